@@ -1,0 +1,85 @@
+"""Small meshes and the checks that any finished surface must pass."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.surface import (
+    Surface,
+    border_edges,
+    components,
+    half_edges,
+    mesh_edges,
+    non_manifold_edges,
+    non_manifold_vertices,
+    orient,
+)
+
+Place = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
+
+
+def plane(u: NDArray[np.float64], v: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.stack([u, v, np.zeros_like(u)], axis=-1)
+
+
+def cylinder(u: NDArray[np.float64], v: NDArray[np.float64], radius: float = 0.2) -> NDArray[np.float64]:
+    """Half a cylinder about Y, seen from +Z: u runs to the right over pi * radius, v up over 0.5."""
+    angle = np.pi * (u - 0.5)
+    return np.stack([radius * np.sin(angle), 0.5 * v, radius * np.cos(angle)], axis=-1)
+
+
+def sphere(u: NDArray[np.float64], v: NDArray[np.float64], radius: float = 0.2) -> NDArray[np.float64]:
+    """A patch of 1.2 by 1.2 rad about +Z."""
+    a, b = 1.2 * (u - 0.5), 1.2 * (v - 0.5)
+    return radius * np.stack([np.sin(a) * np.cos(b), np.sin(b), np.cos(a) * np.cos(b)], axis=-1)
+
+
+def grid(columns: int, rows: int, place: Place = plane) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Vertices row by row from below, and quads wound counter-clockwise as seen from +Z."""
+    u, v = np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, rows))
+    i = np.arange(columns * rows, dtype=np.int32).reshape(rows, columns)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    return place(u.ravel(), v.ravel()), quads
+
+
+def scattered(count: int, place: Place, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
+    """Irregular triangles with a straight column of edges at u = 0.5; the last array is that column from below."""
+    from scipy.spatial import Delaunay
+
+    b = np.linspace(0, 1, int(np.sqrt(count)))
+    inner = np.random.default_rng(seed).random((count, 2))
+    inner = inner[(np.abs(inner[:, 0] - 0.5) > 0.6 / len(b)) & (np.abs(inner - 0.5).max(axis=1) < 0.5 - 0.3 / len(b))]
+    zero, one, half = np.zeros_like(b), np.ones_like(b), np.full_like(b, 0.5)
+    sides = [np.stack(p, axis=1) for p in ((zero, b), (one, b), (half, b))]
+    ends = [np.stack(p, axis=1)[1:-1] for p in ((b, zero), (b, one))]
+    points = np.unique(np.concatenate([inner, *sides, *ends]).round(12), axis=0)
+    triangles = Delaunay(points).simplices
+    area = np.linalg.det(points[triangles[:, 1:]] - points[triangles[:, :1]])
+    triangles = triangles[np.abs(area) > 1e-9].astype(np.int32)
+    column = np.flatnonzero(points[:, 0] == 0.5)
+    column = column[np.argsort(points[column, 1])].astype(np.int32)
+    return place(points[:, 0], points[:, 1]), triangles, column
+
+
+def check_invariants(surface: Surface) -> None:
+    """What the rest of the package relies on."""
+    faces = surface.faces
+    assert faces.dtype == np.int32
+    assert faces.shape[1] == 4
+    assert surface.vertices.dtype == np.float64
+    assert np.isfinite(surface.vertices).all()
+    assert np.array_equal(np.unique(faces[faces >= 0]), np.arange(len(surface.vertices)))
+    assert len(non_manifold_edges(faces)) == 0
+    assert len(non_manifold_vertices(faces)) == 0
+    assert components(faces).max() == 0
+    assert len(border_edges(faces)) > 0
+    assert orient(faces)[1] == 0
+    he = half_edges(faces)
+    assert len(np.unique(np.stack([he.tail, he.head], axis=1), axis=0)) == len(he.tail)
+    assert np.array_equal(surface.vertices, surface.input_vertices[surface.input_index])
+    edges = {tuple(edge) for edge in mesh_edges(faces).tolist()}
+    for line in surface.lines.values():
+        assert all((min(a, b), max(a, b)) in edges for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))

@@ -1,0 +1,69 @@
+"""warpflat: flat sewing patterns from 3D garment surfaces, by minimum strain energy on NVIDIA Warp.
+
+>>> import warpflat
+>>> result = warpflat.flatten("bodice.obj", units="m", fabric="woven")
+>>> result.save("out")
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat._version import __version__
+
+if TYPE_CHECKING:
+    from warpflat.errors import InputError
+    from warpflat.fabric import Fabric, find_fabric, load_library
+    from warpflat.flattening import Flattening, Progress, flatten
+    from warpflat.relax import RelaxOptions
+    from warpflat.surface import Surface, make_surface, read_surface
+
+_here = Path(__file__).parent
+if not (_here / "kernels").is_dir() and (_here.parent / "kernels").is_dir():
+    # Imported from a checkout's root, where the kernels lie beside this folder and not in it.
+    __path__.append(str(_here.parent))
+
+_HOME = {
+    "Fabric": "fabric",
+    "Flattening": "flattening",
+    "InputError": "errors",
+    "Progress": "flattening",
+    "RelaxOptions": "relax",
+    "Surface": "surface",
+    "find_fabric": "fabric",
+    "flatten": "flattening",
+    "load_library": "fabric",
+    "make_surface": "surface",
+    "read_surface": "surface",
+}
+
+__all__ = [
+    "Fabric",
+    "Flattening",
+    "InputError",
+    "Progress",
+    "RelaxOptions",
+    "Surface",
+    "__version__",
+    "find_fabric",
+    "flatten",
+    "load_library",
+    "make_surface",
+    "read_surface",
+]
+
+
+def __getattr__(name: str) -> Any:
+    # Names are loaded when first used, so that `import warpflat` and `warpflat --help` cost nothing.
+    if name not in _HOME:
+        raise AttributeError(f"module 'warpflat' has no attribute {name!r}")
+    from importlib import import_module
+
+    value = getattr(import_module(f"warpflat.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -1,0 +1,41 @@
+"""The surface: a 3D mesh of quads and/or triangles with named feature lines."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["Surface"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Surface:
+    """One piece of surface in space, checked and ready to be flattened.
+
+    Made by :func:`warpflat.surface.make_surface`, which validates and mends; nothing checks it again.
+
+    Attributes:
+        vertices: #V by 3, positions [m], float64.
+        faces: #F by 4, vertex indices, int32, consistently wound; a triangle has -1 in its last column.
+        lines: feature lines by name: vertex indices along mesh edges, int32; a closed line repeats its first vertex.
+        name: what the piece is called in files and messages.
+        input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it.
+        input_index: #V, for each vertex its row in `input_vertices`.
+        notes: what was mended on the way in, one sentence each.
+    """
+
+    vertices: NDArray[np.float64]
+    faces: NDArray[np.int32]
+    lines: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
+    name: str = "piece"
+    input_vertices: NDArray[np.float64]
+    input_index: NDArray[np.int32]
+    notes: tuple[str, ...] = ()
+
+    @property
+    def is_quad(self) -> NDArray[np.bool_]:
+        """#F, true for quads."""
+        return self.faces[:, 3] >= 0

@@ -1,0 +1,132 @@
+"""Shortest paths along mesh edges."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import mesh_edges
+
+if TYPE_CHECKING:
+    from scipy.sparse import csr_matrix
+
+__all__ = ["EdgeGraph", "as_vertex", "chain_positions"]
+
+# A point given by coordinates must lie this close to the piece: as a share of its diagonal, or in edge lengths.
+_NEAR_SHARE = 0.1
+_NEAR_EDGES = 2.0
+
+
+class EdgeGraph:
+    """The edges of a surface, ready for searches.
+
+    Attributes:
+        edges: #E by 2.
+        length: #E [m].
+        size: #V.
+    """
+
+    def __init__(self, surface: Surface) -> None:
+        self.edges = mesh_edges(surface.faces)
+        self.size = len(surface.vertices)
+        ends = surface.vertices[self.edges]
+        self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self._keys = self.edges[:, 0].astype(np.int64) * self.size + self.edges[:, 1]
+
+    def are_joined(self, a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
+        """Whether edges a-b exist."""
+        one, two = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
+        key = np.minimum(one, two) * self.size + np.maximum(one, two)
+        at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
+        return self._keys[at] == key
+
+    def matrix(self, weight: NDArray[np.float64]) -> csr_matrix:
+        """#V by #V, the weight of each edge."""
+        from scipy.sparse import coo_matrix
+
+        a, b = self.edges.T
+        both = (np.concatenate([a, b]), np.concatenate([b, a]))
+        # A weight of zero would be read as "no edge".
+        safe = np.maximum(np.concatenate([weight, weight]), np.finfo(float).tiny)
+        return coo_matrix((safe, both), shape=(self.size, self.size)).tocsr()
+
+    def path(self, start: int, end: int, weight: NDArray[np.float64] | None = None) -> NDArray[np.int32]:
+        """The path of least weight (by default: of least length) from `start` to `end`."""
+        return path_in(self.matrix(self.length if weight is None else weight), start, end)
+
+
+def path_in(matrix: csr_matrix, start: int, end: int) -> NDArray[np.int32]:
+    """The path of least weight in a matrix of weights, or an empty array if there is none."""
+    from scipy.sparse.csgraph import dijkstra
+
+    _, before = dijkstra(matrix, indices=start, return_predecessors=True)
+    path = [end]
+    while path[-1] != start:
+        step = int(before[path[-1]])
+        if step < 0:
+            return np.empty(0, dtype=np.int32)
+        path.append(step)
+    return np.array(path[::-1], dtype=np.int32)
+
+
+def as_vertex(
+    surface: Surface, place: int | ArrayLike, *, as_read: bool = False, among: NDArray[np.int32] | None = None
+) -> int:
+    """The vertex that a user means by an index or by a point.
+
+    Args:
+        surface: where.
+        place: a vertex index, or three coordinates [m], which stand for the nearest vertex.
+        as_read: the index counts the vertices of the file (from 0) instead of the surface's.
+        among: only these vertices may be meant by a point; an index is taken as it is.
+
+    Raises:
+        InputError: if the index does not exist or the point is off the piece.
+    """
+    if np.ndim(place) == 0:
+        return _by_index(surface, place, as_read)
+    point = np.asarray(place, dtype=np.float64)
+    if point.shape != (3,) or not np.isfinite(point).all():
+        raise InputError(f"a place is a vertex index or a point of three numbers [m], got {place!r}")
+    choice = np.arange(len(surface.vertices)) if among is None else among
+    distance = np.linalg.norm(surface.vertices[choice] - point, axis=1)
+    vertex = int(choice[np.argmin(distance)])
+    diagonal = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    ring = mesh_edges(surface.faces[(surface.faces == vertex).any(axis=1)])
+    edge = np.linalg.norm(surface.vertices[ring[:, 0]] - surface.vertices[ring[:, 1]], axis=1).max()
+    if distance.min() > max(_NEAR_SHARE * diagonal, _NEAR_EDGES * edge):
+        x, y, z = surface.vertices[vertex].tolist()
+        raise InputError(
+            f"the point ({point[0]:g}, {point[1]:g}, {point[2]:g}) is {distance.min():.3g} m off the piece "
+            f"{surface.name!r}; its nearest vertex is {vertex} at ({x:.4g}, {y:.4g}, {z:.4g})"
+        )
+    return vertex
+
+
+def _by_index(surface: Surface, place: object, as_read: bool) -> int:
+    if isinstance(place, (bool, np.bool_)) or not isinstance(place, (int, np.integer)):
+        raise InputError(f"a place is a vertex index or a point of three numbers [m], got {place!r}")
+    index = int(place)
+    total = len(surface.input_vertices) if as_read else len(surface.vertices)
+    if not 0 <= index < total:
+        raise InputError(f"vertex {index} does not exist in {surface.name!r}: valid are 0 to {total - 1}")
+    if not as_read:
+        return index
+    at = np.flatnonzero(surface.input_index == index)
+    if len(at) == 0:
+        # Welded or merged away: what lies in its place is what the user sees there.
+        point = surface.input_vertices[index]
+        distance = np.linalg.norm(surface.vertices - point, axis=1)
+        if distance.min() > 1e-4 * np.linalg.norm(np.ptp(surface.vertices, axis=0)):
+            raise InputError(f"vertex {index} of the input is not part of the piece {surface.name!r}")
+        return int(np.argmin(distance))
+    return int(at[0])
+
+
+def chain_positions(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """#P, the arc length [m] at each point of a polyline."""
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])

@@ -1,0 +1,191 @@
+"""From polygons as files have them to faces of three or four distinct, convex corners."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError
+
+__all__ = ["distinct_corners", "list_some", "padded_polygons", "split_non_convex_quads", "split_polygons"]
+
+
+def list_some(indices: ArrayLike, most: int = 8) -> str:
+    """`3, 4, 9 and 12 more`: enough of a list to go and look, short enough for one line."""
+    values = np.asarray(indices).ravel()
+    shown = ", ".join(str(int(i)) for i in values[:most])
+    return shown if len(values) <= most else f"{shown} and {len(values) - most:,} more"
+
+
+def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
+    """#F by the largest corner count, vertex indices, filled up with -1 on the right.
+
+    Raises:
+        InputError: if there are no polygons or one has fewer than three corners.
+    """
+    if isinstance(polygons, np.ndarray) and polygons.ndim == 2 and polygons.shape[1] >= 3:
+        if len(polygons) == 0:
+            raise InputError("there are no faces")
+        if not np.issubdtype(polygons.dtype, np.integer):
+            raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
+        return polygons.astype(np.int64)
+    rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+    if not rows:
+        raise InputError("there are no faces")
+    try:
+        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
+        flat = np.concatenate([np.asarray(row, dtype=np.int64).ravel() for row in rows])
+    except (TypeError, ValueError) as error:
+        raise InputError("faces must be lists of vertex indices, one list per face") from error
+    short = np.flatnonzero(count < 3)
+    if len(short):
+        raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
+    out = np.full((len(rows), max(int(count.max()), 3)), -1, dtype=np.int64)
+    out[np.arange(out.shape[1]) < count[:, None]] = flat
+    return out
+
+
+def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+    """Polygons without corners that repeat the one before.
+
+    A quad with two equal neighbouring corners is a triangle; what keeps fewer than three corners, or the same vertex
+    twice apart from each other, is no face.
+
+    Returns:
+        #F by k polygons; #F, which of them are faces; #F, which of those lost a corner.
+    """
+    ordered = np.sort(polygons, axis=1)
+    suspect = np.flatnonzero(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1))
+    out = polygons.copy()
+    keep = np.ones(len(polygons), dtype=bool)
+    lost = np.zeros(len(polygons), dtype=bool)
+    for row in suspect.tolist():
+        corners = [c for c in polygons[row].tolist() if c >= 0]
+        kept = [c for i, c in enumerate(corners) if c != corners[i - 1]]
+        keep[row] = len(kept) >= 3 and len(set(kept)) == len(kept)
+        lost[row] = keep[row]
+        out[row] = kept + [-1] * (polygons.shape[1] - len(kept))
+    return out, keep, lost
+
+
+def split_polygons(
+    vertices: NDArray[np.float64], polygons: NDArray[np.int64]
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """#F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
+
+    Polygons of more than four corners are cut into triangles, ear by ear, in the plane that fits them.
+
+    Raises:
+        InputError: naming the polygon, if its outline crosses itself.
+    """
+    if polygons.shape[1] <= 4:
+        faces = np.full((len(polygons), 4), -1, dtype=np.int32)
+        faces[:, : polygons.shape[1]] = polygons
+        return faces, np.arange(len(polygons), dtype=np.int32)
+    large = polygons[:, 4] >= 0
+    parts = [polygons[~large, :4].astype(np.int32)]
+    origin = [np.flatnonzero(~large).astype(np.int32)]
+    for row in np.flatnonzero(large).tolist():
+        corners = polygons[row][polygons[row] >= 0]
+        triangles = _clip_ears(vertices[corners], row)
+        block = np.full((len(triangles), 4), -1, dtype=np.int32)
+        block[:, :3] = corners[np.array(triangles)]
+        parts.append(block)
+        origin.append(np.full(len(triangles), row, dtype=np.int32))
+    index = np.concatenate(origin)
+    order = np.argsort(index, kind="stable")
+    return np.concatenate(parts)[order], index[order]
+
+
+def _newell(points: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Twice the vector area of a closed polygon."""
+    return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def _clip_ears(points: NDArray[np.float64], row: int) -> list[list[int]]:
+    """Triangles (local corner numbers) of one simple polygon."""
+    centred = points - points.mean(axis=0)
+    normal = _newell(centred)
+    drop = int(np.argmax(np.abs(normal)))
+    flat = np.delete(centred, drop, axis=1)
+    turn = np.sign(normal[drop]) * (-1.0 if drop == 1 else 1.0)
+
+    def area(i: int, j: int, k: int) -> float:
+        (ax, ay), (bx, by), (cx, cy) = flat[i], flat[j], flat[k]
+        return float(turn * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
+
+    ring = list(range(len(points)))
+    triangles = []
+    while len(ring) > 3:
+        best, best_ear = 0.0, -1
+        for n, j in enumerate(ring):
+            i, k = ring[n - 1], ring[(n + 1) % len(ring)]
+            size = area(i, j, k)
+            if size <= best:
+                continue
+            others = (p for p in ring if p not in (i, j, k))
+            if not any(area(i, j, p) >= 0 and area(j, k, p) >= 0 and area(k, i, p) >= 0 for p in others):
+                best, best_ear = size, n
+        if best_ear < 0:
+            raise InputError(f"face {row} (counted from 0) crosses itself: it cannot be cut into triangles")
+        triangles.append([ring[best_ear - 1], ring[best_ear], ring[(best_ear + 1) % len(ring)]])
+        del ring[best_ear]
+    triangles.append(ring)
+    return triangles
+
+
+def split_non_convex_quads(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], origin: NDArray[np.int32], tolerance: float
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Quads with a straight or inward corner, cut into two triangles from that corner.
+
+    The corner triangle there would have no area, or less: no measure by corners could tell it from a flipped one.
+
+    Args:
+        vertices: #V by 3, positions [m].
+        faces: #F by 4.
+        origin: #F, the input face of each.
+        tolerance: a corner counts as straight if its height over the diagonal before it is below this share of the
+            quad's mean edge.
+
+    Returns:
+        Faces, origins, and the input faces that were cut.
+
+    Raises:
+        InputError: naming the quad whose sides cross.
+    """
+    quads = np.flatnonzero(faces[:, 3] >= 0)
+    p = vertices[faces[quads]]
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
+    chord = np.linalg.norm(after - before, axis=2)
+    mean = np.linalg.norm(after - p, axis=2).mean(axis=1)
+    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit)
+    height = twice / np.maximum(chord, np.finfo(float).tiny)
+    inward = height <= tolerance * mean[:, None]
+    # Where no corner spans an area there is no inside: that is a sliver, not a matter of convexity.
+    spread = np.linalg.norm(np.cross(p - before, after - p), axis=2).max(axis=1)
+    thin = spread <= tolerance * mean * np.maximum(chord, np.linalg.norm(after - p, axis=2)).max(axis=1)
+    folded = (inward.sum(axis=1) > 1) & (height.min(axis=1) < -tolerance * mean)
+    void = np.linalg.norm(normal, axis=1) <= tolerance * mean * chord.max(axis=1)
+    crossed = np.flatnonzero((folded | void) & ~thin)
+    if len(crossed):
+        raise InputError(
+            f"face {origin[quads[crossed[0]]]} (counted from 0) is a quad whose sides cross, or is folded by more than "
+            "90 degrees; list its corners in order around it, or give triangles"
+        )
+    cut = inward.any(axis=1) & ~thin
+    if not cut.any():
+        return faces, origin, np.empty(0, dtype=np.int32)
+    rows, corner = quads[cut], np.argmin(height[cut], axis=1)
+    turned = faces[rows][np.arange(len(rows))[:, None], (corner[:, None] + np.arange(4)) % 4]
+    none = np.full(len(rows), -1, dtype=np.int32)
+    out = faces.copy()
+    out[rows] = np.column_stack([turned[:, :3], none])
+    second = np.column_stack([turned[:, 0], turned[:, 2], turned[:, 3], none])
+    # Each second half directly behind its first keeps the order of the input faces.
+    return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]

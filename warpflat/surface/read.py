@@ -1,0 +1,261 @@
+"""Surfaces from files: the format by the suffix, the unit by the file or by word, then through the one door."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError, nearest
+from warpflat.surface.lines import line_from_curve, with_lines
+from warpflat.surface.mend import make_surface
+from warpflat.surface.mesh import Surface
+from warpflat.surface.read_obj import read_obj
+from warpflat.surface.read_usd import read_usd
+
+__all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_surface"]
+
+METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+_METRES = (".glb", ".gltf")
+SUFFIXES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl", *_USD)
+
+# A piece of a garment lies between these extents [m]; a usual one between the other two.
+_POSSIBLE = (3e-3, 20.0)
+_USUAL = (0.02, 5.0)
+
+
+@dataclass(kw_only=True)
+class _Raw:
+    """What any format comes down to. `scale` is metres per unit, None where the file does not say."""
+
+    vertices: NDArray[np.float64]
+    polygons: NDArray[np.int64]
+    scale: float | None
+    split_corners: bool = False
+    name: str | None = None
+    curves: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_surface(
+    path: str | PathLike[str],
+    *,
+    units: str | None = None,
+    component: int | Literal["largest"] | None = None,
+    name: str | None = None,
+    prim: str | None = None,
+    weld: bool | None = None,
+) -> Surface:
+    """Read, mend and check a surface.
+
+    OBJ keeps its quads, and USD too; PLY, STL, OFF, GLB and glTF are read with trimesh, which cuts polygons into
+    triangles. GLB and glTF are in metres and Y up by their standard, USD says its unit and its up axis (Z up is turned
+    to Y up); all other axes are taken as they are. Line elements of OBJ and linear BasisCurves beside or below a USD
+    mesh become feature lines.
+
+    Args:
+        path: the file.
+        units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
+            overrides what the file says.
+        component: which connected part to take if there are several: "largest", or its number, largest first from 0.
+        name: what to call the piece; by default the file's stem, or the USD prim's name.
+        prim: which mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
+        weld: whether vertices at the same place are one; by default judged by format and mesh (see
+            :func:`warpflat.surface.make_surface`).
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    file = Path(path)
+    try:
+        if units is not None and units not in METRES_PER_UNIT:
+            raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
+        _check_file(file)
+        raw = _read(file, units, prim)
+        if raw.scale is None:
+            raise InputError(_ask_for_units(raw))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    surface = make_surface(
+        raw.vertices * raw.scale,
+        raw.polygons,
+        name=name or raw.name or file.stem,
+        lines=raw.chains,
+        component=component,
+        weld=weld,
+        split_corners=raw.split_corners,
+        source=str(file),
+    )
+    _check_size(surface, file, raw.scale)
+    surface = _snap_curves(surface, {key: curve * raw.scale for key, curve in raw.curves.items()})
+    return replace(surface, notes=(*raw.notes, *surface.notes))
+
+
+def _check_file(file: Path) -> None:
+    if file.is_dir():
+        raise InputError("is a directory, not a mesh file")
+    if not file.exists():
+        beside = [p.name for p in file.parent.iterdir() if p.suffix in SUFFIXES] if file.parent.is_dir() else []
+        close = nearest(file.name, beside).partition("? ")[0] if beside else ""
+        raise InputError("does not exist" + (f"; {close}?" if close.startswith("did you mean") else ""))
+    if file.suffix.lower() not in SUFFIXES:
+        raise InputError(f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}")
+    if file.stat().st_size == 0:
+        raise InputError("is empty")
+
+
+def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
+    suffix = file.suffix.lower()
+    scale = METRES_PER_UNIT[units] if units else None
+    if suffix in _USD:
+        mesh = read_usd(file, prim=prim, metres_per_unit=scale)
+        return _Raw(
+            vertices=mesh.vertices,
+            polygons=mesh.polygons,
+            scale=1.0,
+            name=mesh.name,
+            curves=mesh.curves,
+            notes=mesh.notes,
+        )
+    if prim is not None and suffix not in _METRES:
+        raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
+    if suffix == ".obj":
+        return _from_obj(file, scale)
+    return _from_trimesh(file, scale, prim)
+
+
+def _from_obj(file: Path, scale: float | None) -> _Raw:
+    obj = read_obj(file)
+    raw = _Raw(vertices=obj.vertices, polygons=obj.polygons, scale=scale, split_corners=obj.split_corners)
+    if not obj.lines:
+        return raw
+    edges = _directed_edges(obj.polygons)
+    stride = len(obj.vertices)
+    for name, chains in obj.lines.items():
+        for number, chain in enumerate(chains):
+            key = name if len(chains) == 1 else f"{name}_{number + 1}"
+            line = np.array(chain, dtype=np.int64)
+            if np.isin(line[:-1] * stride + line[1:], edges).all():
+                raw.chains[key] = line
+            else:
+                raw.curves[key] = obj.vertices[line]
+    return raw
+
+
+def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The sides of all polygons, both ways, each as one number: tail times the count of vertices plus head."""
+    size = (polygons >= 0).sum(axis=1)
+    column = np.arange(polygons.shape[1])
+    follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
+    heads = np.take_along_axis(polygons, follow, axis=1)
+    real = polygons >= 0
+    a, b = polygons[real], heads[real]
+    stride = int(polygons.max()) + 1
+    return np.unique(np.concatenate([a * stride + b, b * stride + a]))
+
+
+def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
+    import trimesh
+
+    suffix = file.suffix.lower()
+    options = {"fix_texture": False} if suffix == ".ply" else {}
+    try:
+        scene = trimesh.load_scene(str(file), process=False, **options)
+    # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
+    except Exception as error:
+        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
+        raise InputError(f"not a readable {suffix[1:].upper()} file ({reason[:120]})") from error
+    meshes = list(_instances(scene))
+    if prim is not None:
+        names = [node for node, _, _ in meshes]
+        meshes = [item for item in meshes if item[0] == prim]
+        if not meshes:
+            raise InputError(f"there is no mesh node {prim!r}; {nearest(prim, names)}")
+    if not any(len(faces) for _, _, faces in meshes):
+        raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
+    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)])
+    textured = any(
+        getattr(m.visual, "kind", None) == "texture" for m in scene.geometry.values() if hasattr(m, "visual")
+    )
+    return _Raw(
+        vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
+        polygons=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
+        scale=1.0 if scale is None and suffix in _METRES else scale,
+        split_corners=suffix in (".stl", *_METRES) or (suffix == ".ply" and textured),
+    )
+
+
+def _instances(scene: Any) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.int64]]]:
+    """The meshes of a trimesh scene: node, world positions, triangles."""
+    import trimesh
+
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry]
+        if not isinstance(mesh, trimesh.Trimesh):
+            continue
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        matrix = np.asarray(transform, dtype=np.float64)
+        if not np.array_equal(matrix, np.eye(4)):
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+
+
+def _extent(points: NDArray[np.float64], scale: float) -> str:
+    return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
+
+
+def _ask_for_units(raw: _Raw) -> str:
+    used = np.unique(raw.polygons[raw.polygons >= 0])
+    points = raw.vertices[used[used < len(raw.vertices)]]
+    points = points[np.isfinite(points).all(axis=1)]
+    sizes = "; ".join(f'"{unit}": {_extent(points, METRES_PER_UNIT[unit])} m' for unit in ("m", "cm", "mm"))
+    return (
+        'carries no unit: say which with units = "m" in the scene or --units m on the command line '
+        f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
+    )
+
+
+def _check_size(surface: Surface, file: Path, scale: float) -> None:
+    size = float(np.ptp(surface.vertices, axis=0).max())
+    if _POSSIBLE[0] <= size <= _POSSIBLE[1]:
+        return
+    fitting = [u for u, metres in METRES_PER_UNIT.items() if _USUAL[0] <= size / scale * metres <= _USUAL[1]]
+    what = "larger than any garment" if size > 1 else "smaller than any piece of a garment"
+    advice = " or ".join(f'units = "{unit}" ({size / scale * METRES_PER_UNIT[unit]:.3g} m)' for unit in fitting)
+    raise InputError(
+        f"{file}: the piece would be {size:.4g} m long, {what}; "
+        + (f"plausible: {advice}" if advice else "no usual unit makes it plausible: scale the mesh")
+    )
+
+
+def _snap_curves(surface: Surface, curves: dict[str, NDArray[np.float64]]) -> Surface:
+    """Curves as feature lines; those that do not lie on the piece are left out with a note."""
+    if not curves:
+        return surface
+    from scipy.spatial import cKDTree
+
+    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    notes = list(surface.notes)
+    lines = {}
+    for name, curve in curves.items():
+        try:
+            lines[name] = line_from_curve(surface, curve, name=name)
+        except InputError as error:
+            notes.append(f"line left out: {error}")
+            continue
+        off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
+        if off.max() > 1e-6 * size:
+            notes.append(f"line {name!r} was drawn along the nearest edges")
+    return replace(with_lines(surface, lines), notes=tuple(notes))

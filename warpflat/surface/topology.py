@@ -1,0 +1,369 @@
+"""How the faces of a mesh hang together: pure functions, arrays in, new arrays out.
+
+Faces are #F by 4 vertex indices with -1 in the last column of a triangle (#F by 3 is taken for triangles only).
+No function changes its arguments. Unless a docstring says otherwise the mesh may be wound inconsistently and an edge
+may have any number of faces, so the same functions serve to check a mesh at the door and to query it afterwards.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError
+
+__all__ = [
+    "HalfEdges",
+    "border_edges",
+    "border_loops",
+    "components",
+    "corner_fans",
+    "corner_triangles",
+    "edge_faces",
+    "euler_characteristic",
+    "half_edges",
+    "mesh_edges",
+    "non_manifold_edges",
+    "non_manifold_vertices",
+    "orient",
+    "triangulate",
+    "unfold_quad_diagonals",
+]
+
+
+@dataclass(frozen=True, kw_only=True)
+class HalfEdges:
+    """Every side of every face, in the order of the faces: half-edge h runs from corner h to the next of its face.
+
+    Attributes:
+        tail, head: #H, the vertices it runs from and to.
+        face: #H, the face it bounds.
+        slot: #H, the column of `tail` in that face.
+        next: #H, the half-edge that follows in the face.
+        edge: #H, its row in `edges`.
+        edges: #E by 2, unique edges as (lower, higher) vertex, sorted.
+        count: #E, how many faces lie at each edge.
+    """
+
+    tail: NDArray[np.int32]
+    head: NDArray[np.int32]
+    face: NDArray[np.int32]
+    slot: NDArray[np.int32]
+    next: NDArray[np.int64]
+    edge: NDArray[np.int64]
+    edges: NDArray[np.int32]
+    count: NDArray[np.int64]
+
+
+def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
+    array = np.asarray(faces, dtype=np.int32)
+    if array.size == 0:
+        return np.empty((0, 4), dtype=np.int32)
+    if array.ndim != 2 or array.shape[1] not in (3, 4):
+        raise InputError(f"faces must be #F by 4 (or #F by 3), got an array of shape {array.shape}")
+    if array.shape[1] == 3:
+        return np.column_stack([array, np.full(len(array), -1, dtype=np.int32)])
+    return array
+
+
+def half_edges(faces: ArrayLike) -> HalfEdges:
+    """The sides of all faces with their unique edges: what the other functions here are built on."""
+    quads = _four_columns(faces)
+    sides = 3 + (quads[:, 3] >= 0).astype(np.int64)
+    total = int(sides.sum())
+    face = np.repeat(np.arange(len(quads), dtype=np.int32), sides)
+    first = np.cumsum(sides) - sides
+    index = np.arange(total, dtype=np.int64)
+    slot = index - first[face]
+    follow = np.where(slot + 1 == sides[face], first[face], index + 1)
+    tail = quads[face, slot]
+    head = tail[follow]
+    low, high = np.minimum(tail, head), np.maximum(tail, head)
+    stride = np.int64(quads.max(initial=0)) + 1
+    keys, edge, count = np.unique(low.astype(np.int64) * stride + high, return_inverse=True, return_counts=True)
+    edges = np.column_stack([keys // stride, keys % stride]).astype(np.int32)
+    return HalfEdges(
+        tail=tail,
+        head=head,
+        face=face,
+        slot=slot.astype(np.int32),
+        next=follow,
+        edge=edge.reshape(-1),
+        edges=edges,
+        count=count,
+    )
+
+
+def mesh_edges(faces: ArrayLike) -> NDArray[np.int32]:
+    """#E by 2, the unique edges as (lower, higher) vertex, sorted by the first, then the second. No diagonals."""
+    return half_edges(faces).edges
+
+
+def edge_faces(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The edges (as :func:`mesh_edges`) and, #E by 2, the faces beside each: lower index first, -1 on the border.
+
+    Of an edge with more than two faces the two lowest are given; :func:`non_manifold_edges` finds those edges.
+    """
+    he = half_edges(faces)
+    beside = np.full((len(he.edges), 2), -1, dtype=np.int32)
+    order = np.argsort(he.edge, kind="stable")
+    start = np.cumsum(he.count) - he.count
+    beside[:, 0] = he.face[order[start]]
+    second = he.count > 1
+    beside[second, 1] = he.face[order[start[second] + 1]]
+    return he.edges, beside
+
+
+def non_manifold_edges(faces: ArrayLike) -> NDArray[np.int32]:
+    """#N by 2, the edges with more than two faces, as (lower, higher) vertex."""
+    he = half_edges(faces)
+    return he.edges[he.count > 2]
+
+
+def border_edges(faces: ArrayLike) -> NDArray[np.int32]:
+    """#B by 2, the edges with one face, as (from, to) in the direction in which that face runs through them."""
+    he = half_edges(faces)
+    alone = he.count[he.edge] == 1
+    return np.column_stack([he.tail[alone], he.head[alone]])
+
+
+def _paired(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Half-edges that share an edge, as pairs; around an edge with n faces, n - 1 pairs."""
+    order = np.argsort(he.edge, kind="stable")
+    same = he.edge[order[1:]] == he.edge[order[:-1]]
+    return order[:-1][same], order[1:][same]
+
+
+def _labels(size: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> NDArray[np.int32]:
+    """Connected components of `size` nodes joined by the pairs a-b."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(size, size))
+    return connected_components(graph, directed=False)[1].astype(np.int32)
+
+
+def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
+    """#F, the connected component of each face, numbered from 0 by each component's first face.
+
+    Faces are connected across shared edges; two faces that touch in a single vertex are not.
+
+    Args:
+        faces: #F by 4.
+        barrier: #B by 2, edges that do not connect, such as those of a line that may part the surface.
+    """
+    he = half_edges(faces)
+    size = len(_four_columns(faces))
+    if size == 0:
+        return np.empty(0, dtype=np.int32)
+    a, b = _paired(he)
+    if barrier is not None and len(barrier):
+        stride = np.int64(max(he.edges.max(), barrier.max())) + 1
+        blocked = barrier.min(axis=1).astype(np.int64) * stride + barrier.max(axis=1)
+        open_edge = ~np.isin(he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1], blocked)
+        passable = open_edge[he.edge[a]]
+        a, b = a[passable], b[passable]
+    labels = _labels(size, he.face[a].astype(np.int64), he.face[b].astype(np.int64))
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
+
+
+def corner_fans(faces: ArrayLike) -> NDArray[np.int32]:
+    """#H, for each corner (the tails of :func:`half_edges`) the fan of faces around its vertex that it belongs to.
+
+    Corners at one vertex are of one fan where their faces share an edge at that vertex. A vertex of a manifold has one
+    fan; a vertex with more is where parts of the surface touch in a point only.
+    """
+    return _corner_fans(half_edges(faces))
+
+
+def _corner_fans(he: HalfEdges) -> NDArray[np.int32]:
+    a, b = _paired(he)
+    opposite = he.tail[a] == he.head[b]
+    at_tail = np.where(opposite, he.next[b], b)
+    at_head = np.where(opposite, b, he.next[b])
+    return _labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([at_tail, at_head]))
+
+
+def non_manifold_vertices(faces: ArrayLike) -> NDArray[np.int32]:
+    """#N, the vertices at which several fans of faces touch in the point only (bow ties), sorted."""
+    he = half_edges(faces)
+    if len(he.tail) == 0:
+        return np.empty(0, dtype=np.int32)
+    _, first = np.unique(_corner_fans(he), return_index=True)
+    vertex, count = np.unique(he.tail[first], return_counts=True)
+    return vertex[count > 1].astype(np.int32)
+
+
+def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) -> list[NDArray[np.int32]]:
+    """The closed loops of border edges, each a vertex array that does *not* repeat its first vertex.
+
+    Args:
+        faces: consistently wound (see :func:`orient`), no non-manifold edge.
+        vertices: #V by 3 positions [m]; when given, "longest" means metres, else the number of edges.
+
+    Returns:
+        Loops in the direction in which the faces run through them (the surface lies to the left, seen from outside),
+        each from its lowest vertex, the longest loop first. Where two loops touch in a vertex each stays with its own
+        fan of faces.
+
+    Raises:
+        InputError: if the winding is inconsistent, so that border edges do not follow each other.
+    """
+    he = half_edges(faces)
+    alone = np.flatnonzero(he.count[he.edge] == 1)
+    start, end = alone, he.next[alone]
+    node = he.tail
+    if len(np.unique(he.tail[start])) < len(start):
+        node = _corner_fans(he)
+    follow = dict(zip(node[start].tolist(), node[end].tolist(), strict=True))
+    if len(follow) < len(start) or set(follow) != set(follow.values()):
+        raise InputError("the border does not close into loops: the faces are wound inconsistently; orient them first")
+    vertex = dict(zip(node[start].tolist(), he.tail[start].tolist(), strict=True))
+    loops = []
+    for seed in sorted(follow, key=vertex.__getitem__):
+        if seed not in follow:
+            continue
+        loop = []
+        here = seed
+        while here in follow:
+            loop.append(vertex[here])
+            here = follow.pop(here)
+        loops.append(np.array(loop, dtype=np.int32))
+
+    def length(loop: NDArray[np.int32]) -> float:
+        if vertices is None:
+            return float(len(loop))
+        return float(np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum())
+
+    return sorted(loops, key=length, reverse=True)
+
+
+def euler_characteristic(faces: ArrayLike) -> int:
+    """Vertices in use - edges + faces: 2 - 2 (handles) - (border loops) for one connected, orientable surface."""
+    he = half_edges(faces)
+    return len(np.unique(he.tail)) - len(he.edges) + len(_four_columns(faces))
+
+
+def orient(faces: ArrayLike) -> tuple[NDArray[np.int32], int]:
+    """Faces wound consistently, and how many of them had to be turned over.
+
+    In each component the winding of the majority is kept. Edges with more than two faces are not crossed.
+
+    Raises:
+        InputError: if a component is one-sided, like a Möbius strip.
+    """
+    quads = _four_columns(faces)
+    he = half_edges(quads)
+    a, b = _paired(he)
+    plain = he.count[he.edge[a]] == 2
+    a, b = a[plain], b[plain]
+    agree = he.tail[a] == he.head[b]
+    size = len(quads)
+    fa, fb = he.face[a].astype(np.int64), he.face[b].astype(np.int64)
+    # Two copies of each face, one per side: neighbours that agree join like sides, others unlike ones. A component
+    # of the surface is two-sided exactly if its two copies stay apart (the orientation double cover).
+    other = np.where(agree, fb, fb + size)
+    mirror = np.where(agree, fb + size, fb)
+    labels = _labels(2 * size, np.concatenate([fa, fa + size]), np.concatenate([other, mirror]))
+    front, back = labels[:size], labels[size:]
+    one_sided = np.flatnonzero(front == back)
+    if len(one_sided):
+        raise InputError(
+            f"the surface is one-sided (like a Möbius strip) around face {int(one_sided[0])}: its faces cannot be "
+            "wound consistently; cut it open there"
+        )
+    votes = np.bincount(front, minlength=2 * size)
+    lowest = np.minimum(front, back)
+    flip = (votes[front] < votes[back]) | ((votes[front] == votes[back]) & (front != lowest))
+    turned = quads.copy()
+    triangle = quads[:, 3] < 0
+    turned[flip & triangle] = quads[flip & triangle][:, [0, 2, 1, 3]]
+    turned[flip & ~triangle] = quads[flip & ~triangle][:, [0, 3, 2, 1]]
+    return turned, int(flip.sum())
+
+
+def triangulate(
+    faces: ArrayLike, *, other_diagonal: bool | NDArray[np.bool_] = False
+) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """#T by 3 triangles, in the order of the faces, and #T, the face of each. Winding is kept.
+
+    Args:
+        faces: #F by 4.
+        other_diagonal: where true (one value or #F) a quad is split along its corners 1-3 instead of 0-2.
+    """
+    quads = _four_columns(faces)
+    is_quad = quads[:, 3] >= 0
+    turn = np.broadcast_to(np.asarray(other_diagonal, dtype=bool), is_quad.shape) & is_quad
+    rolled = np.where(turn[:, None], np.roll(quads, -1, axis=1), quads)
+    both = np.stack([rolled[:, [0, 1, 2]], rolled[:, [0, 2, 3]]], axis=1)
+    keep = np.column_stack([np.ones(len(quads), dtype=bool), is_quad])
+    face = np.repeat(np.arange(len(quads), dtype=np.int32), 2).reshape(-1, 2)
+    return np.ascontiguousarray(both[keep]), face[keep]
+
+
+def corner_triangles(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+    """Triangles that measure both splits of a quad at once.
+
+    A triangle gives itself with weight 1; a quad gives its four corner triangles (before, corner, after) with weight
+    1/2: their weighted areas sum to the mean of both ways of splitting it.
+
+    Returns:
+        #C by 3 vertices in the order of the faces, wound as they are; #C, the face of each; #C, the weight.
+    """
+    quads = _four_columns(faces)
+    is_quad = quads[:, 3] >= 0
+    corners = np.stack([quads[:, [(i - 1) % 4, i, (i + 1) % 4]] for i in range(4)], axis=1)
+    corners[~is_quad, 0] = quads[~is_quad, :3]
+    keep = np.repeat(is_quad[:, None], 4, axis=1)
+    keep[:, 0] = True
+    face = np.repeat(np.arange(len(quads), dtype=np.int32), 4).reshape(-1, 4)[keep]
+    return np.ascontiguousarray(corners[keep]), face, np.where(is_quad[face], 0.5, 1.0)
+
+
+def unfold_quad_diagonals(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Both diagonals of each quad, measured on the surface.
+
+    A bent quad is two triangles that meet in one diagonal; the other diagonal is the distance between their far
+    corners once one of them is turned about the shared one into the plane of its neighbour. A planar quad gives the
+    plain distance, also where it is not convex; a bent one is never shortened.
+
+    Args:
+        vertices: #V by 3, positions [m].
+        faces: #F by 4, -1 in the last column of a triangle.
+
+    Returns:
+        #Q by 2 lengths [m], of corners 0-2 (across the hinge 1-3) and of corners 1-3 (across the hinge 0-2); and #Q,
+        the face of each row.
+    """
+    index = np.flatnonzero(faces[:, 3] >= 0).astype(np.int32)
+    corner = vertices[faces[index]]
+    normal = np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    lengths = np.empty((len(index), 2))
+    for column, (a, b, hinge, other) in enumerate(((0, 2, 1, 3), (1, 3, 2, 0))):
+        lengths[:, column] = _across(corner[:, a], corner[:, b], corner[:, hinge], corner[:, other], normal)
+    return lengths, index
+
+
+def _across(
+    a: NDArray[np.float64],
+    b: NDArray[np.float64],
+    p: NDArray[np.float64],
+    q: NDArray[np.float64],
+    normal: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad."""
+    hinge = q - p
+    length = np.linalg.norm(hinge, axis=1)
+    straight = np.linalg.norm(b - a, axis=1)
+    safe = np.where(length > 0, length, 1.0)
+    cross_a, cross_b = np.cross(p - a, hinge), np.cross(b - p, hinge)
+    along = np.einsum("ij,ij->i", b - a, hinge) / safe
+    across = (np.linalg.norm(cross_a, axis=1) + np.linalg.norm(cross_b, axis=1)) / safe
+    # Where the corner a or b points inwards, a-b runs inside the quad and the hinge outside of it: nothing to unfold.
+    inwards = (np.einsum("ij,ij->i", cross_a, normal) < 0) | (np.einsum("ij,ij->i", cross_b, normal) < 0)
+    return np.where((length > 0) & ~inwards, np.hypot(along, across), straight)
