@@ -1,0 +1,108 @@
+"""Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix."""
+
+import warp as wp
+
+from .cells import Cells
+from .springs import Springs, spring_forces_on, viscosity_forces_on
+
+wp.set_module_options({"enable_backward": False})
+
+# Every vertex may move this share of the least height of the cells around it: were all three corners of a cell to
+# approach each other, a fifth of its height would remain, so no step can mirror a cell.
+STEP_SHARE = wp.constant(wp.float64(0.4))
+
+
+@wp.kernel
+def gather_forces(
+    position: wp.array(dtype=wp.vec2d),
+    velocity: wp.array(dtype=wp.vec2d),
+    mass: wp.array(dtype=wp.float64),
+    spring_stiffness: wp.array(dtype=wp.float64),
+    springs: Springs,
+    cells: Cells,
+    cell_acting: wp.array(dtype=wp.int32),
+    cell_clearance: wp.array(dtype=wp.float64),
+    cell_force: wp.array(dtype=wp.vec2d),
+    cell_viscosity: wp.array(dtype=wp.vec2d),
+    cell_stiffness: wp.array(dtype=wp.float64),
+    time_step: wp.float64,
+    first: int,
+    # outputs
+    force: wp.array(dtype=wp.vec2d),
+    power: wp.array(dtype=wp.float64),
+    driving_force: wp.array(dtype=wp.vec2d),
+    first_guess: wp.array(dtype=wp.vec2d),
+    stiffness: wp.array(dtype=wp.float64),
+    reach: wp.array(dtype=wp.float64),
+):
+    """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), and the neighbours' share, eq. (9).
+
+    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. cell_*: as `cells.evaluate_guard`.
+    force F [N], power F.v / K [m2/s], driving_force F~ [N], first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
+    the cells' around the vertex [N/m], reach: how far it may move in this step [m]. All #V.
+    """
+    i = wp.tid() + first
+    total = spring_forces_on(i, position, springs)
+    driving = viscosity_forces_on(i, velocity, springs, time_step)
+    k = spring_stiffness[i]
+    height = wp.float64(wp.inf)
+    for e in range(cells.offset[i], cells.offset[i + 1]):
+        slot = cells.slot[e]
+        cell = slot / 3
+        height = wp.min(height, cell_clearance[cell])
+        if cell_acting[cell] != 0:
+            total += cell_force[slot]
+            driving += cell_viscosity[slot]
+            k += cell_stiffness[slot]
+    driving += total
+    force[i] = total
+    power[i] = wp.dot(total, velocity[i]) / k
+    driving_force[i] = driving
+    first_guess[i] = driving * (time_step / (mass[i] + time_step * time_step * k))
+    stiffness[i] = k
+    reach[i] = STEP_SHARE * height
+
+
+@wp.kernel
+def advance(
+    mass: wp.array(dtype=wp.float64),
+    springs: Springs,
+    driving_force: wp.array(dtype=wp.vec2d),
+    first_guess: wp.array(dtype=wp.vec2d),
+    stiffness: wp.array(dtype=wp.float64),
+    reach: wp.array(dtype=wp.float64),
+    time_step: wp.float64,
+    first: int,
+    # outputs
+    position: wp.array(dtype=wp.vec2d),
+    velocity: wp.array(dtype=wp.vec2d),
+):
+    """Eq. (10): dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i), then eq. (4).
+
+    A vertex that would move further than its reach is stopped there. Arguments as in `gather_forces`, all #V.
+    """
+    i = wp.tid() + first
+    coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
+    h2 = time_step * time_step
+    dv = (driving_force[i] * time_step + h2 * coupling) / (mass[i] + h2 * stiffness[i])
+    v = velocity[i] + dv
+    distance = wp.length(v) * time_step
+    if distance > reach[i]:
+        v = v * (reach[i] / distance)
+    velocity[i] = v
+    position[i] = position[i] + v * time_step
+
+
+@wp.kernel
+def compute_kinetic_energy(
+    mass: wp.array(dtype=wp.float64),
+    velocity: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    energy: wp.array(dtype=wp.float64),
+):
+    """1/2 m v^2. mass [kg], velocity [m/s], energy [J]: #V."""
+    i = wp.tid() + first
+    energy[i] = wp.float64(0.5) * mass[i] * wp.dot(velocity[i], velocity[i])

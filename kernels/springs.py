@@ -1,0 +1,71 @@
+"""Springs of the mass-spring model: forces, viscosity, energy, gathered per vertex."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Springs:
+    """The springs around each vertex, every spring listed at both of its ends.
+
+    offset: #V+1, where the springs of each vertex begin.
+    neighbor: the vertex at the far end.
+    rest_length: length on the surface in space [m].
+    stiffness: k_ij [N/m].
+    """
+
+    offset: wp.array(dtype=wp.int32)
+    neighbor: wp.array(dtype=wp.int32)
+    rest_length: wp.array(dtype=wp.float64)
+    stiffness: wp.array(dtype=wp.float64)
+
+
+@wp.func
+def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
+    """Force on the near end of a spring, d the vector to its far end: -grad of 1/2 k (l - L)^2. Zero at zero length."""
+    length = wp.length(d)
+    if length > wp.float64(0.0):
+        return stiffness * (wp.float64(1.0) - rest_length / length) * d
+    return wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+
+
+@wp.func
+def spring_forces_on(i: int, position: wp.array(dtype=wp.vec2d), springs: Springs):
+    """Sum of the spring forces on vertex i [N]."""
+    here = position[i]
+    force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        force += spring_force(position[springs.neighbor[s]] - here, springs.rest_length[s], springs.stiffness[s])
+    return force
+
+
+@wp.func
+def viscosity_forces_on(i: int, velocity: wp.array(dtype=wp.vec2d), springs: Springs, time_step: wp.float64):
+    """Paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]."""
+    here = velocity[i]
+    force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        force += springs.stiffness[s] * (velocity[springs.neighbor[s]] - here)
+    return time_step * force
+
+
+@wp.kernel
+def compute_spring_energy(
+    position: wp.array(dtype=wp.vec2d),
+    springs: Springs,
+    first: int,
+    # outputs
+    energy: wp.array(dtype=wp.float64),
+):
+    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's.
+
+    position: #V [m]. energy: #V [J].
+    """
+    i = wp.tid() + first
+    here = position[i]
+    total = wp.float64(0.0)
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
+        total += wp.float64(0.25) * springs.stiffness[s] * stretch * stretch
+    energy[i] = total

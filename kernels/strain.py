@@ -1,0 +1,66 @@
+"""Worn strain and strain energy of the cloth, per cell, in the fabric's axes: paper eqs. (1)-(3)."""
+
+import warp as wp
+
+from .cells import Cells, flat_edges
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Membrane:
+    """Plane stress of an orthotropic sheet: sigma_warp = c_warp e_warp + c_cross e_weft, tau = shear gamma.
+
+    warp, weft: unit vectors in the plane. c_warp, c_weft, c_cross, shear: [N/m].
+    """
+
+    warp: wp.vec2d
+    weft: wp.vec2d
+    c_warp: wp.float64
+    c_weft: wp.float64
+    c_cross: wp.float64
+    shear: wp.float64
+
+
+@wp.kernel
+def compute_worn_strain(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    membrane: Membrane,
+    first: int,
+    # outputs
+    strain: wp.array(dtype=wp.vec3d),
+    stress: wp.array(dtype=wp.vec3d),
+    energy: wp.array(dtype=wp.float64),
+    area: wp.array(dtype=wp.float64),
+):
+    """The cloth is flat when relaxed and strained when worn: e = |F e_warp| - 1, |F e_weft| - 1, gamma = F e_warp . F e_weft.
+
+    U = 1/2 (sigma_warp e_warp + sigma_weft e_weft + tau gamma) a, eq. (3), with a the signed flat area of the cell.
+
+    position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m]. energy: #C [J].
+    area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    """
+    c = wp.tid() + first
+    D = flat_edges(position, cells.corner[c])
+    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    area[c] = wp.float64(0.5) * det * cells.weight[c]
+    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if det > wp.float64(0.0):
+        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        F = cells.edges[c] * inv
+        worn_warp = F * membrane.warp
+        worn_weft = F * membrane.weft
+        e = wp.vec3d(
+            wp.length(worn_warp) - wp.float64(1.0),
+            wp.length(worn_weft) - wp.float64(1.0),
+            wp.dot(worn_warp, worn_weft),
+        )
+    s = wp.vec3d(
+        membrane.c_warp * e[0] + membrane.c_cross * e[1],
+        membrane.c_weft * e[1] + membrane.c_cross * e[0],
+        membrane.shear * e[2],
+    )
+    strain[c] = e
+    stress[c] = s
+    energy[c] = wp.float64(0.5) * wp.dot(s, e) * area[c]

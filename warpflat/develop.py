@@ -1,0 +1,263 @@
+"""Development: the first, unrelaxed layout of a piece, from a datum line (paper, section IV.B).
+
+Three ways, the first that leaves no face mirrored: along the profiles of a quad grid, by geodesic distance from the datum
+line, and, where both fold, a harmonic map onto a disk, which cannot.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+from warpflat.network import CellArrays, cells_of
+from warpflat.strain import signed_cell_areas
+from warpflat.surface.geodesic import signed_distance_and_station
+from warpflat.surface.lines import line_between, line_on_plane
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import border_loops, half_edges, triangulate
+from warpflat.untangle import untangle
+
+__all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmonic_layout", "profile_layout"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+# A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
+_LEAST_AREA = 0.01
+# Up to this share of the faces may be mirrored for a development to be mended rather than given up.
+_FEW = 0.1
+
+
+@dataclass(frozen=True, kw_only=True)
+class Development:
+    """A first layout without mirrored faces.
+
+    Attributes:
+        positions: #V by 2 [m], the datum along +y.
+        method: "profiles", "geodesic" or "harmonic".
+        mended: whether faces had to be turned back, so that it says little of directions.
+        notes: why a way was not taken, one sentence each.
+    """
+
+    positions: FloatArray
+    method: str
+    mended: bool = False
+    notes: tuple[str, ...] = ()
+
+
+def choose_datum(surface: Surface) -> IntArray:
+    """The line along the piece's long axis through its middle, as vertex indices along edges.
+
+    The long axis is the first principal axis of the surface; where length and width are within a fifth of each other, and
+    one is nearer to the vertical (+y), that one. The line follows the section by the plane of that axis and the mean
+    normal.
+    """
+    triangles, _ = triangulate(surface.faces)
+    p = surface.vertices[triangles]
+    normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+    area = np.linalg.norm(normal, axis=1)
+    centre = np.average(p.mean(axis=1), axis=0, weights=area)
+    spread = p.mean(axis=1) - centre
+    values, axes = np.linalg.eigh((spread * area[:, None]).T @ spread / area.sum())
+    facing = normal.sum(axis=0)
+    long_axis = axes[:, 2]
+    if values[1] > 0.64 * values[2]:
+        # Nearly as wide as long: let the grain hang down rather than run by the accident of a few millimetres.
+        up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
+        if np.linalg.norm(up) > 0.5:
+            long_axis = up / np.linalg.norm(up)
+    across = np.cross(long_axis, facing)
+    if np.linalg.norm(across) < 1e-9 * max(float(np.linalg.norm(facing)), 1e-300) or not np.any(facing):
+        across = axes[:, 1]
+    try:
+        line = line_on_plane(surface, centre, across)
+    except InputError:
+        line = np.empty(0, dtype=np.int32)
+    if len(line) < 2 or line[0] == line[-1]:
+        along = (surface.vertices - centre) @ long_axis
+        line = line_between(surface, int(along.argmin()), int(along.argmax()))
+    rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
+    leading = int(np.abs(long_axis).argmax())
+    upwards = rising[1] if abs(rising[1]) > 1e-6 * np.linalg.norm(rising) else rising[leading]
+    return np.ascontiguousarray(line if upwards >= 0 else line[::-1], dtype=np.int32)
+
+
+def develop(surface: Surface, datum: IntArray) -> Development:
+    """First layout of the surface from its datum line.
+
+    Args:
+        surface: one piece.
+        datum: vertex indices along edges; laid along +y at its arc lengths.
+
+    Raises:
+        InputError: the surface is a closed tube (two borders around it), which no layout in the plane can be.
+    """
+    notes: list[str] = []
+    cells = cells_of(surface)
+    for method, layout in (("profiles", profile_layout), ("geodesic", geodesic_layout)):
+        positions = layout(surface, datum)
+        if positions is None:
+            continue
+        folded = _mirrored(cells, positions)
+        if folded == 0:
+            return Development(positions=positions, method=method, notes=tuple(notes))
+        notes.append(f"the {method} development mirrors or crushes {folded:,} of {len(surface.faces):,} faces")
+        if folded <= _FEW * len(surface.faces):
+            mended = untangle(cells, positions, least=_LEAST_AREA)
+            if mended is not None:
+                notes.append("they were turned back, with a few faces around them")
+                return Development(positions=mended, method=method, mended=True, notes=tuple(notes))
+    _refuse_tubes(surface)
+    positions = _upright(harmonic_layout(surface), datum)
+    notes.append("started from a harmonic map onto a disk instead, which cannot fold")
+    return Development(positions=positions, method="harmonic", mended=True, notes=tuple(notes))
+
+
+def _mirrored(cells: CellArrays, positions: FloatArray) -> int:
+    body = cells.area / cells.weight
+    return len(np.unique(cells.face[signed_cell_areas(cells.corner, positions) <= _LEAST_AREA * body]))
+
+
+def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
+    """Pieces of bricks: the datum straight at its arc lengths, and each profile run out to both sides, parallel.
+
+    The profiles are the grid lines of a quad mesh that cross the datum; a vertex lies at its arc length along its profile,
+    beside the place of the datum where that starts.
+
+    Returns:
+        #V by 2 [m], or None where the mesh is no grid of quads that the datum's profiles cover.
+    """
+    if not surface.is_quad.all() or datum[0] == datum[-1]:
+        return None
+    steps = np.linalg.norm(np.diff(surface.vertices[datum], axis=0), axis=1)
+    station = np.concatenate([[0.0], np.cumsum(steps)])
+    positions = np.full((len(surface.vertices), 2), np.nan)
+    positions[datum] = np.column_stack([np.zeros(len(datum)), station])
+    for side in (1.0, -1.0):
+        x = np.zeros(len(datum))
+        before = datum
+        for line in _grid_lines(surface, datum if side < 0 else datum[::-1]):
+            current = line if side < 0 else line[::-1]
+            on = (current >= 0) & (before >= 0)
+            if not np.isnan(positions[current[on], 0]).all():
+                return None
+            x[on] += np.linalg.norm(surface.vertices[current[on]] - surface.vertices[before[on]], axis=1)
+            positions[current[on]] = np.column_stack([side * x[on], station[on]])
+            before = current
+    return None if np.isnan(positions).any() else positions
+
+
+def _grid_lines(surface: Surface, line: IntArray) -> Iterator[IntArray]:
+    """The grid lines to the left of a line of a quad mesh, one after the other; -1 where the grid has ended."""
+    he = half_edges(surface.faces)
+    size = np.int64(len(surface.vertices))
+    keys = he.tail.astype(np.int64) * size + he.head
+    order = np.argsort(keys)
+    sorted_keys = keys[order]
+    current = np.asarray(line, dtype=np.int64)
+    for _ in range(len(surface.faces)):
+        both = (current[:-1] >= 0) & (current[1:] >= 0)
+        wanted = np.where(both, current[:-1] * size + current[1:], -1)
+        place = np.minimum(np.searchsorted(sorted_keys, wanted), len(keys) - 1)
+        found = both & (sorted_keys[place] == wanted)
+        ahead = he.next[he.next[order[place]]]
+        over_head = np.where(found, he.tail[ahead], -1)
+        over_tail = np.where(found, he.head[ahead], -1)
+        following = np.full(len(current), -1, dtype=np.int64)
+        following[:-1] = over_tail
+        clash = (following[1:] >= 0) & (over_head >= 0) & (following[1:] != over_head)
+        following[1:] = np.where(over_head >= 0, over_head, following[1:])
+        if clash.any() or not (following >= 0).any():
+            return
+        current = following
+        yield current.astype(np.int32)
+
+
+def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray:
+    """Any mesh: x is the signed geodesic distance from the datum, y the arc length of the nearest datum point. #V by 2 [m]."""
+    distance, station = signed_distance_and_station(surface, datum)
+    return np.column_stack([distance, station])
+
+
+def harmonic_layout(surface: Surface) -> FloatArray:
+    """Layout that cannot fold: the border on a circle, every other vertex a convex mean of its neighbours (Floater 1997).
+
+    Mean value weights (Floater 2003), which are positive on any triangles. Holes are closed by a vertex each while the
+    map is computed. Scaled to the surface's area. #V by 2 [m].
+    """
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import spsolve
+
+    triangles, _ = triangulate(surface.faces)
+    loops = border_loops(surface.faces, surface.vertices)
+    points = [surface.vertices]
+    caps = [triangles]
+    for number, loop in enumerate(loops[1:]):
+        centre = np.full(len(loop), len(surface.vertices) + number)
+        points.append(surface.vertices[loop].mean(axis=0)[None])
+        caps.append(np.column_stack([np.roll(loop, -1), loop, centre]))
+    p, t = np.concatenate(points), np.concatenate(caps).astype(np.int64)
+    rows, columns, weights = [], [], []
+    for k in range(3):
+        i, j, other = t[:, k], t[:, (k + 1) % 3], t[:, (k + 2) % 3]
+        u, v = p[j] - p[i], p[other] - p[i]
+        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+        cosine = np.clip(np.einsum("ij,ij->i", u, v) / np.maximum(lu * lv, 1e-300), -0.999999, 0.999999)
+        half_tangent = np.sqrt((1 - cosine) / (1 + cosine))
+        rows += [i, i]
+        columns += [j, other]
+        weights += [half_tangent / np.maximum(lu, 1e-300), half_tangent / np.maximum(lv, 1e-300)]
+    size = len(p)
+    matrix = coo_matrix((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
+    matrix = matrix.tocsr()
+    matrix = diags(1.0 / np.asarray(matrix.sum(axis=1)).ravel()) @ matrix
+
+    border = loops[0]
+    arc = np.linalg.norm(surface.vertices[np.roll(border, -1)] - surface.vertices[border], axis=1)
+    angle = 2 * np.pi * np.concatenate([[0.0], np.cumsum(arc)[:-1]]) / arc.sum()
+    q = surface.vertices[triangles]
+    area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
+    layout = np.zeros((size, 2))
+    layout[border] = np.sqrt(area / np.pi) * np.column_stack([np.cos(angle), np.sin(angle)])
+    inner = np.setdiff1d(np.arange(size), border)
+    if len(inner):
+        system = (diags(np.ones(len(inner))) - matrix[inner][:, inner]).tocsc()
+        layout[inner] = spsolve(system, matrix[inner][:, border] @ layout[border]).reshape(-1, 2)
+    return layout[: len(surface.vertices)]
+
+
+def _upright(positions: FloatArray, datum: IntArray) -> FloatArray:
+    """The layout turned so that the datum's chord points up, its first point at the origin."""
+    chord = positions[datum[-1]] - positions[datum[0]]
+    length = float(np.hypot(*chord))
+    c, s = (chord[1] / length, chord[0] / length) if length > 0 else (1.0, 0.0)
+    return (positions - positions[datum[0]]) @ np.array([[c, -s], [s, c]]).T
+
+
+def _refuse_tubes(surface: Surface) -> None:
+    """A flat ring turns once around at each of its borders, a closed tube at neither."""
+    for loop in border_loops(surface.faces, surface.vertices)[1:]:
+        corner_angle = _border_angles(surface)[loop]
+        turning = float((np.pi - corner_angle).sum())
+        if turning > -np.pi:
+            size = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1).sum()
+            raise InputError(
+                f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
+                f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first"
+            )
+
+
+def _border_angles(surface: Surface) -> FloatArray:
+    """#V, the sum of the angles of the triangles at each vertex [rad]."""
+    triangles, _ = triangulate(surface.faces)
+    total = np.zeros(len(surface.vertices))
+    for k in range(3):
+        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
+        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
+        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        total += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(total))
+    return total

@@ -1,0 +1,310 @@
+"""Relaxation: the strain energy of a network is released by approximate implicit integration (paper, section III).
+
+The step is the paper's; two things are added. Velocities are set to zero whenever the forces begin to brake the motion
+(kinetic damping, as in dynamic relaxation: the energy swings otherwise, and progress is as slow as diffusion), and no
+vertex moves so far in one step that a face could be mirrored.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import InitVar, dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
+from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
+from warpflat.kernels.springs import compute_spring_energy
+from warpflat.network import SpringNetwork
+
+__all__ = ["Energies", "Outcome", "RelaxOptions", "Relaxation", "relax"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelaxOptions:
+    """How the energy is released, and when that is done.
+
+    Attributes:
+        time_step: h [s]. The minimum does not depend on it; steps to it stop falling above 1e-3.
+        energy_tolerance: eq. (11): relative change of the energy per step.
+        residual_tolerance: largest force on a vertex over the mean force of the springs.
+        max_steps: a state that has taken so many is not stepped on, and says so (`converged` is false).
+        check_every: steps between two looks at energies and convergence.
+        kinetic_damping: set velocities to zero when the forces begin to brake the motion.
+    """
+
+    time_step: float = 0.01
+    energy_tolerance: float = 1e-6
+    residual_tolerance: float = 5e-3
+    max_steps: int = 20_000
+    check_every: int = 10
+    kinetic_damping: bool = True
+
+    def validate(self) -> None:
+        """Raise InputError for a value out of its bounds; names the value."""
+        for key, low, high in (
+            ("time_step", 1e-9, 1e9),
+            ("energy_tolerance", 0.0, 1.0),
+            ("residual_tolerance", 1e-12, 1e3),
+            ("max_steps", 1, 10**9),
+            ("check_every", 1, 10**6),
+        ):
+            value = getattr(self, key)
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise InputError(f"relax: {key} = {value!r} is not a number")
+            if not low <= value <= high:
+                raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
+
+
+@dataclass(frozen=True)
+class Energies:
+    """[J]: of the springs, of the guard (see `warpflat.network`), and of the motion."""
+
+    spring: float
+    guard: float
+    kinetic: float
+
+    @property
+    def potential(self) -> float:
+        """What is minimised: springs and guard."""
+        return self.spring + self.guard
+
+    @property
+    def total(self) -> float:
+        """Potential and kinetic."""
+        return self.spring + self.guard + self.kinetic
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """How a relaxation ended.
+
+    Attributes:
+        converged: false if it ran into its step limit.
+        steps: approximate implicit steps taken.
+        restarts: how often the velocities were set to zero.
+        energy_change: last relative change of the energy per step, eq. (11).
+        residual: largest force on a vertex over the mean spring force.
+        energies: at the end [J].
+        seconds: wall clock.
+    """
+
+    converged: bool
+    steps: int
+    restarts: int
+    energy_change: float
+    residual: float
+    energies: Energies
+    seconds: float
+
+
+@dataclass
+class Relaxation:
+    """State and buffers of a running relaxation: allocated once, then a flat list of launches per step.
+
+    Attributes:
+        network: the model.
+        options: of `relax`; the time step is fixed once made.
+        start: #V by 2, the first layout [m].
+        position: #V vec2d [m]. velocity: #V vec2d [m/s]. On the network's device.
+    """
+
+    network: SpringNetwork
+    options: RelaxOptions
+    start: InitVar[NDArray[np.float64]]
+
+    def __post_init__(self, start: NDArray[np.float64]) -> None:
+        n, c, device = self.network.vertex_count, self.network.cell_count, self.network.device
+        if np.shape(start) != (n, 2):
+            raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
+        self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
+        self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self._driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self._first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self._power = wp.zeros(n, dtype=wp.float64, device=device)
+        self._stiffness = wp.zeros(n, dtype=wp.float64, device=device)
+        self._reach = wp.zeros(n, dtype=wp.float64, device=device)
+        self._cell_acting = wp.zeros(c, dtype=wp.int32, device=device)
+        self._cell_force = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
+        self._cell_viscosity = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
+        self._cell_stiffness = wp.zeros(3 * c, dtype=wp.float64, device=device)
+        self._cell_clearance = wp.zeros(c, dtype=wp.float64, device=device)
+        self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
+        self._cell_energy = wp.zeros(c, dtype=wp.float64, device=device)
+        springs = self.network.spring_arrays
+        # What a strain of 1e-9 everywhere stores: below it a layout counts as free of strain.
+        self.negligible_energy = 0.5e-18 * float(np.sum(springs.stiffness * springs.rest_length**2))
+        self.steps = 0
+        self.restarts = 0
+        self._record()
+
+    def _record(self) -> None:
+        """Record the launches of a step: a recorded launch costs a fifth of a fresh one."""
+        net, h = self.network, self.options.time_step
+        n, c, device = net.vertex_count, net.cell_count, net.device
+        self._evaluate_cells = wp.launch(
+            evaluate_guard,
+            dim=c,
+            inputs=[self.position, self.velocity, net.cells, net.guard, h, 0],
+            outputs=[
+                self._cell_acting,
+                self._cell_clearance,
+                self._cell_force,
+                self._cell_viscosity,
+                self._cell_stiffness,
+            ],
+            device=device,
+            record_cmd=True,
+        )
+        self._gather = wp.launch(
+            gather_forces,
+            dim=n,
+            inputs=[
+                self.position,
+                self.velocity,
+                net.mass,
+                net.spring_stiffness,
+                net.springs,
+                net.cells,
+                self._cell_acting,
+                self._cell_clearance,
+                self._cell_force,
+                self._cell_viscosity,
+                self._cell_stiffness,
+                h,
+                0,
+            ],
+            outputs=[
+                self.force,
+                self._power,
+                self._driving_force,
+                self._first_guess,
+                self._stiffness,
+                self._reach,
+            ],
+            device=device,
+            record_cmd=True,
+        )
+        self._advance = wp.launch(
+            advance,
+            dim=n,
+            inputs=[
+                net.mass,
+                net.springs,
+                self._driving_force,
+                self._first_guess,
+                self._stiffness,
+                self._reach,
+                h,
+                0,
+            ],
+            outputs=[self.position, self.velocity],
+            device=device,
+            record_cmd=True,
+        )
+
+    def step(self) -> None:
+        """One approximate implicit step."""
+        self._evaluate_cells.launch()
+        self._gather.launch()
+        if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
+            self.velocity.zero_()
+            self._evaluate_cells.launch()
+            self._gather.launch()
+            self.restarts += 1
+        self._advance.launch()
+        self.steps += 1
+
+    def energies(self) -> Energies:
+        """Energies of the present state [J]."""
+        net, device = self.network, self.network.device
+        n, c = net.vertex_count, net.cell_count
+        wp.launch(
+            compute_spring_energy,
+            dim=n,
+            inputs=[self.position, net.springs, 0],
+            outputs=[self._vertex_energy],
+            device=device,
+        )
+        spring = float(self._vertex_energy.numpy().sum())
+        wp.launch(
+            compute_kinetic_energy,
+            dim=n,
+            inputs=[net.mass, self.velocity, 0],
+            outputs=[self._vertex_energy],
+            device=device,
+        )
+        kinetic = float(self._vertex_energy.numpy().sum())
+        wp.launch(
+            compute_guard_energy,
+            dim=c,
+            inputs=[self.position, net.cells, net.guard, 0],
+            outputs=[self._cell_energy],
+            device=device,
+        )
+        return Energies(spring, float(self._cell_energy.numpy().sum()), kinetic)
+
+    def residual(self) -> float:
+        """Largest force on a vertex, at the last evaluated state, over the mean force of the springs.
+
+        The mean has a floor of 1e-9 K L, the force of a spring strained by 1e-9, so that a layout without strain counts
+        as at rest.
+        """
+        s = self.network.spring_arrays
+        position = self.position.numpy()
+        d = position[s.ends[:, 1]] - position[s.ends[:, 0]]
+        mean = float(np.mean(s.stiffness * np.abs(np.sqrt(np.einsum("ij,ij->i", d, d)) - s.rest_length)))
+        floor = 1e-9 * float(np.mean(s.stiffness * s.rest_length))
+        force = self.force.numpy()
+        return float(np.sqrt(np.einsum("ij,ij->i", force, force).max())) / max(mean, floor)
+
+    def positions(self) -> NDArray[np.float64]:
+        """#V by 2, a copy [m]."""
+        return np.array(self.position.numpy(), dtype=np.float64, copy=True)
+
+
+Watch = Callable[[Relaxation, Energies, float], None]
+
+
+def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | None = None) -> Outcome:
+    """Step until the energy and the residual force have come to rest, or the step limit is reached.
+
+    Args:
+        state: where to start; holds the relaxed layout afterwards.
+        watch: called every `check_every` steps with the state, its energies and the residual.
+        each_step: called after every step, with the energies and the residual of the last look.
+    """
+    options = state.options
+    begun = time.perf_counter()
+    first = state.steps
+    before = state.energies()
+    change, residual, converged = math.inf, math.inf, False
+    while not converged and state.steps < options.max_steps:
+        chunk = min(options.check_every, options.max_steps - state.steps)
+        for _ in range(chunk):
+            state.step()
+            if each_step is not None:
+                each_step(state, before, residual)
+        now = state.energies()
+        residual = state.residual()
+        at_rest = now.potential <= state.negligible_energy
+        change = 0.0 if at_rest else abs(now.potential - before.potential) / (chunk * now.potential)
+        converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
+        before = now
+        if watch is not None:
+            watch(state, now, residual)
+    return Outcome(
+        converged=converged,
+        steps=state.steps - first,
+        restarts=state.restarts,
+        energy_change=change,
+        residual=residual,
+        energies=before,
+        seconds=time.perf_counter() - begun,
+    )

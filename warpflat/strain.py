@@ -1,0 +1,137 @@
+"""Worn strain, stress and strain energy of a layout, and its errors as a map of the surface.
+
+The cloth is flat when relaxed and strained when worn. Strain here is *worn* strain, L3/l2 - 1: a thread that is shorter
+flat than on the body is in tension when worn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.fabric import Fabric
+from warpflat.kernels.strain import Membrane, compute_worn_strain
+from warpflat.network import SpringNetwork, grain_axes
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import border_edges, mesh_edges
+
+__all__ = ["LayoutErrors", "WornStrain", "layout_errors", "membrane_of", "signed_cell_areas", "worn_strain"]
+
+FloatArray = NDArray[np.float64]
+
+
+def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
+    """The fabric as an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21), and so on."""
+    warp, weft = grain_axes(grain_angle)
+    nu = fabric.poisson_ratio
+    share = 1.0 / (1.0 - nu * nu * fabric.stiffness_weft / fabric.stiffness_warp)
+    membrane = Membrane()
+    membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
+    membrane.c_warp = fabric.stiffness_warp * share
+    membrane.c_weft = fabric.stiffness_weft * share
+    membrane.c_cross = nu * fabric.stiffness_weft * share
+    membrane.shear = fabric.shear_stiffness
+    return membrane
+
+
+@dataclass(frozen=True, kw_only=True)
+class WornStrain:
+    """Per face, the mean over its cells by flat area.
+
+    Attributes:
+        strain: #F by 3: along warp, along weft, shear angle [1, 1, rad].
+        stress: #F by 3: sigma_warp, sigma_weft, tau [N/m].
+        energy: #F, strain energy, paper eq. (3) [J].
+        area: #F, flat area [m2].
+    """
+
+    strain: FloatArray
+    stress: FloatArray
+    energy: FloatArray
+    area: FloatArray
+
+    @property
+    def energy_density(self) -> FloatArray:
+        """#F [J/m2], per flat area of cloth."""
+        return self.energy / np.where(self.area > 0, self.area, np.inf)
+
+
+def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
+    """Worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric."""
+    count, device = network.cell_count, network.device
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    strain = wp.empty(count, dtype=wp.vec3d, device=device)
+    stress = wp.empty(count, dtype=wp.vec3d, device=device)
+    energy = wp.empty(count, dtype=wp.float64, device=device)
+    area = wp.empty(count, dtype=wp.float64, device=device)
+    wp.launch(
+        compute_worn_strain,
+        dim=count,
+        inputs=[at, network.cells, membrane_of(network.fabric, network.grain_angle), 0],
+        outputs=[strain, stress, energy, area],
+        device=device,
+    )
+    face, faces = network.cell_arrays.face, len(network.surface.faces)
+    cell_area: FloatArray = np.array(area.numpy(), dtype=np.float64)
+    face_area = np.bincount(face, cell_area, minlength=faces).astype(np.float64)
+    share = cell_area / np.where(face_area > 0, face_area, np.inf)[face]
+
+    def mean(values: FloatArray) -> FloatArray:
+        return np.stack([np.bincount(face, share * values[:, k], minlength=faces) for k in range(3)], axis=1)
+
+    return WornStrain(
+        strain=mean(strain.numpy()),
+        stress=mean(stress.numpy()),
+        energy=np.bincount(face, energy.numpy(), minlength=faces).astype(np.float64),
+        area=face_area,
+    )
+
+
+def signed_cell_areas(corner: NDArray[np.int32], positions: FloatArray) -> FloatArray:
+    """#C, signed areas of triangles (#C by 3) in the plane [m2]; 0 or less where one is mirrored or collapsed."""
+    p = positions[corner]
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayoutErrors:
+    """How far a layout is from an isometry.
+
+    Attributes:
+        length_error: sum |l2 - L3| / sum L3 over the mesh edges (Wang 2002, E_c).
+        area_error: sum |a2 - A3| / sum A3 over the faces (Wang 2002, E_s).
+        boundary_error: |border length in the plane - in space| / in space.
+        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed.
+    """
+
+    length_error: float
+    area_error: float
+    boundary_error: float
+    flipped_faces: int
+
+
+def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
+    """Errors of a layout (#V by 2 [m]) of the network's surface."""
+    cells = network.cell_arrays
+    edges = mesh_edges(surface.faces)
+    in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
+    signed = signed_cell_areas(cells.corner, positions)
+    faces = len(surface.faces)
+    flat = np.bincount(cells.face, cells.weight * signed, minlength=faces)
+    body = np.bincount(cells.face, cells.area, minlength=faces)
+    border = border_edges(surface.faces)
+    border_space, border_plane = _lengths(surface.vertices, border).sum(), _lengths(positions, border).sum()
+    return LayoutErrors(
+        length_error=float(np.abs(in_plane - in_space).sum() / in_space.sum()),
+        area_error=float(np.abs(flat - body).sum() / body.sum()),
+        boundary_error=float(abs(border_plane - border_space) / border_space),
+        flipped_faces=len(np.unique(cells.face[signed <= 0])),
+    )
+
+
+def _lengths(points: FloatArray, edges: NDArray[np.int32]) -> FloatArray:
+    return np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)
