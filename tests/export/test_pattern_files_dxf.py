@@ -1,0 +1,170 @@
+"""DXF read back: outline, notches and grain in millimetres, on the layers that apparel CAD expects."""
+
+from __future__ import annotations
+
+from datetime import datetime
+from itertools import pairwise
+
+import ezdxf
+import numpy as np
+import pytest
+from shapely.geometry import LinearRing, Point
+
+from warpflat.errors import InputError
+from warpflat.export.dxf import block_name, write_dxf
+from warpflat.pattern import Edge, Garment, Piece, draft_garment
+from warpflat.pattern.sample import sample_dress
+
+SIZES = ("36", "38", "40")
+CREATED = datetime(2024, 5, 17, 9, 30)
+
+
+@pytest.fixture(scope="module")
+def dress():
+    return draft_garment(sample_dress(SIZES))
+
+
+@pytest.fixture(scope="module", params=["aama", "astm"])
+def file(dress, request, tmp_path_factory):
+    path = tmp_path_factory.mktemp("dxf") / "dress.dxf"
+    write_dxf(dress, path, dialect=request.param, created=CREATED)
+    return path, request.param, ezdxf.readfile(path)
+
+
+def points(block, layer):
+    return np.array([tuple(e.dxf.location)[:2] for e in block.query(f'POINT[layer=="{layer}"]')])
+
+
+def vertices(polyline):
+    return np.array([tuple(v.dxf.location)[:2] for v in polyline.vertices])
+
+
+def test_one_block_and_one_insert_per_piece_and_size(dress, file):
+    document = file[2]
+    blocks = {b.name for b in document.blocks if not b.name.startswith("*")}
+    assert blocks == {f"{p.name.upper().replace(' ', '_')}_{s}" for s in SIZES for p in dress.pieces[s]}
+    inserts = document.modelspace().query("INSERT")
+    assert {i.dxf.name for i in inserts} == blocks
+    assert len(inserts) == len(blocks)
+    assert {i.dxf.layer for i in inserts} == {"1"}
+
+
+def test_outline_notches_grain_and_drills_come_back_within_a_hundredth_of_a_millimetre(dress, file):
+    document = file[2]
+    for size in SIZES:
+        for piece in dress.pieces[size]:
+            block = document.blocks.get(block_name(piece, set()))
+            (boundary,) = block.query('POLYLINE[layer=="1"]')
+            assert boundary.is_closed
+            back = vertices(boundary)
+            assert len(back) == len(piece.cut_line)
+            start = np.linalg.norm(piece.cut_line * 1000 - back[0], axis=1).argmin()
+            assert np.abs(back - np.roll(piece.cut_line, -start, axis=0) * 1000).max() < 0.01
+            bases = np.array([base for notch in piece.notches for base in notch.base]) * 1000
+            assert np.abs(points(block, "4") - bases).max() < 0.01
+            (grain,) = block.query('LINE[layer=="7"]')
+            ends = np.array([tuple(grain.dxf.start)[:2], tuple(grain.dxf.end)[:2]])
+            assert np.abs(ends - piece.grain * 1000).max() < 0.01
+            if piece.drill_holes:
+                assert np.abs(points(block, "13") - [h.at * 1000 for h in piece.drill_holes]).max() < 0.01
+
+
+def test_notches_carry_their_angle_and_depth(dress, file):
+    document = file[2]
+    (piece,) = (p for p in dress.pieces["38"] if p.name == "sleeve")
+    block = document.blocks.get("SLEEVE_38")
+    slits = [(notch, base) for notch in piece.notches for base in notch.base]
+    for entity, (notch, _) in zip(block.query('POINT[layer=="4"]'), slits, strict=True):
+        angle = np.radians(entity.dxf.angle)
+        assert np.array([np.cos(angle), np.sin(angle)]) == pytest.approx(notch.direction, abs=1e-6)
+        assert entity.dxf.location.z == pytest.approx(notch.depth * 1000)
+    assert sum(notch.double for notch in piece.notches) == 1
+
+
+def test_every_boundary_vertex_is_a_turn_or_a_curve_point(file):
+    block = file[2].blocks.get("FRONT_BODICE_38")
+    (boundary,) = block.query('POLYLINE[layer=="1"]')
+    turn, curve = points(block, "2"), points(block, "3")
+    assert len(turn) + len(curve) == len(boundary.vertices)
+    assert 10 <= len(turn) <= 20
+    assert np.abs(turn - vertices(boundary)[0]).sum(axis=1).min() < 1e-9, "the boundary begins in a turn point"
+    ring = LinearRing(vertices(boundary))
+    assert max(ring.distance(Point(p)) for p in np.concatenate([turn, curve])) < 1e-9
+
+
+def test_sewing_lines_and_mirror_line_keep_their_names(dress, file):
+    document = file[2]
+    (piece,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
+    block = document.blocks.get("FRONT_BODICE_38")
+    named = {t.dxf.text for t in block.query('TEXT[layer=="15"]')}
+    assert named == {f"EDGE: {e.name}" for e in piece.edges}
+    (mirror,) = block.query('LINE[layer=="6"]')
+    assert abs(mirror.dxf.start.x) < 1e-6
+    assert abs(mirror.dxf.end.x) < 1e-6
+    sewn = [e for e in piece.edges if e.kind not in ("fold", "dart")]
+    for polyline, edge in zip(block.query('POLYLINE[layer=="14"]'), sewn, strict=True):
+        assert np.abs(vertices(polyline) - edge.line * 1000).max() < 0.01
+
+
+def test_only_r12_entities_and_no_tables_or_layout_blocks(file):
+    path, dialect, _ = file
+    text = path.read_text(encoding="ascii")
+    tags = [line.strip() for line in text.splitlines()]
+    pairs = list(zip(tags[::2], tags[1::2], strict=True))
+    entities = {value for code, value in pairs if code == "0"}
+    assert entities == {
+        *("SECTION", "ENDSEC", "EOF", "BLOCK", "ENDBLK", "INSERT"),
+        *("POLYLINE", "VERTEX", "SEQEND", "LINE", "POINT", "TEXT"),
+    }
+    sections = [b[1] for a, b in pairwise(pairs) if a == ("0", "SECTION")]
+    assert sections == ["HEADER", "BLOCKS", "ENTITIES"]
+    assert "$MODEL_SPACE" not in text.upper()
+    layers = {value for code, value in pairs if code == "8"}
+    basic = {"0", "1", "2", "3", "4", "6", "7", "8", "13", "14", "15"}
+    assert layers == (basic if dialect == "aama" else basic | {"84", "87"})
+
+
+def test_texts_name_style_piece_size_and_units(file):
+    document = file[2]
+    style = [t.dxf.text for t in document.modelspace().query("TEXT")]
+    for expected in ("STYLE NAME: Sample dress", "CREATION DATE: 17-05-2024", "UNITS: METRIC", "SAMPLE SIZE: 38"):
+        assert expected in style
+    piece = [t.dxf.text for t in document.blocks.get("SLEEVE_40").query('TEXT[layer=="1"]')]
+    for expected in ("PIECE NAME: sleeve", "SIZE: 40", "QUANTITY: 2", "FABRIC: main"):
+        assert expected in piece
+
+
+def test_inches(dress, tmp_path):
+    write_dxf(dress, tmp_path / "p.dxf", units="english", sizes=["38"], created=CREATED)
+    document = ezdxf.readfile(tmp_path / "p.dxf")
+    (boundary,) = document.blocks.get("SKIRT_BACK_38").query('POLYLINE[layer=="1"]')
+    (piece,) = (p for p in dress.pieces["38"] if p.name == "skirt back")
+    assert np.ptp(vertices(boundary), axis=0) == pytest.approx(np.ptp(piece.cut_line, axis=0) / 0.0254, abs=4e-4)
+    assert "UNITS: ENGLISH" in [t.dxf.text for t in document.modelspace().query("TEXT")]
+    assert len([b for b in document.blocks if not b.name.startswith("*")]) == 5
+
+
+def test_names_in_any_script_give_ascii_blocks_that_differ(tmp_path):
+    corners = np.array([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0)])
+    edges = [Edge(name=f"é{i}", points=corners[i : i + 2]) for i in range(3)]
+    names = ("Rückenteil links", "Ruckenteil links", "前身頃", "後身頃")
+    pieces = [Piece(name=n, edges=edges) for n in names]
+    write_dxf(draft_garment(Garment(name="x", pieces={"": pieces})), tmp_path / "p.dxf", created=CREATED)
+    blocks = [b.name for b in ezdxf.readfile(tmp_path / "p.dxf").blocks if not b.name.startswith("*")]
+    assert blocks == ["RUCKENTEIL_LINKS", "RUCKENTEIL_LINKS_2", "PIECE", "PIECE_2"]
+
+
+def test_the_same_pattern_gives_the_same_bytes(dress, tmp_path):
+    for name in ("a.dxf", "b.dxf"):
+        write_dxf(dress, tmp_path / name, created=CREATED, sizes=["38"])
+    assert (tmp_path / "a.dxf").read_bytes() == (tmp_path / "b.dxf").read_bytes()
+
+
+def test_unknown_options_say_what_is_valid(dress, tmp_path):
+    with pytest.raises(InputError, match="did you mean 'aama'"):
+        write_dxf(dress, tmp_path / "p.dxf", dialect="aamma")
+    with pytest.raises(InputError, match="valid: english, metric"):
+        write_dxf(dress, tmp_path / "p.dxf", units="cm")
+    with pytest.raises(InputError, match="no size '50'"):
+        write_dxf(dress, tmp_path / "p.dxf", sizes=["50"])
+    assert list(tmp_path.iterdir()) == []

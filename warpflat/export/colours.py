@@ -1,0 +1,69 @@
+"""The colours of an energy map: one scale and one colour map for the picture and the USD frames."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb", "weighted_percentile"]
+
+# Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
+SMALLEST_SCALE = 1e-6  # [J/m2]
+
+# Near-white where the cloth is at ease, dark where energy stays: reads on paper, in grey, and without red-green vision.
+# Lightness falls evenly, so that lines and labels stay legible on most of a pattern.
+_ANCHORS = np.array(
+    [
+        [0.965, 0.957, 0.925],
+        [0.992, 0.910, 0.690],
+        [0.996, 0.796, 0.478],
+        [0.984, 0.640, 0.365],
+        [0.945, 0.460, 0.325],
+        [0.845, 0.285, 0.345],
+        [0.690, 0.165, 0.385],
+        [0.500, 0.095, 0.385],
+        [0.310, 0.055, 0.325],
+    ]
+)
+
+
+def energy_colours(density: ArrayLike, scale: float) -> NDArray[np.float64]:
+    """sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N); what exceeds `scale` gets the last colour."""
+    position = np.clip(np.asarray(density, dtype=np.float64) / scale, 0.0, 1.0) * (len(_ANCHORS) - 1)
+    lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
+    fraction = (position - lower)[..., None]
+    return np.asarray(_ANCHORS[lower] * (1.0 - fraction) + _ANCHORS[lower + 1] * fraction)
+
+
+def linear_rgb(colours: ArrayLike) -> NDArray[np.float64]:
+    """sRGB to linear Rec. 709, the space in which USD reads ``displayColor`` (IEC 61966-2-1)."""
+    srgb = np.asarray(colours, dtype=np.float64)
+    return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+
+
+def energy_scale(density: ArrayLike, areas: ArrayLike) -> float:
+    """The upper end of the colour scale [J/m2]: the value that 98 % of the area stays below, rounded up.
+
+    A few sliver faces would otherwise make all the rest of the map pale. By area, since faces differ in size; rounded
+    up to 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 times a power of ten, so that the scale is easy to read and to compare.
+
+    Args:
+        density: #F, energy per area [J/m2].
+        areas: #F, the areas that count [m2].
+    """
+    robust = weighted_percentile(density, areas, 0.98)
+    if not robust > SMALLEST_SCALE:
+        return SMALLEST_SCALE
+    steps = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
+    power = 10.0 ** np.floor(np.log10(robust))
+    return float(power * steps[min(np.searchsorted(steps, robust / power * (1.0 - 1e-12)), len(steps) - 1)])
+
+
+def weighted_percentile(values: ArrayLike, weights: ArrayLike, fraction: float) -> float:
+    """The smallest of `values` (#N) below or at which at least `fraction` of the `weights` (#N) lie; 0 for none."""
+    value, weight = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
+    if value.size == 0:
+        return 0.0
+    order = np.argsort(value)
+    running = np.cumsum(weight[order])
+    return float(value[order[min(np.searchsorted(running, fraction * running[-1]), value.size - 1)]])

@@ -1,0 +1,192 @@
+"""Patterns as DXF for apparel CAD: the AAMA dialect (ANSI/AAMA-292) and ASTM D6673, both on DXF R12.
+
+Written through ezdxf's exporter for this dialect: an empty header, no tables, no layout blocks; other saves are
+refused by some CAD systems. Layers are numbers: 1 boundary and system text, 2 turn points, 3 curve points, 4 slit
+notches, 6 mirror line, 7 grain, 8 internal lines, 11 cutouts, 13 drill holes, 14 sewing lines, 15 annotation; ASTM
+adds validation curves, 84 of the boundary and 87 of the sewing line.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import unicodedata
+from collections.abc import Sequence
+from datetime import datetime
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat._version import __version__
+from warpflat.errors import InputError, nearest
+from warpflat.export.atomic import atomic_path
+from warpflat.pattern.curves import turning_angles
+from warpflat.pattern.draft import DraftedGarment, DraftedPiece
+from warpflat.pattern.layout import lay_out, nests
+
+if TYPE_CHECKING:
+    from ezdxf.layouts import BlockLayout, Modelspace
+
+__all__ = ["block_name", "write_dxf"]
+
+Vector = NDArray[np.float64]
+
+DIALECTS = ("aama", "astm")
+#: File units per metre, by what the file says of itself.
+UNITS = {"metric": 1000.0, "english": 1000.0 / 25.4}
+#: A boundary vertex that turns by more than this [rad] is a turn point, else a curve point.
+TURN = np.radians(12.0)
+
+
+def write_dxf(
+    garment: DraftedGarment,
+    path: str | os.PathLike[str],
+    *,
+    dialect: str = "aama",
+    units: str = "metric",
+    sizes: Sequence[str] | None = None,
+    created: datetime | None = None,
+) -> None:
+    """Write all pieces, one block per piece and size, in one file (a graded nest where there are several sizes).
+
+    Args:
+        garment: drafted.
+        path: of the file.
+        dialect: "aama" (which the most systems read) or "astm".
+        units: "metric" (millimetres) or "english" (inches).
+        sizes: those to write; None writes all.
+        created: date and time for the file's text; None takes the present.
+
+    Raises:
+        InputError: unknown dialect, units or size.
+    """
+    import ezdxf
+    from ezdxf.addons import gerber_D6673
+
+    if dialect not in DIALECTS:
+        raise InputError(f"unknown DXF dialect {dialect!r}; {nearest(dialect, DIALECTS)}")
+    if units not in UNITS:
+        raise InputError(f"unknown DXF units {units!r}; {nearest(units, UNITS)}")
+    chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
+    for size in chosen:
+        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+    scale = UNITS[units]
+    document = ezdxf.new("R12", units=0)
+    space = document.modelspace()
+    groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
+    taken: set[str] = set()
+    for placed in lay_out(groups, width=1.5).placed:
+        for piece in placed.pieces:
+            name = block_name(piece, taken)
+            block = document.blocks.new(name, base_point=(0, 0))
+            _write_piece(block, piece, scale, validation=dialect == "astm")
+            space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
+    _write_style(space, garment, units, scale, created or datetime.now().astimezone())
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
+        gerber_D6673.export_stream(document, stream)
+
+
+def block_name(piece: DraftedPiece, taken: set[str]) -> str:
+    """A block name such as FRONT_BODICE_38 in the few characters that R12 allows, and not in `taken` (it is added)."""
+    text = f"{piece.name}_{piece.size}" if piece.size else piece.name
+    clean = re.sub(r"[^A-Z0-9_$-]+", "_", _ascii(text).upper()).strip("_") or "PIECE"
+    unique, count = clean, 1
+    while unique in taken:
+        count += 1
+        unique = f"{clean}_{count}"
+    taken.add(unique)
+    return unique
+
+
+def _ascii(text: str) -> str:
+    """The standards allow 7 bits only: accents are dropped, what remains becomes "?"."""
+    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return "".join(c for c in plain if not unicodedata.combining(c)).encode("ascii", "replace").decode("ascii")
+
+
+def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, validation: bool) -> None:
+    boundary = _from_a_corner(piece.cut_line)
+    _polyline(block, boundary, scale, "1", closed=True)
+    corner = _is_corner(boundary)
+    for point, turns in zip(boundary, corner, strict=True):
+        _point(block, point, scale, "2" if turns else "3")
+    for notch in piece.notches:
+        angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
+        for base in notch.base:
+            location = (base[0] * scale, base[1] * scale, notch.depth * scale)
+            block.add_point(location, dxfattribs={"layer": "4", "angle": angle})
+    for edge in piece.edges:
+        if edge.kind == "fold":
+            _line(block, edge.line[[0, -1]], scale, "6")
+        else:
+            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" else "14")
+        middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
+        _text(block, f"EDGE: {edge.name}", middle, scale, "15", 0.003)
+    _line(block, piece.grain, scale, "7")
+    for line in piece.internal_lines.values():
+        _polyline(block, line, scale, "8")
+    for dart in piece.darts:
+        if dart.fold is not None:
+            _polyline(block, dart.fold, scale, "8")
+    for line in piece.fisheyes.values():
+        _polyline(block, line, scale, "8", closed=True)
+    for line in piece.cutouts.values():
+        _polyline(block, line, scale, "11", closed=True)
+    for hole in piece.drill_holes:
+        _point(block, hole.at, scale, "13")
+    if validation:
+        _polyline(block, boundary, scale, "84", closed=True)
+        for edge in piece.edges:
+            if edge.kind not in ("fold", "dart"):
+                _polyline(block, edge.curve.sample(5e-6), scale, "87")
+    texts = [f"PIECE NAME: {piece.name}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
+    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
+    texts += [f"ANNOTATION: {text}" for text, _ in piece.label.lines[2:3]]
+    texts += [f"ANNOTATION: {note}" for note in piece.notes]
+    for row, text in enumerate(texts):
+        _text(block, text, piece.label.at + np.array([-0.03, 0.02 - 0.007 * row]), scale, "1", 0.004)
+
+
+def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime) -> None:
+    texts = [
+        f"STYLE NAME: {garment.name}",
+        f"CREATION DATE: {created:%d-%m-%Y}",
+        f"CREATION TIME: {created:%H:%M}",
+        "AUTHOR: warpflat",
+        f"SAMPLE SIZE: {garment.garment.sample}",
+        f"UNITS: {units.upper()}",
+        "PRODUCT: warpflat",
+        f"VERSION: {__version__}",
+    ]
+    for row, text in enumerate(texts):
+        _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
+
+
+def _polyline(block: BlockLayout, points: Vector, scale: float, layer: str, *, closed: bool = False) -> None:
+    block.add_polyline2d([tuple(p) for p in (points * scale).tolist()], close=closed, dxfattribs={"layer": layer})
+
+
+def _line(block: BlockLayout, ends: Vector, scale: float, layer: str) -> None:
+    start, end = (tuple(p) for p in (ends * scale).tolist())
+    block.add_line(start, end, dxfattribs={"layer": layer})
+
+
+def _point(block: BlockLayout, at: Vector, scale: float, layer: str) -> None:
+    block.add_point(tuple((at * scale).tolist()), dxfattribs={"layer": layer})
+
+
+def _text(block: BlockLayout | Modelspace, text: str, at: Vector, scale: float, layer: str, height: float) -> None:
+    entity = block.add_text(_ascii(text), height=height * scale, dxfattribs={"layer": layer})
+    entity.set_placement(tuple((at * scale).tolist()))
+
+
+def _is_corner(ring: Vector) -> NDArray[np.bool_]:
+    around = np.concatenate([ring[-1:], ring, ring[:1]])
+    return np.asarray(np.abs(turning_angles(around)) > TURN)
+
+
+def _from_a_corner(ring: Vector) -> Vector:
+    """CAD systems expect a boundary to begin in a turn point."""
+    corners = np.flatnonzero(_is_corner(ring))
+    return np.roll(ring, -int(corners[0]), axis=0) if len(corners) else ring

@@ -1,0 +1,142 @@
+"""Patterns as JSON with everything: edges, cut lines, notches, darts, seams as stitches, the map to the mesh."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from warpflat._version import __version__
+from warpflat.export.atomic import atomic_path
+from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.pattern.pieces import SeamSide
+
+__all__ = ["SCHEMA", "pattern_json", "write_pattern_json"]
+
+#: Raised when a reader of the old form would misread the new one.
+SCHEMA = 1
+
+
+def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
+    """The whole pattern as plain lists and numbers. Lengths are metres, angles radians, y along the grain.
+
+    A stitch sews two sides: each lists its edges in the order in which the seam meets them, and whether it runs against
+    the edge's own direction (counter-clockwise round its piece). Numbers are not rounded.
+    """
+    sample = next(iter(garment.pieces.values()))
+    stitches: list[dict[str, Any]] = [
+        {
+            "name": seam.name,
+            "kind": "seam",
+            "ease": seam.ease,
+            "sides": [[_side(part) for part in side] for side in seam.sides],
+        }
+        for seam in garment.garment.seams
+    ]
+    stitches += [
+        {
+            "name": f"{piece.name}.{dart.dart.name}",
+            "kind": "dart",
+            "ease": 0.0,
+            "sides": [
+                [{"piece": piece.name, "edge": dart.dart.left, "reversed": False}],
+                [{"piece": piece.name, "edge": dart.dart.right, "reversed": True}],
+            ],
+        }
+        for piece in sample
+        for dart in piece.darts
+    ]
+    return {
+        "schema": SCHEMA,
+        "warpflat": __version__,
+        "units": "m",
+        "name": garment.name,
+        "sample_size": garment.garment.sample,
+        "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
+        "stitches": stitches,
+        "seams": [
+            {
+                "name": report.name,
+                "size": report.size,
+                "sides": list(report.sides),
+                "length_mm": list(report.length_mm),
+                "ease": report.ease,
+                "difference_mm": report.difference_mm,
+                "matches": report.matches,
+            }
+            for report in garment.seams
+        ],
+    }
+
+
+def write_pattern_json(garment: DraftedGarment, path: str | os.PathLike[str]) -> None:
+    """Write :func:`pattern_json`; the file appears whole or not at all."""
+    with atomic_path(path) as temporary:
+        temporary.write_text(json.dumps(pattern_json(garment), indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+
+
+def _side(side: SeamSide) -> dict[str, Any]:
+    return {"piece": side.piece, "edge": side.edge, "reversed": side.reversed}
+
+
+def _piece(piece: DraftedPiece) -> dict[str, Any]:
+    return {
+        "fabric": piece.piece.fabric,
+        "quantity": piece.piece.quantity,
+        "paired": piece.piece.paired,
+        "on_fold": piece.piece.on_fold,
+        "frame": piece.frame.tolist(),
+        "edges": [_edge(edge) for edge in piece.edges],
+        "cut_line": piece.cut_line.tolist(),
+        "darts": [
+            {
+                "name": dart.dart.name,
+                "left": dart.dart.left,
+                "right": dart.dart.right,
+                "tip": dart.tip.tolist(),
+                "fold": None if dart.fold is None else dart.fold.tolist(),
+                "fold_to": dart.fold_to,
+                "opening": dart.opening,
+            }
+            for dart in piece.darts
+        ],
+        "notches": [
+            {
+                "seam": notch.seam,
+                "edge": notch.edge,
+                "length": notch.length,
+                "at": notch.at.tolist(),
+                "base": [base.tolist() for base in notch.base],
+                "direction": notch.direction.tolist(),
+                "depth": notch.depth,
+                "double": notch.double,
+            }
+            for notch in piece.notches
+        ],
+        "drill_holes": [{"name": hole.name, "at": hole.at.tolist()} for hole in piece.drill_holes],
+        "internal_lines": _lists(piece.internal_lines),
+        "cutouts": _lists(piece.cutouts),
+        "fisheye_darts": _lists(piece.fisheyes),
+        "grain": piece.grain.tolist(),
+        "label": {"at": piece.label.at.tolist(), "lines": [text for text, _ in piece.label.lines]},
+        "notes": list(piece.notes),
+    }
+
+
+def _edge(edge: DraftedEdge) -> dict[str, Any]:
+    return {
+        "name": edge.name,
+        "kind": edge.kind,
+        "allowance": edge.width,
+        "length": edge.length,
+        "bezier": edge.curve.bezier.tolist(),
+        "line": edge.line.tolist(),
+        "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
+    }
+
+
+def _lists(lines: Mapping[str, Sequence[Any] | np.ndarray[Any, Any]]) -> dict[str, Any]:
+    return {name: np.asarray(line).tolist() for name, line in lines.items()}

@@ -1,0 +1,148 @@
+"""The first page of a printed pattern: test squares, what to do, what the lines mean, and which sheet goes where."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.export.svg import STYLE
+from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.layout import Sheet
+
+if TYPE_CHECKING:
+    from warpflat.export.pdf import Tiling
+
+__all__ = ["LEGEND_SIZE", "TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
+
+Vector = NDArray[np.float64]
+
+#: Width and height [m] of the block that :func:`draw_legend` draws.
+LEGEND_SIZE = (0.180, 0.128)
+#: Sides of the test squares: 50 mm and 2 inches [m].
+TEST_MM, TEST_INCHES = 0.050, 2 * 0.0254
+
+POINT = 72 / 0.0254
+FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
+
+_KEY = (
+    ("cut", "cutting line"),
+    ("sew", "sewing line"),
+    ("hem", "hem line"),
+    ("fold", "fold of the cloth"),
+    ("dart", "dart leg"),
+    ("dart_fold", "fold of a dart"),
+    ("internal", "construction line"),
+    ("grain", "grain: along the warp"),
+    ("notch", "notch; double at the back"),
+)
+
+
+def draw_legend(canvas: Any, at: Vector, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
+    """Title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
+    from warpflat.export.pdf import SIZE_COLOURS, SIZE_DASHES
+
+    x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
+    _text(canvas, x, top - 0.008, garment.name, 18, bold=True)
+    _text(canvas, x, top - 0.016, f"Size{'s' if len(sizes) > 1 else ''} {', '.join(sizes)}", 11)
+    _text(canvas, x, top - 0.025, "Print at 100 % (actual size). Do not fit to the page.", 10, bold=True)
+    _text(canvas, x, top - 0.031, f"Paper: {paper}. Measure both squares before you cut anything.", 8)
+    _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "50 mm")
+    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, "2 inches")
+    y = top - 0.037
+    for role, meaning in _KEY:
+        y -= 0.0052
+        _sample(canvas, x + 0.117, y, *STYLE[role])
+        _text(canvas, x + 0.139, y - 0.0009, meaning, 7)
+    if len(sizes) > 1:
+        for index, size in enumerate(sizes):
+            column, row = divmod(index, 4)
+            y = top - 0.097 - 0.006 * row
+            dashes = SIZE_DASHES[index % len(SIZE_DASHES)]
+            _sample(canvas, x + 0.001 + 0.045 * column, y, SIZE_COLOURS[index % len(SIZE_COLOURS)], 0.5, dashes)
+            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, f"size {size}", 8)
+    notes = sorted({f"{p.name}: {note}" for pieces in garment.pieces.values() for p in pieces for note in p.notes})
+    for row, note in enumerate(notes[:2]):
+        _text(canvas, x, top - 0.122 - 0.004 * row, note, 6.5)
+
+
+def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
+    """The first page of a tiled pattern; ends the page."""
+    paper = tiling.paper
+    low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
+    draw_legend(canvas, low, garment, sizes, paper.name)
+    y = float(low[1]) - 0.004
+    lines = [
+        "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
+        f"the half diamonds meet, and glue. {len(tiling.tiles)} sheets; empty ones are left out.",
+    ]
+    for line in lines:
+        _text(canvas, float(low[0]), y, line, 7.5)
+        y -= 0.0042
+    pieces = next(iter(garment.pieces.values()))
+    for piece in pieces:
+        cut = next((text for text, _ in piece.label.lines if text.startswith("Cut ")), "")
+        _text(canvas, float(low[0]), y - 0.002, f"{piece.name}: {cut[0].lower() + cut[1:]}", 7.5)
+        y -= 0.0042
+    _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
+    canvas.showPage()
+
+
+def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, width: float, height: float) -> None:
+    """All sheets and pieces, small, in a box whose lower left is (x, y) [m]."""
+    step, overlap = tiling.paper.step, tiling.paper.overlap
+    total = np.array([tiling.columns * step[0] + overlap, tiling.rows * step[1] + overlap])
+    scale = float(min(width / total[0], height / total[1]))
+    left = x + (width - scale * total[0]) / 2
+    origin = np.array([left, y + scale * (total[1] - float(sheet.size[1]))])
+    canvas.setDash([])
+    for row, column in tiling.tiles:
+        corner = tiling.corner(row, column) + np.array([0.0, overlap])
+        canvas.setStrokeColor("#999999")
+        canvas.setLineWidth(0.4)
+        canvas.rect(*((origin + scale * corner) * POINT), *(scale * step * POINT))
+        canvas.setFillColor("#999999")
+        canvas.setFont(FONT, 7)
+        name_at = origin + scale * (corner + np.array([0.006, step[1]])) - np.array([0.0, 0.003])
+        canvas.drawString(*(name_at * POINT), tiling.name(row, column))
+    canvas.setStrokeColor("#000000")
+    canvas.setLineWidth(0.6)
+    for placed in sheet.placed:
+        for piece in placed.pieces:
+            points = (origin + scale * (piece.cut_line + placed.offset)) * POINT
+            path = canvas.beginPath()
+            path.moveTo(*points[0])
+            for point in points[1:]:
+                path.lineTo(*point)
+            path.close()
+            canvas.drawPath(path)
+        middle = origin + scale * (placed.pieces[len(placed.pieces) // 2].label.at + placed.offset)
+        canvas.setFillColor("#000000")
+        canvas.setFont(FONT, 6)
+        canvas.drawCentredString(*(middle * POINT), placed.pieces[0].name)
+
+
+def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
+    canvas.setDash([])
+    canvas.setLineWidth(0.4)
+    canvas.setStrokeColor("#000000")
+    canvas.rect(x * POINT, y * POINT, side * POINT, side * POINT)
+    canvas.setFillColor("#000000")
+    canvas.setFont(FONT, 9)
+    canvas.drawCentredString((x + side / 2) * POINT, (y + side / 2) * POINT, text)
+
+
+def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: Sequence[float]) -> None:
+    canvas.setStrokeColor(colour)
+    canvas.setLineWidth(width / 1000 * POINT)
+    canvas.setDash([d / 1000 * POINT for d in dashes])
+    canvas.line(x * POINT, y * POINT, (x + 0.019) * POINT, y * POINT)
+    canvas.setDash([])
+
+
+def _text(canvas: Any, x: float, y: float, text: str, size: float, *, bold: bool = False) -> None:
+    canvas.setFillColor("#000000")
+    canvas.setFont(BOLD if bold else FONT, size)
+    canvas.drawString(x * POINT, y * POINT, text)

@@ -1,0 +1,405 @@
+"""The page of `picture.png`: rows of two views with dimensions, grain, labels and a scale bar, and one colour bar."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.export.colours import energy_colours
+from warpflat.export.labels import LabelRoom, Spot, along_line, away_from, beyond_ends
+from warpflat.export.picture_views import HALO_LAYER, INK, DrawnView, View
+
+__all__ = ["DPI", "PAGE_WIDTH", "TOP_MARGIN", "Pen", "Row", "draw_colour_bar", "draw_row", "lay_out"]
+
+DPI = 150
+PAGE_WIDTH = 12.5  # [in], as all that follows
+TOP_MARGIN = 0.30
+_LEFT, _RIGHT = 0.55, 1.75  # the colour bar stands in the right margin
+_BETWEEN = 1.35  # from surface to pattern: the height's dimension line, and labels that do not fit inside
+_BESIDE = 0.75  # right of the pattern, for labels
+_BELOW = 0.95  # a row's foot: the width's dimension line and the scale bar
+_SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
+_COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
+_SHORTEST_GRAIN = 0.28  # half its length
+_GREY = (0.36, 0.38, 0.42)
+_GRAIN = (0.02, 0.27, 0.66)
+_LABEL_SIZE = 8.5  # [pt]
+
+
+@dataclass(kw_only=True, eq=False)
+class Row:
+    """One piece on the page."""
+
+    name: str
+    captions: Mapping[str, str]
+    density: NDArray[np.float64]
+    on_body: View
+    pattern: View
+    datum: str | None
+    caption_lines: list[str] = field(default_factory=list)
+    inches_per_metre: float = 1.0
+    band: float = 0.0
+
+    @property
+    def areas(self) -> NDArray[np.float64]:
+        """#F, the areas of the faces on the body [m2]."""
+        facets, vectors = self.on_body.facets, self.on_body.vectors
+        lengths = np.zeros(len(facets.triangles)) if vectors is None else np.linalg.norm(vectors, axis=1)
+        summed = np.bincount(facets.face_of_triangle, weights=lengths, minlength=len(facets.faces))
+        return summed.astype(np.float64)
+
+    @property
+    def head(self) -> float:
+        """Room for the name, the captions and the words above the views."""
+        return 0.34 + 0.20 * len(self.caption_lines) + 0.44
+
+    @property
+    def height(self) -> float:
+        return self.head + self.band + _BELOW
+
+
+class Pen:
+    """Text and lines on the page, measured in inches from its lower left corner."""
+
+    def __init__(self, renderer: Any) -> None:
+        self._renderer = renderer
+        self.axes: Any = None
+        self.page_height = 0.0
+
+    def open_page(self, figure: Any, height: float) -> None:
+        """Lay axes over the whole page whose units are inches."""
+        self.page_height = height
+        self.axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+        self.axes.set_axis_off()
+        self.axes.set_xlim(0.0, PAGE_WIDTH)
+        self.axes.set_ylim(0.0, height)
+        self.axes.set_autoscale_on(False)
+
+    def measure(self, text: str, size: float, weight: str = "normal") -> tuple[float, float]:
+        """Width and height of a line of text [in] at a size [pt]."""
+        from matplotlib.font_manager import FontProperties
+
+        font = FontProperties(size=size, weight=weight)
+        width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
+        return width / DPI, height / DPI
+
+    def write(self, x: float, y: float, text: str, size: float, *, halo: bool = False, **options: Any) -> None:
+        """A text; with a halo it stays legible over colours and lines."""
+        from matplotlib.patheffects import withStroke
+
+        options = {"color": INK, "ha": "left", "va": "center", "zorder": 8, "parse_math": False} | options
+        drawn = self.axes.text(x, y, text, fontsize=size, **options)
+        if halo:
+            drawn.set_path_effects([withStroke(linewidth=2.4, foreground=(1.0, 1.0, 1.0, 0.85))])
+
+    def line(
+        self, points: NDArray[np.float64], *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
+    ) -> None:
+        """A polyline (#N by 2); with a halo it stays visible on dark colours."""
+        if halo:
+            self.axes.plot(
+                points[:, 0], points[:, 1], color=(1.0, 1.0, 1.0, 0.7), linewidth=width + 1.6, zorder=HALO_LAYER
+            )
+        self.axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=width, linestyle=style, zorder=5)
+
+    def arrow(self, ends: NDArray[np.float64], *, width: float, colour: Any, head: float, halo: bool = False) -> None:
+        """A straight line (2 by 2) with a filled head at either end."""
+        from matplotlib.patches import FancyArrowPatch
+        from matplotlib.patheffects import withStroke
+
+        style = f"<|-|>,head_length={head},head_width={0.42 * head}"
+        options = {"arrowstyle": style, "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0, "zorder": 6}
+        patch = FancyArrowPatch(tuple(ends[0]), tuple(ends[1]), **options)
+        if halo:
+            patch.set_path_effects([withStroke(linewidth=width + 1.6, foreground=(1.0, 1.0, 1.0, 0.7))])
+        self.axes.add_patch(patch)
+
+
+def lay_out(pen: Pen, rows: Sequence[Row]) -> float:
+    """Choose the scale and the height of each row, and return the height of the page [in].
+
+    All rows have the same scale, so that pieces can be compared; only a piece that would become too small to read is
+    drawn larger. Each row has its own scale bar.
+    """
+    wide = PAGE_WIDTH - _LEFT - _RIGHT - _BETWEEN - _BESIDE
+    high = 6.0 if len(rows) == 1 else 4.4 if len(rows) < 4 else 3.4
+    sizes = [(row.on_body.size[:2], row.pattern.size[:2]) for row in rows]
+    fits = [
+        min(wide / max(float(body[0] + flat[0]), 1e-9), high / max(float(body[1]), float(flat[1]), 1e-9))
+        for body, flat in sizes
+    ]
+    for row, fit, (body, flat) in zip(rows, fits, sizes, strict=True):
+        readable = _SMALLEST_PATTERN / max(float(flat.max()), 1e-9)
+        row.inches_per_metre = max(min(fits), min(fit, readable))
+        row.band = max(_SMALLEST_BAND, row.inches_per_metre * float(max(body[1], flat[1])))
+        row.caption_lines = _wrapped(pen, row)
+    rows[0].band = max(rows[0].band, _COLOUR_BAR[0])
+    return TOP_MARGIN + sum(row.height for row in rows) + 0.15
+
+
+def _wrapped(pen: Pen, row: Row) -> list[str]:
+    """The captions as lines that end before the colour bar."""
+    width, height = row.pattern.size[:2]
+    captions = {"pattern": f"{_length(width, unit=False)} × {_length(height)}"} | dict(row.captions)
+    lines: list[str] = []
+    for key, value in captions.items():
+        entry = f"{key} {value}"
+        longer = f"{lines[-1]}   ·   {entry}" if lines else entry
+        if lines and pen.measure(longer, 9.5)[0] < PAGE_WIDTH - _LEFT - _RIGHT:
+            lines[-1] = longer
+        else:
+            lines.append(entry)
+    return lines
+
+
+def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
+    """Draw a row whose upper edge is at `top` [in], its colours up to `scale` [J/m2]."""
+    pen.write(_LEFT, top - 0.14, row.name, 15, fontweight="bold")
+    for index, text in enumerate(row.caption_lines):
+        pen.write(_LEFT, top - 0.42 - 0.20 * index, text, 9.5, color=_GREY)
+    middle = top - row.head - 0.5 * row.band
+    size = row.inches_per_metre
+    body, flat = row.on_body.size * size, row.pattern.size * size
+    spare = PAGE_WIDTH - _LEFT - _RIGHT - _BETWEEN - _BESIDE - float(body[0] + flat[0])
+    left = _LEFT + 0.3 * spare
+    shown = []
+    for view, extent in ((row.on_body, body), (row.pattern, flat)):
+        bottom = middle - 0.5 * float(extent[1])
+        drawn = DrawnView(view, left=left, bottom=bottom, inches_per_metre=size, dpi=DPI)
+        drawn.draw(pen.axes, energy_colours(row.density, scale))
+        shown.append(drawn)
+        left += float(body[0]) + _BETWEEN + 0.35 * spare
+    room = LabelRoom()
+    on_body, pattern = shown
+    for drawn, words in ((on_body, "on the body"), (pattern, "pattern")):
+        _heading(pen, room, drawn, words, top - row.head + 0.16)
+    _dimensions(pen, room, pattern)
+    _scale_bar(pen, room, on_body, size)
+    datum = row.pattern.lines.get(row.datum, [None])[0] if row.datum is not None else None
+    has_grain = datum is None or _grain(pen, room, pattern, datum, inside=True)
+    floor = top - row.height + 0.02
+    between = 0.5 * (on_body.box[2] + pattern.box[0])
+    unnamed: dict[str, None] = {}
+    for drawn, left, right in ((on_body, 0.1, between), (pattern, between, PAGE_WIDTH - _RIGHT + 0.1)):
+        page = (left, floor, right, top - row.head + 0.2)
+        unnamed |= dict.fromkeys(_feature_lines(pen, room, drawn, row.datum, page))
+    if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, inside=False):
+        unnamed["grain"] = None
+    if unnamed:
+        text = f"not labelled for want of room: {', '.join(unnamed)}"
+        pen.write(_LEFT, floor + 0.06, text, 7.5, color=_GREY)
+
+
+def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:
+    x = 0.5 * (drawn.box[0] + drawn.box[2])
+    width, height = pen.measure(words, 9.5)
+    pen.write(x, y, words, 9.5, color=_GREY, ha="center", fontstyle="italic")
+    room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
+
+
+def _feature_lines(
+    pen: Pen, room: LabelRoom, drawn: DrawnView, datum: str | None, page: tuple[float, float, float, float]
+) -> list[str]:
+    """Draw the lines of a view with their names, and return the names for which there was no room."""
+    unnamed = []
+    for name, parts in drawn.view.lines.items():
+        is_datum = name == datum
+        style = (0, (9, 2.5, 2, 2.5)) if is_datum else "-"
+        for part in parts:
+            points = drawn.visible_line(part)
+            if drawn.view.vectors is None or is_datum:
+                if len(points) > 1:
+                    pen.line(points, width=1.3, colour=_GRAIN if is_datum else INK, style=style, halo=True)
+            else:
+                drawn.draw_segments(pen.axes, np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True, zorder=5)
+    stretches = {name: _longest_visible(drawn, parts) for name, parts in drawn.view.lines.items()}
+    for name, points in stretches.items():
+        if len(points) < 2:
+            continue
+        others = [line for other, line in stretches.items() if other != name and len(line) > 1]
+        width, height = pen.measure(name, _LABEL_SIZE)
+        beside = [*along_line(points, width, 0.62 * height + 0.02), *beyond_ends(points, width, height)]
+        spot = room.place(beside, width, height, page, others)
+        spot = spot or room.place(list(away_from(points, width)), width, height, page, others)
+        if spot is None:
+            unnamed.append(name)
+            continue
+        colour = _GRAIN if name == datum else INK
+        angle = float(np.degrees(spot.angle))
+        options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": colour}
+        pen.write(spot.x, spot.y, name, _LABEL_SIZE, halo=True, **options)
+        if spot.leader is not None:
+            near = spot.x - np.copysign(0.5 * width + 0.04, spot.x - spot.leader[0])
+            leader = np.array([spot.leader, (near, spot.y)])
+            pen.line(leader, width=0.6, colour=colour)
+            room.take_line(leader, 0.03)
+    return unnamed
+
+
+def _longest_visible(drawn: DrawnView, parts: Sequence[NDArray[np.int32]]) -> NDArray[np.float64]:
+    """#N by 2 [in], of all parts of a line the longest stretch that can be seen."""
+    return max(
+        map(drawn.visible_line, parts), key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    )
+
+
+def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: NDArray[np.int32], *, inside: bool) -> bool:
+    """A grain arrow parallel to the datum line, on the pattern or right of it; False where there is no room."""
+    line = drawn.to_page(drawn.view.points[datum])
+    along = line[-1] - line[0]
+    length = float(np.linalg.norm(along))
+    if not length > 0.0:
+        return True
+    along = along / length * (1.0 if along[1] >= 0 else -1.0)
+    across = np.array([along[1], -along[0]])
+    text_width, text_height = pen.measure("grain", _LABEL_SIZE)
+    if inside:
+        place = _grain_inside(drawn, 0.5 * (line[0] + line[-1]), along, across, length, text_height)
+    else:
+        place = _grain_outside(room, drawn, float(np.arctan2(along[1], along[0])))
+    if place is None:
+        return False
+    centre, half = place
+    ends = np.array([centre - half * along, centre + half * along])
+    pen.arrow(ends, width=1.3, colour=_GRAIN, head=5.5, halo=True)
+    room.take_line(ends, 0.12)
+    middle = centre + across * (0.5 * text_height + 0.07)
+    angle = float(np.degrees(np.arctan2(along[1], along[0])))
+    options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": _GRAIN}
+    pen.write(float(middle[0]), float(middle[1]), "grain", _LABEL_SIZE, halo=True, **options)
+    room.take_line(middle + np.array([[-0.5], [0.5]]) * text_width * along, text_height)
+    return True
+
+
+def _grain_inside(
+    drawn: DrawnView,
+    middle: NDArray[np.float64],
+    along: NDArray[np.float64],
+    across: NDArray[np.float64],
+    length: float,
+    text_height: float,
+) -> tuple[NDArray[np.float64], float] | None:
+    """The middle of the arrow and half its length [in], where it and its word lie on the cloth."""
+    left, bottom, right, top = drawn.box
+    width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
+    for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
+        for shift in (0.0, 0.15, -0.15, 0.3, -0.3):
+            for aside in (0.12, -0.12, 0.2, -0.2, 0.3, -0.3, 0.42, -0.42):
+                centre = middle + shift * length * along + aside * width * across
+                run = centre + np.linspace(-half, half, 15)[:, None] * along
+                margin = 0.10
+                edges = np.concatenate([run - margin * across, run + (margin + text_height) * across])
+                if half >= _SHORTEST_GRAIN and drawn.covers(edges).all():
+                    return centre, half
+    return None
+
+
+def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[NDArray[np.float64], float] | None:
+    _, bottom, right, top = drawn.box
+    spots = [
+        Spot(x=right + far, y=bottom + share * (top - bottom), angle=angle)
+        for far in (0.45, 0.9)
+        for share in (0.5, 0.25, 0.75, 0.1, 0.9)
+    ]
+    free = room.place(spots, 0.8, 0.35, (0.0, 0.0, PAGE_WIDTH, np.inf))
+    return None if free is None else (np.array([free.x - 0.05, free.y]), 0.35)
+
+
+def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
+    """Width and height of the pattern, as a technical drawing gives them."""
+    left, bottom, right, top = drawn.box
+    width, height = drawn.view.size[:2]
+    y, x = bottom - 0.22, left - 0.26
+    for start, end, ticks in (
+        ((left, y), (right, y), ((left, left), (right, right))),
+        ((x, bottom), (x, top), ((bottom, bottom), (top, top))),
+    ):
+        ends = np.array([start, end])
+        if np.ptp(ends, axis=0).max() > 0.3:
+            pen.arrow(ends, width=0.6, colour=_GREY, head=3.5)
+        else:
+            pen.line(ends, width=0.6, colour=_GREY)
+        for tick, _ in ticks:
+            mark = [(tick, y + 0.14), (tick, y - 0.06)] if start[1] == end[1] else [(x + 0.18, tick), (x - 0.06, tick)]
+            pen.line(np.array(mark), width=0.6, colour=_GREY)
+        room.take_line(ends, 0.1)
+    text = _length(width)
+    text_width, text_height = pen.measure(text, 9)
+    middle = 0.5 * (left + right)
+    pen.write(middle, y - 0.14, text, 9, ha="center", color=_GREY)
+    room.take_box(middle - 0.5 * text_width, y - 0.14 - 0.5 * text_height, middle + 0.5 * text_width, y - 0.07)
+    text = _length(height)
+    text_width, text_height = pen.measure(text, 9)
+    middle = 0.5 * (bottom + top)
+    if top - bottom > text_width + 0.1:
+        pen.write(x - 0.12, middle, text, 9, ha="center", color=_GREY, rotation=90, rotation_mode="anchor")
+        room.take_box(x - 0.2, middle - 0.5 * text_width, x - 0.04, middle + 0.5 * text_width)
+    else:
+        pen.write(x - 0.10, middle, text, 9, ha="right", color=_GREY)
+        room.take_box(x - 0.10 - text_width, middle - 0.08, x - 0.1, middle + 0.08)
+
+
+def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: float) -> None:
+    from matplotlib.patches import Rectangle
+
+    steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
+    metres = float(steps[max(int(np.searchsorted(steps, 1.7 / inches_per_metre, side="right")) - 1, 0)])
+    wide = metres * inches_per_metre
+    left = max(0.5 * (drawn.box[0] + drawn.box[2] - wide), 0.2)
+    y = drawn.box[1] - 0.42
+    for part in range(2):
+        fill = INK if part == 0 else "white"
+        box = Rectangle(
+            (left + 0.5 * part * wide, y), 0.5 * wide, 0.06, facecolor=fill, edgecolor=INK, linewidth=0.7, zorder=6
+        )
+        pen.axes.add_patch(box)
+    pen.write(left + 0.5 * wide, y - 0.12, _length(metres, digits=0), 9, ha="center", color=_GREY)
+    room.take_box(left - 0.1, y - 0.22, left + wide + 0.1, y + 0.08)
+
+
+def draw_colour_bar(
+    pen: Pen,
+    figure: Any,
+    row: Row,
+    scale: float,
+    density: NDArray[np.float64],
+    areas: NDArray[np.float64],
+    quantity: str,
+) -> None:
+    """The colour bar beside the first row, and what lies above its end."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import ListedColormap, Normalize
+
+    above = density > scale
+    tall = float(np.clip(row.band, *_COLOUR_BAR))
+    top = pen.page_height - TOP_MARGIN - row.head - max(0.0, 0.5 * (row.band - tall))
+    left, bottom = PAGE_WIDTH - _RIGHT + 0.45, max(top - tall, 0.75)
+    box = (left / PAGE_WIDTH, bottom / pen.page_height, 0.2 / PAGE_WIDTH, (top - bottom) / pen.page_height)
+    colours = ListedColormap(energy_colours((np.arange(256) + 0.5) / 256, 1.0))
+    mapping = ScalarMappable(norm=Normalize(0.0, scale), cmap=colours)
+    bar = figure.colorbar(mapping, cax=figure.add_axes(box), extend="max" if above.any() else "neither")
+    bar.set_label(f"{quantity} [J/m²]", fontsize=9.5, color=INK, labelpad=6)
+    bar.ax.tick_params(labelsize=8.5, width=0.6, length=3)
+    bar.ax.yaxis.get_offset_text().set_fontsize(8)
+    bar.formatter.set_powerlimits((-3, 4))
+    bar.outline.set_linewidth(0.6)
+    total = float(areas.sum())
+    if above.any() and total > 0.0:
+        share = float(areas[above].sum()) / total
+        text = f"clipped: {_percent(share)} of the\narea is above, up to\n{density.max():.3g} J/m²"
+        pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=_GREY, va="top", linespacing=1.35)
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
+
+
+def _length(metres: float, *, digits: int = 1, unit: bool = True) -> str:
+    """A length as pattern makers write it: centimetres, millimetres where it is below one."""
+    value, word = (100 * metres, "cm") if metres >= 0.00999 else (1000 * metres, "mm")
+    number = f"{value:.{digits}f}" if digits or value >= 1 else f"{value:.3g}"
+    return f"{number} {word}" if unit else number

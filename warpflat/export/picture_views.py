@@ -1,0 +1,265 @@
+"""One mesh on a page: the surface seen from its front, lit, or the pattern in its plane, coloured by energy."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
+from warpflat.export.raster import Samples, interpolate, rasterise, reduce_samples
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import triangulate
+
+__all__ = ["DrawnView", "Facets", "View", "facets_of", "pattern_view", "surface_view"]
+
+_FINE = 500_000  # triangles, about as many as pixels: from here on smooth light and smooth edges show no difference
+_MARGIN = 3  # pixels around the image of a mesh
+_LIGHT = np.array([-0.42, 0.55, 0.72]) / np.linalg.norm([-0.42, 0.55, 0.72])  # right, up, towards the viewer
+_BACK = np.array([0.80, 0.80, 0.79])
+INK = (0.10, 0.11, 0.14)
+HALO_LAYER = 3.5  # below the outline
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Facets:
+    """How the faces of a mesh (#F by 4) are drawn.
+
+    Attributes:
+        faces: #F by 4.
+        triangles, face_of_triangle: #T by 3 and #T.
+        outline: #B by 2, the edges with one face.
+        used: the vertices that have a face.
+    """
+
+    faces: NDArray[np.int32]
+    triangles: NDArray[np.int32]
+    face_of_triangle: NDArray[np.int32]
+    outline: NDArray[np.int32]
+    used: NDArray[np.int64]
+
+
+def facets_of(faces: NDArray[np.int32]) -> Facets:
+    """The facets of faces (#F by 4)."""
+    triangles, face = triangulate(faces)
+    has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
+    has_face[triangles] = True
+    used = np.flatnonzero(has_face)
+    return Facets(faces=faces, triangles=triangles, face_of_triangle=face, outline=outline_edges(faces), used=used)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class View:
+    """A mesh as seen on the page.
+
+    Attributes:
+        points: #V by 3, to the right, upwards, towards the viewer [m].
+        facets: its faces.
+        lines: feature lines, each a list of vertex-index arrays.
+        vectors: #T by 3, the normals of the triangles in the view's directions, as long as their areas [m2]; None for a
+            flat pattern, which needs no light and hides nothing.
+    """
+
+    points: NDArray[np.float64]
+    facets: Facets
+    lines: Mapping[str, list[NDArray[np.int32]]]
+    vectors: NDArray[np.float64] | None
+
+    @cached_property
+    def low(self) -> NDArray[np.float64]:
+        """Left, bottom and back [m]."""
+        return np.asarray(self.points[self.facets.used].min(axis=0))
+
+    @cached_property
+    def size(self) -> NDArray[np.float64]:
+        """Width, height and depth [m]."""
+        return np.asarray(self.points[self.facets.used].max(axis=0) - self.low)
+
+
+def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[NDArray[np.int32]]]) -> View:
+    """The surface from its front: along its mean normal, a little from the side and from above, Y upwards.
+
+    A surface that faces all ways (a skirt) is seen from +Z, one that lies flat on the ground from above.
+    """
+    vectors = area_vectors(surface.vertices, facets.triangles)
+    directions = _view_directions(vectors)
+    centred = surface.vertices - surface.vertices.mean(axis=0)
+    return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
+
+
+def pattern_view(positions: NDArray[np.float64], facets: Facets, lines: Mapping[str, list[NDArray[np.int32]]]) -> View:
+    """The pattern (#P by 2) as it lies."""
+    points = np.column_stack([positions, np.zeros(len(positions))])
+    return View(points=points, facets=facets, lines=lines, vectors=None)
+
+
+def _view_directions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+    """3 by 3, rows: right, up and towards the viewer; from the area vectors (#T by 3)."""
+    total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
+    length = float(np.linalg.norm(mean))
+    front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
+    aside, above = np.radians(22.0), np.radians(12.0)
+    if abs(front[1]) > 0.85:
+        towards = np.array([np.sin(aside), np.copysign(2.0, front[1]), np.copysign(1.0, front[1])])
+        upwards = np.array([0.0, 0.0, -np.copysign(1.0, front[1])])
+    else:
+        azimuth = np.arctan2(front[0], front[2]) + aside
+        elevation = np.clip(np.arcsin(np.clip(front[1], -1.0, 1.0)) + above, -1.2, 1.2)
+        level = np.cos(elevation)
+        towards = np.array([level * np.sin(azimuth), np.sin(elevation), level * np.cos(azimuth)])
+        upwards = np.array([0.0, 1.0, 0.0])
+    towards = towards / np.linalg.norm(towards)
+    right = np.cross(upwards, towards)
+    right /= np.linalg.norm(right)
+    return np.array([right, np.cross(towards, right), towards])
+
+
+class DrawnView:
+    """A view at a place on the page: knows where its points are, and what of it can be seen."""
+
+    def __init__(self, view: View, *, left: float, bottom: float, inches_per_metre: float, dpi: int) -> None:
+        """Rasterise a view whose lower left corner comes to (`left`, `bottom`) [in]."""
+        self.view = view
+        self._dpi = dpi
+        self._fine = len(view.facets.triangles) > _FINE
+        self._per_pixel = 1 if self._fine else 2
+        self._low = view.low
+        self._scale = inches_per_metre
+        # On the grid of pixels, so that the image is shown as it is and not resampled.
+        self.left, self.bottom = round(left * dpi) / dpi, round(bottom * dpi) / dpi
+        pixels = np.ceil(view.size[:2] * inches_per_metre * dpi).astype(int) + 2 * _MARGIN
+        self._columns, self._rows = int(pixels[0]), int(pixels[1])
+        self._grid = self._to_samples(view.points)
+        shape = (self._rows * self._per_pixel, self._columns * self._per_pixel)
+        self._samples: Samples = rasterise(self._grid, view.facets.triangles, shape)
+
+    def to_page(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        """#N by 2 [in] of points in the view's directions (#N by 2 or 3) [m]."""
+        return np.asarray((points[:, :2] - self._low[:2]) * self._scale + (self.left, self.bottom))
+
+    @property
+    def box(self) -> tuple[float, float, float, float]:
+        """Left, bottom, right, top [in]."""
+        width, height = self.view.size[:2] * self._scale
+        return self.left, self.bottom, self.left + float(width), self.bottom + float(height)
+
+    def covers(self, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """#N, whether the mesh is at places on the page (#N by 2) [in]."""
+        per_inch = self._dpi * self._per_pixel
+        margin = _MARGIN * self._per_pixel
+        column = np.floor((spots[:, 0] - self.left) * per_inch + margin).astype(int)
+        row = len(self._samples.triangle) - 1 - np.floor((spots[:, 1] - self.bottom) * per_inch + margin).astype(int)
+        inside = (column >= 0) & (row >= 0)
+        inside &= (column < self._samples.triangle.shape[1]) & (row < len(self._samples.triangle))
+        hit = self._samples.triangle[np.where(inside, row, 0), np.where(inside, column, 0)] >= 0
+        return np.asarray(inside & hit)
+
+    def draw(self, axes: Any, face_colours: NDArray[np.float64]) -> None:
+        """The coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
+        colours, covered = self._shade(face_colours)
+        margin = _MARGIN / self._dpi
+        left, bottom = self.left - margin, self.bottom - margin
+        extent = (left, left + self._columns / self._dpi, bottom, bottom + self._rows / self._dpi)
+        pixels = np.round(reduce_samples(colours, covered, self._per_pixel) * 255).astype(np.uint8)
+        axes.imshow(pixels, extent=extent, interpolation="nearest", aspect="auto", zorder=1)
+        self._draw_mesh(axes)
+        self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
+
+    def draw_segments(
+        self, axes: Any, edges: NDArray[np.int32], *, width: float, colour: Any = INK, halo: bool = False, zorder: float
+    ) -> None:
+        """The visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
+        from matplotlib.collections import LineCollection
+
+        if len(edges):
+            segments = self._visible(edges)
+            layers = [((1.0, 1.0, 1.0, 0.7), width + 1.6, HALO_LAYER)] if halo else []
+            for ink, thickness, layer in (*layers, (colour, width, zorder)):
+                lines = LineCollection(
+                    list(segments), colors=[ink], linewidths=thickness, capstyle="round", zorder=layer
+                )
+                axes.add_collection(lines)
+
+    def visible_line(self, line: NDArray[np.int32]) -> NDArray[np.float64]:
+        """#N by 2 [in], the longest stretch of a polyline of vertices that can be seen."""
+        points = self.to_page(self.view.points[line])
+        seen = np.concatenate([[False], self._seen(self._grid[line]), [False]])
+        changes = np.flatnonzero(seen[1:] != seen[:-1])
+        if len(changes) == 0:
+            return points[:0]
+        begins, ends = changes[::2], changes[1::2]
+        longest = int(np.argmax(ends - begins))
+        return points[begins[longest] : ends[longest]]
+
+    def _to_samples(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+        per_metre = self._scale * self._dpi
+        result = np.empty((len(points), 3))
+        result[:, 0] = ((points[:, 0] - self._low[0]) * per_metre + _MARGIN) * self._per_pixel
+        result[:, 1] = (self._rows - ((points[:, 1] - self._low[1]) * per_metre + _MARGIN)) * self._per_pixel
+        result[:, 2] = points[:, 2]
+        return result
+
+    def _shade(self, face_colours: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+        triangle = self._samples.triangle
+        covered = triangle >= 0
+        colours = face_colours[self.view.facets.face_of_triangle[triangle]]
+        if self.view.vectors is not None:
+            normals = self._normals(self.view.vectors)
+            lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
+            normals = normals / np.where(lengths > 0.0, lengths, 1.0)
+            behind = normals[..., 2] < 0.0
+            # The reverse of the cloth, seen through a neck or an armhole, is grey: the colours belong to its face.
+            colours = np.where(behind[..., None], 0.25 * colours + 0.75 * _BACK, colours)
+            lit = np.clip(np.where(behind[..., None], -normals, normals) @ _LIGHT, 0.0, 1.0)
+            light = np.where(behind, 0.62, 0.55) + np.where(behind, 0.25, 0.50) * lit
+            colours = np.clip(colours * light[..., None], 0.0, 1.0)
+        return colours, covered
+
+    def _normals(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+        """#R by #C by 3, normals of any length at each sample: blended, of a fine mesh each triangle's own."""
+        if self._fine:
+            return np.asarray(vectors[self._samples.triangle])
+        triangles = self.view.facets.triangles
+        smooth = vertex_normals(vectors, triangles, len(self.view.points))
+        return interpolate(self._samples, self._grid, triangles, smooth)
+
+    def _draw_mesh(self, axes: Any) -> None:
+        faces = self.view.facets.faces
+        is_quad = faces[:, 3] >= 0
+        covered = float((self._samples.triangle >= 0).sum()) / self._per_pixel**2
+        # Thin lines at less than every seventh pixel would only darken the colours.
+        if covered / max(len(faces), 1) < 50.0:
+            return
+        closed = np.where(is_quad[:, None], faces, faces[:, [0, 1, 2, 0]])
+        sides = np.stack([closed, np.roll(closed, -1, axis=1)], axis=-1).reshape(-1, 2)
+        edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
+        self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
+
+    def _visible(self, edges: NDArray[np.int32]) -> NDArray[np.float64]:
+        """#S by 2 by 2 [in], the edges, on a surface cut into short pieces of which the hidden ones are left out."""
+        a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
+        if self.view.vectors is None:
+            return np.stack([self.to_page(a), self.to_page(b)], axis=1)
+        pixels = np.linalg.norm((b - a)[:, :2], axis=1) * self._scale * self._dpi
+        count = np.clip(np.ceil(pixels / 3.0), 1, 400).astype(int)
+        edge = np.repeat(np.arange(len(edges)), count)
+        step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
+        begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
+        start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
+        seen = self._seen(self._to_samples(0.5 * (start + stop)))
+        return np.stack([self.to_page(start[seen]), self.to_page(stop[seen])], axis=1)
+
+    def _seen(self, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
+        """#N, whether points on the mesh (#N by 3, as samples) are in front, with room for the mesh's own slope."""
+        if self.view.vectors is None:
+            return np.ones(len(spots), dtype=bool)
+        rows, columns = self._samples.depth.shape
+        row = np.clip(np.floor(spots[:, 1]).astype(int), 1, rows - 2)
+        column = np.clip(np.floor(spots[:, 0]).astype(int), 1, columns - 2)
+        around = np.stack([self._samples.depth[row + i, column + j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
+        tolerance = 0.01 * float(np.linalg.norm(self.view.size))
+        return np.asarray(spots[:, 2] >= around.min(axis=0) - tolerance)

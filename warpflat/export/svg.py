@@ -1,0 +1,232 @@
+"""Patterns as SVG in true size: one unit is one millimetre, a group per piece and size, an id per edge."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Sequence
+from xml.etree import ElementTree as ET
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.export.atomic import atomic_path
+from warpflat.pattern.curves import Curve
+from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.drawing import Drawing, Stroke, Words, draw_nest, grain_strokes
+from warpflat.pattern.layout import lay_out, nests
+from warpflat.pattern.marker import Copy, Marker
+
+__all__ = ["STYLE", "SvgPage", "write_marker_svg", "write_svg"]
+
+Vector = NDArray[np.float64]
+
+#: Stroke colour, width [mm], dashes [mm] by role; shared with the PDF.
+STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
+    "cut": ("#000000", 0.5, ()),
+    "sew": ("#4a4a4a", 0.25, (3, 1.5)),
+    "hem": ("#4a4a4a", 0.25, (6, 1.5, 1, 1.5)),
+    "fold": ("#000000", 0.5, (8, 2, 1.5, 2)),
+    "dart": ("#4a4a4a", 0.3, (3, 1.5)),
+    "dart_fold": ("#7a7a7a", 0.2, (1, 1.5)),
+    "internal": ("#7a7a7a", 0.2, (5, 2)),
+    "grain": ("#000000", 0.3, ()),
+    "notch": ("#000000", 0.6, ()),
+    "drill": ("#000000", 0.25, ()),
+    "cutout": ("#000000", 0.5, ()),
+}
+#: Height of the letters' body over that of their capitals.
+BODY = 1.39
+
+
+def write_svg(
+    garment: DraftedGarment,
+    path: str | os.PathLike[str],
+    *,
+    sizes: Sequence[str] | None = None,
+    nested: bool = False,
+    width: float = 1.5,
+) -> None:
+    """Write the pieces side by side, in true size.
+
+    Groups are called "PIECE-SIZE"; in them the cut line is "PIECE-SIZE.cut" and every edge "PIECE-SIZE.EDGE" (what
+    an id may not hold becomes "_"; the plain names stand in `data-piece`, `data-size` and `data-edge`).
+
+    Args:
+        garment: drafted.
+        path: of the file.
+        sizes: those to draw; None draws all.
+        nested: lay all sizes of a piece upon each other, as a grading nest.
+        width: of the sheet [m].
+    """
+    chosen = _chosen(garment, sizes)
+    groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
+    if not nested:
+        groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
+    sheet = lay_out(groups, width=width)
+    page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
+    for placed in sheet.placed:
+        for index, drawing in enumerate(draw_nest(placed.pieces)):
+            shift = np.column_stack([np.eye(2), placed.offset])
+            page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None)
+    page.write(path)
+
+
+def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
+    """Write the lay plan in true size: the cloth lies along x, the pieces on it with their grain and names."""
+    share = f"{marker.length:.3f} m of {marker.width:.3f} m, {marker.utilisation:.1%} used"
+    page = SvgPage(marker.length, marker.width, f"marker {marker.fabric}: {share}".replace(" :", ":"))
+    cloth = np.array([[0, 0], [marker.length, 0], [marker.length, marker.width], [0, marker.width]])
+    page.stroke(page.root, Stroke(role="internal", name="cloth", points=cloth, closed=True), "cloth")
+    for index, copy in enumerate(marker.placements):
+        page.marker_copy(copy, index)
+    page.write(path)
+
+
+def _chosen(garment: DraftedGarment, sizes: Sequence[str] | None) -> tuple[str, ...]:
+    if sizes is None:
+        return tuple(garment.pieces)
+    for size in sizes:
+        garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
+    return tuple(size for size in garment.pieces if size in sizes)
+
+
+class SvgPage:
+    """One SVG document whose user unit is the millimetre; y runs downwards in it, so heights are turned over."""
+
+    #: Colours by which the sizes of a nest are told apart, legible on paper and without red-green vision.
+    SIZES = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a", "#555555")
+
+    def __init__(self, width: float, height: float, title: str) -> None:
+        """`width`, `height` in metres."""
+        self.height = height * 1000
+        w, h = _number(width * 1000), _number(self.height)
+        self.root = ET.Element(
+            "svg",
+            {
+                "xmlns": "http://www.w3.org/2000/svg",
+                "width": f"{w}mm",
+                "height": f"{h}mm",
+                "viewBox": f"0 0 {w} {h}",
+                "version": "1.1",
+            },
+        )
+        ET.SubElement(self.root, "title").text = title
+        style = [
+            f".{role} {{ fill: none; stroke: {colour}; stroke-width: {width}; stroke-linejoin: round; "
+            + (f"stroke-dasharray: {' '.join(map(str, dashes))}; " if dashes else "")
+            + "}"
+            for role, (colour, width, dashes) in STYLE.items()
+        ]
+        style.append("text { font-family: 'DejaVu Sans', Arial, Helvetica, sans-serif; text-anchor: middle; }")
+        ET.SubElement(self.root, "style").text = "\n".join(style)
+        self._ids: set[str] = set()
+
+    def piece(self, drawing: Drawing, matrix: Vector, *, hue: int | None = None) -> None:
+        """Add a group for one piece and size, moved by a 2 by 3 matrix [m]."""
+        piece = drawing.piece
+        key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
+        group = ET.SubElement(self.root, "g", {"id": key, "data-piece": piece.name, "data-size": piece.size})
+        colour = None if hue is None else self.SIZES[hue % len(self.SIZES)]
+        for stroke in drawing.strokes:
+            self.stroke(group, stroke, key, matrix, colour)
+        for words in drawing.words:
+            self.words(group, words, matrix, colour if words.tag else None)
+
+    def stroke(
+        self, parent: ET.Element, stroke: Stroke, key: str, matrix: Vector | None = None, colour: str | None = None
+    ) -> None:
+        """Add one line to a group; `key` begins its id."""
+        matrix = np.eye(2, 3) if matrix is None else matrix
+        attributes = {"class": stroke.role}
+        if stroke.name:
+            attributes["id"] = self._id(f"{key}.{stroke.name}")
+            attributes["data-edge"] = stroke.name
+        if colour is not None:
+            attributes["style"] = f"stroke: {colour}"
+        if stroke.curve is not None:
+            attributes["d"] = self._bezier(stroke.curve.transformed(matrix))
+        else:
+            points = self._page(stroke.points @ matrix[:, :2].T + matrix[:, 2])
+            attributes["d"] = "M" + " L".join(_pair(p) for p in points) + (" Z" if stroke.closed else "")
+        ET.SubElement(parent, "path", attributes)
+
+    def words(self, parent: ET.Element, words: Words, matrix: Vector | None = None, colour: str | None = None) -> None:
+        """Add one line of text, centred on its place."""
+        matrix = np.eye(2, 3) if matrix is None else matrix
+        x, y = self._page((words.at @ matrix[:, :2].T + matrix[:, 2])[None])[0]
+        height = words.height * 1000
+        turn = -np.degrees(words.angle + np.arctan2(matrix[1, 0], matrix[0, 0]))
+        attributes = {
+            "transform": f"translate({_number(x)} {_number(y)}) rotate({_number(turn)})",
+            "y": _number(height / 2),
+            "font-size": _number(height * BODY),
+        }
+        if words.bold:
+            attributes["font-weight"] = "bold"
+        if colour:
+            attributes["fill"] = colour
+        if words.tag:
+            attributes |= {"stroke": "#ffffff", "stroke-width": "1.2", "paint-order": "stroke"}
+        ET.SubElement(parent, "text", attributes).text = words.text
+
+    def marker_copy(self, copy: Copy, index: int) -> None:
+        """Add one placed copy of a marker."""
+        key = self._id(f"copy{index}-{copy.label}")
+        group = ET.SubElement(self.root, "g", {"id": key, "data-piece": copy.piece.name, "data-size": copy.piece.size})
+        self.stroke(group, Stroke(role="cut", name="cut", points=copy.cut_line, closed=True), key)
+        group[-1].set("style", "fill: #f3efe6")
+        for line in copy.fold_lines:
+            self.stroke(group, Stroke(role="internal", name="", points=line), key)
+        for line in copy.notches:
+            self.stroke(group, Stroke(role="notch", name="", points=line), key)
+        for stroke in grain_strokes(copy.grain):
+            self.stroke(group, stroke, key)
+        texts = [
+            copy.piece.name,
+            f"size {copy.piece.size}" if copy.piece.size else "",
+            "mirrored" if copy.mirrored else "",
+        ]
+        for row, text in enumerate(t for t in texts if t):
+            height = 0.012 if row == 0 else 0.009
+            at = copy.label_at - [0, 0.016 * row - 0.008]
+            self.words(group, Words(text=text, at=at, height=height, bold=row == 0))
+
+    def write(self, path: str | os.PathLike[str]) -> None:
+        """Write the document; the file appears whole or not at all."""
+        ET.indent(self.root)
+        with atomic_path(path) as temporary:
+            ET.ElementTree(self.root).write(temporary, encoding="utf-8", xml_declaration=True)
+
+    def _page(self, points: Vector) -> Vector:
+        return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
+
+    def _bezier(self, curve: Curve) -> str:
+        control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
+        text = ["M" + _pair(control[0, 0])]
+        for segment, straight in zip(control, curve.straight, strict=True):
+            if straight:
+                text.append("L" + _pair(segment[3]))
+            else:
+                text.append("C" + " ".join(_pair(p) for p in segment[1:]))
+        return " ".join(text)
+
+    def _id(self, name: str) -> str:
+        """A valid id that no other element has."""
+        clean = re.sub(r"[^\w.\-]", "_", name)
+        clean = clean if re.match(r"[^\W\d]", clean) else f"_{clean}"
+        unique, count = clean, 1
+        while unique in self._ids:
+            count += 1
+            unique = f"{clean}_{count}"
+        self._ids.add(unique)
+        return unique
+
+
+def _number(value: float) -> str:
+    """Millimetres to a tenth of a micrometre."""
+    return f"{value:.4f}".rstrip("0").rstrip(".") if abs(value) > 5e-5 else "0"
+
+
+def _pair(point: Vector) -> str:
+    return f"{_number(point[0])},{_number(point[1])}"

@@ -1,0 +1,414 @@
+"""`frames.usdc`: every piece in space and in the plane, over the time of the relaxation.
+
+The writer streams: frames go to a hidden file that is saved every few frames, so that memory does not grow with their
+number. Two things can only be known at the end and are authored then, in a second pass over that file: the places of
+the patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale
+comes from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping
+from contextlib import suppress
+from dataclasses import dataclass, field
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat._version import __version__
+from warpflat.errors import InputError
+from warpflat.export.atomic import atomic_path, hidden_beside, require_writable
+from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
+from warpflat.export.geometry import (
+    Polylines,
+    area_vectors,
+    corner_average,
+    face_areas,
+    polylines_of,
+    vertex_normals,
+)
+from warpflat.export.usd_prims import (
+    MeshSamples,
+    SampledLines,
+    define_group,
+    define_mesh,
+    valid_name,
+)
+from warpflat.export.usd_validation import validate_usd
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import triangulate
+
+__all__ = ["FrameWriter", "validate_usd"]
+
+_FIRST_FRAME = 1
+_LINE_COLOUR = (0.03, 0.05, 0.10)
+_CUT_COLOUR = (0.02, 0.20, 0.75)
+_COLOUR_STEPS = 1024
+
+
+@dataclass(kw_only=True)
+class _Piece:
+    """What the writer remembers of a piece: a few arrays of its size, whatever the number of frames."""
+
+    surface: Surface
+    path: str
+    areas: NDArray[np.float64]
+    on_surface: MeshSamples
+    on_pattern: MeshSamples
+    surface_cuts: SampledLines
+    pattern_lines: SampledLines
+    pattern_cuts: SampledLines
+    faces: NDArray[np.int32]
+    to_surface: NDArray[np.int32]
+    lines: dict[str, Polylines]
+    cuts: dict[str, Polylines] = field(default_factory=dict)
+    frames: int = 0
+    last_density: NDArray[np.float32] | None = None
+    low: NDArray[np.float64] = field(default_factory=lambda: np.full(2, np.inf))
+    high: NDArray[np.float64] = field(default_factory=lambda: np.full(2, -np.inf))
+
+
+class FrameWriter:
+    """Streaming writer of `frames.usdc`; used in a ``with`` block.
+
+    ``/World/NAME/surface`` is the piece in space, where it lies in the input. ``/World/NAME/pattern`` is its pattern in
+    the XY plane, facing +Z; its points are the positions as given, and a translation sets it beside the surfaces
+    and the other patterns. Both carry the energy density per face and colours per vertex (linear Rec. 709) on one scale
+    for all pieces and all frames, stated in the colours' custom data. The values of the last frame are also
+    authored as defaults, for readers that do not ask for a time.
+
+    When the block ends well the file appears under its final name, whole. When it ends with an exception, or the
+    process is killed, nothing appears there.
+    """
+
+    def __init__(
+        self,
+        path: str | os.PathLike[str],
+        *,
+        frames_per_second: float = 24.0,
+        save_every: int = 16,
+        scale: float | None = None,
+    ) -> None:
+        """Prepare a writer; nothing is touched before the ``with`` block is entered.
+
+        Args:
+            path: the file, ``*.usdc`` (or ``*.usd``, ``*.usda``).
+            frames_per_second: of playback.
+            save_every: frames kept in memory at most.
+            scale: upper end of the colour scale [J/m2]; if not given, 98 % of the area of the last frames of all pieces
+                lies below it (see :func:`warpflat.export.colours.energy_scale`).
+        """
+        if save_every < 1 or not frames_per_second > 0.0:
+            raise ValueError("save_every must be at least 1, and frames_per_second above 0")
+        self._final = Path(path)
+        self._rate = float(frames_per_second)
+        self._save_every = int(save_every)
+        self._scale = scale
+        self._pieces: dict[str, _Piece] = {}
+        self._taken: set[str] = set()
+        self._unsaved = 0
+        self._stage: Any = None
+        self._working = hidden_beside(self._final)
+
+    def __enter__(self) -> FrameWriter:
+        """Open the hidden working file.
+
+        Raises:
+            InputError: the place cannot be written.
+        """
+        from pxr import Kind, Tf, Usd, UsdGeom
+
+        require_writable(self._final)
+        if self._final.suffix not in (".usdc", ".usd", ".usda"):
+            raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc, .usd or .usda")
+        try:
+            # Crate files are the only ones that can be saved bit by bit, whatever the final format.
+            self._working = self._working.with_suffix(".usdc")
+            self._stage = Usd.Stage.CreateNew(str(self._working))
+        except Tf.ErrorException as error:
+            raise self._cannot_write(error) from error
+        stage = self._stage
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        stage.SetTimeCodesPerSecond(self._rate)
+        stage.SetFramesPerSecond(self._rate)
+        stage.SetStartTimeCode(_FIRST_FRAME)
+        stage.SetEndTimeCode(_FIRST_FRAME)
+        stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
+        stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Colour, place and export when the block ended well; remove the working file in any case."""
+        from pxr import Tf
+
+        try:
+            if kind is None:
+                try:
+                    self._place()
+                    self._colour()
+                    self._author_defaults()
+                    self._save()
+                    with atomic_path(self._final) as temporary:
+                        self._stage.GetRootLayer().Export(str(temporary))
+                except Tf.ErrorException as failed:
+                    raise self._cannot_write(failed) from failed
+        finally:
+            self._stage = None
+            with suppress(OSError):
+                self._working.unlink()
+
+    def add_piece(self, name: str, surface: Surface) -> None:
+        """Author the surface of a piece with its feature lines, and prepare its pattern.
+
+        Args:
+            name: unique; made a valid USD identifier, and kept as the display name where that differs.
+            surface: the piece in space.
+
+        Raises:
+            ValueError: the name is taken.
+        """
+        from pxr import Kind, Usd
+
+        if name in self._pieces:
+            raise ValueError(f"piece {name!r} is already in the file")
+        path = f"/World/{valid_name(name, self._taken)}"
+        define_group(self._stage, path, label=name, kind=Kind.Tokens.component)
+        points = np.asarray(surface.vertices, dtype=np.float32)
+        size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0))) if len(points) else 0.0
+        width = float(np.clip(0.004 * size, 1e-5, 2e-3))
+
+        def group(below: str, colour: tuple[float, float, float]) -> SampledLines:
+            return SampledLines(self._stage, f"{path}/{below}", start=_FIRST_FRAME, width=width, colour=colour)
+
+        default = Usd.TimeCode.Default()
+        triangles, _ = triangulate(surface.faces)
+        normals = vertex_normals(area_vectors(surface.vertices, triangles), triangles, len(surface.vertices))
+        on_surface = MeshSamples(define_mesh(self._stage, f"{path}/surface", normals, per_face=False))
+        on_surface.write(default, points, surface.faces)
+        # Cuts change the number of vertices and never that of faces: one normal per face serves all frames.
+        upright = np.tile([0.0, 0.0, 1.0], (len(surface.faces), 1))
+        on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True))
+        lines = polylines_of(surface.lines)
+        group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
+        self._pieces[name] = _Piece(
+            surface=surface,
+            path=path,
+            areas=face_areas(surface.vertices, surface.faces),
+            on_surface=on_surface,
+            on_pattern=on_pattern,
+            surface_cuts=group("surface_cuts", _CUT_COLOUR),
+            pattern_lines=group("pattern_lines", _LINE_COLOUR),
+            pattern_cuts=group("pattern_cuts", _CUT_COLOUR),
+            faces=surface.faces,
+            to_surface=np.arange(len(surface.vertices), dtype=np.int32),
+            lines=lines,
+        )
+
+    def write(
+        self,
+        name: str,
+        *,
+        positions: ArrayLike,
+        face_energy_density: ArrayLike,
+        faces: ArrayLike | None = None,
+        lines: Mapping[str, Any] | None = None,
+        cuts: Mapping[str, Any] | None = None,
+        measures: Mapping[str, float] | None = None,
+    ) -> int:
+        """Append the next frame of a piece and return its number.
+
+        Args:
+            name: as given to :meth:`add_piece`.
+            positions: #P by 2, the pattern [m].
+            face_energy_density: #F, strain energy per area [J/m2].
+            faces: #F by 4, where the topology changes: the surface's faces, in their order and with their corners in
+                their order, in the pattern's numbering.
+            lines: feature lines in the pattern's numbering, where they change; each a vertex-index array or a list of
+                them. At first those of the surface.
+            cuts: cut lines, likewise (say, both sides of a crack). At first none.
+            measures: numbers of this frame, kept in double precision as ``/World/NAME.warpflat:KEY``.
+
+        Raises:
+            ValueError: the arrays do not fit together, or hold NaN.
+            InputError: the disk is full or the folder is gone.
+        """
+        from pxr import Usd, Vt
+
+        piece = self._pieces[name]
+        flat = np.asarray(positions, dtype=np.float64)
+        density = np.asarray(face_energy_density, dtype=np.float32)
+        number = _FIRST_FRAME + piece.frames
+        new_faces = self._new_topology(piece, faces, flat, density, number)
+        new_lines = piece.frames == 0 or new_faces is not None or lines is not None or cuts is not None
+        piece.lines = piece.lines if lines is None else polylines_of(lines)
+        piece.cuts = piece.cuts if cuts is None else polylines_of(cuts)
+        for line, parts in (*piece.lines.items(), *piece.cuts.items()):
+            if any(part.max() >= len(flat) or part.min() < 0 for part in parts):
+                raise ValueError(f"line {line!r} of piece {name!r} refers to vertices beyond the {len(flat)} positions")
+
+        time = Usd.TimeCode(number)
+        points = np.zeros((len(flat), 3), dtype=np.float32)
+        points[:, :2] = flat
+        piece.on_pattern.write(time, points, new_faces)
+        energy = Vt.FloatArray.FromNumpy(density)
+        for samples in (piece.on_surface, piece.on_pattern):
+            _density(samples).Set(energy, time)
+        piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
+        piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
+        if new_lines:
+            in_space = {key: _on_surface(parts, piece.to_surface) for key, parts in piece.cuts.items()}
+            space = np.asarray(piece.surface.vertices, dtype=np.float32)
+            piece.surface_cuts.write(time, in_space, space, changed=True)
+        self._measure(piece, measures or {}, time)
+
+        piece.frames += 1
+        piece.last_density = density
+        piece.low = np.minimum(piece.low, flat.min(axis=0))
+        piece.high = np.maximum(piece.high, flat.max(axis=0))
+        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
+        self._saved_now_and_then()
+        return number
+
+    def _new_topology(
+        self,
+        piece: _Piece,
+        faces: ArrayLike | None,
+        flat: NDArray[np.float64],
+        density: NDArray[np.float32],
+        number: int,
+    ) -> NDArray[np.int32] | None:
+        """The faces to write with this frame, or None where they stay; checks that all arrays fit together."""
+        what = f"frame {number} of piece {piece.surface.name!r}"
+        own = piece.surface.faces
+        if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
+            raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
+        if density.shape != (len(own),):
+            raise ValueError(f"{what}: {density.shape} energy densities for {len(own)} faces")
+        if not (np.isfinite(flat).all() and np.isfinite(density).all()):
+            raise ValueError(f"{what}: positions or energy densities are not finite")
+        new = piece.faces if faces is None else np.ascontiguousarray(faces, dtype=np.int32)
+        changed = new is not piece.faces and not np.array_equal(new, piece.faces)
+        if changed:
+            used = own >= 0
+            if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= len(flat):
+                raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
+            to_surface = np.zeros(len(flat), dtype=np.int32)
+            to_surface[new[used]] = own[used]
+            if not np.array_equal(to_surface[new[used]], own[used]):
+                raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
+            piece.faces, piece.to_surface = new, to_surface
+        if len(flat) != len(piece.to_surface):
+            raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
+        return piece.faces if changed or piece.frames == 0 else None
+
+    def _measure(self, piece: _Piece, measures: Mapping[str, float], time: Any) -> None:
+        from pxr import Sdf
+
+        prim = self._stage.GetPrimAtPath(piece.path)
+        for key, value in measures.items():
+            attribute = prim.CreateAttribute(f"warpflat:{key}", Sdf.ValueTypeNames.Double, custom=True)
+            attribute.Set(float(value), time)
+
+    def _saved_now_and_then(self) -> None:
+        from pxr import Tf
+
+        self._unsaved += 1
+        if self._unsaved >= self._save_every:
+            try:
+                self._save()
+            except Tf.ErrorException as error:
+                raise self._cannot_write(error) from error
+
+    def _save(self) -> None:
+        self._stage.Save()
+        self._unsaved = 0
+
+    def _place(self) -> None:
+        """Set the patterns in a row to the right of all surfaces, by the room each took over the whole time."""
+        from pxr import Gf, UsdGeom
+
+        shown = [piece for piece in self._pieces.values() if piece.frames]
+        if not shown:
+            return
+        space = [piece.surface.vertices for piece in self._pieces.values()]
+        low = np.min([vertices.min(axis=0) for vertices in space], axis=0)
+        high = np.max([vertices.max(axis=0) for vertices in space], axis=0)
+        gap = 0.15 * max(float(np.max(high - low)), *(float(np.max(piece.high - piece.low)) for piece in shown))
+        middle = 0.5 * (low + high)
+        right = float(high[0]) + gap
+        for piece in shown:
+            offset = Gf.Vec3d(
+                right - float(piece.low[0]), float(middle[1] - 0.5 * (piece.low[1] + piece.high[1])), float(middle[2])
+            )
+            for prim in (piece.on_pattern.mesh.GetPrim(), piece.pattern_lines.prim, piece.pattern_cuts.prim):
+                if prim is not None:
+                    UsdGeom.Xformable(prim).AddTranslateOp().Set(offset)
+            right += float(piece.high[0] - piece.low[0]) + gap
+
+    def _colour(self) -> None:
+        """Turn the energies of all frames into colours on one scale."""
+        shown = [piece for piece in self._pieces.values() if piece.last_density is not None]
+        if not shown:
+            return
+        scale = self._scale
+        if scale is None:
+            density = np.concatenate([piece.last_density for piece in shown if piece.last_density is not None])
+            scale = energy_scale(density, np.concatenate([piece.areas for piece in shown]))
+        table = linear_rgb(energy_colours(np.arange(_COLOUR_STEPS) / (_COLOUR_STEPS - 1), 1.0)).astype(np.float32)
+        for piece in shown:
+            for samples in (piece.on_surface, piece.on_pattern):
+                attribute = samples.mesh.GetDisplayColorPrimvar().GetAttr()
+                attribute.SetCustomData(
+                    {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
+                )
+        for number in range(_FIRST_FRAME, _FIRST_FRAME + max(piece.frames for piece in shown)):
+            for piece in shown:
+                if number < _FIRST_FRAME + piece.frames:
+                    self._colour_frame(piece, number, scale, table)
+            self._saved_now_and_then()
+
+    def _colour_frame(self, piece: _Piece, number: int, scale: float, table: NDArray[np.float32]) -> None:
+        from pxr import Vt
+
+        density = np.asarray(_density(piece.on_pattern).Get(number), dtype=np.float64)
+        face = np.nonzero(piece.surface.faces >= 0)[0].astype(np.int32)
+        done: tuple[int, NDArray[np.int32], Any] | None = None
+        for samples in (piece.on_surface, piece.on_pattern):
+            vertex = np.asarray(samples.mesh.GetFaceVertexIndicesAttr().Get(number))
+            size = len(samples.mesh.GetPointsAttr().Get(number))
+            if done is None or done[0] != size or not np.array_equal(done[1], vertex):
+                share = corner_average(density, piece.areas, face, vertex, size) / scale
+                step = np.clip(share * (_COLOUR_STEPS - 1) + 0.5, 0, _COLOUR_STEPS - 1).astype(np.int32)
+                done = (size, vertex, Vt.Vec3fArray.FromNumpy(table[step]))
+            samples.mesh.GetDisplayColorPrimvar().GetAttr().Set(done[2], number)
+
+    def _author_defaults(self) -> None:
+        """Give every sampled attribute its last value as default."""
+        for prim in self._stage.Traverse():
+            for attribute in prim.GetAuthoredAttributes():
+                if attribute.GetNumTimeSamples():
+                    attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
+
+    def _cannot_write(self, error: Exception) -> InputError:
+        reason = " ".join(str(error).split())[:200]
+        return InputError(f"cannot write {self._final}: {reason or 'USD failed'} (folder still there? disk full?)")
+
+
+def _density(samples: MeshSamples) -> Any:
+    from pxr import UsdGeom
+
+    return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
+
+
+def _on_surface(parts: Polylines, to_surface: NDArray[np.int32]) -> Polylines:
+    """The lines in the surface's numbering, where both sides of a crack are the same line."""
+    return [
+        np.array(line, dtype=np.int32) for line in dict.fromkeys(tuple(to_surface[part].tolist()) for part in parts)
+    ]

@@ -1,0 +1,183 @@
+"""Meshes and lines in a USD stage, sampled over time so that fractional frames are right across a topology change.
+
+USD interpolates two samples of a point array linearly where they are equally long, and holds the earlier one where they
+are not; indices are always held. After a topology change of equal length, the old faces would be drawn through points
+half-way to the new ones. So the first sample of a new topology always has another length than the one before: where
+the lengths would agree, the last point is stored twice. No face uses the second copy.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.export.geometry import Polylines
+
+__all__ = ["MeshSamples", "SampledLines", "define_group", "define_mesh", "valid_name"]
+
+_CONSTANT = "constant"
+
+
+def valid_name(name: str, taken: set[str]) -> str:
+    """`name` as a USD identifier that is not in `taken`, to which it is added."""
+    from pxr import Tf
+
+    base = Tf.MakeValidIdentifier(name)
+    result, number = base, 2
+    while result in taken:
+        result, number = f"{base}_{number}", number + 1
+    taken.add(result)
+    return result
+
+
+def define_group(stage: Any, path: str, *, label: str | None = None, kind: str | None = None) -> Any:
+    """An Xform prim, with its label as display name where that is not its identifier."""
+    from pxr import Usd, UsdGeom
+
+    prim = UsdGeom.Xform.Define(stage, path).GetPrim()
+    _label(prim, label)
+    if kind:
+        Usd.ModelAPI(prim).SetKind(kind)
+    return prim
+
+
+def define_mesh(stage: Any, path: str, normals: NDArray[np.float64], *, per_face: bool) -> Any:
+    """A polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
+
+    Args:
+        stage, path: where.
+        normals: for the whole time; #F by 3 if `per_face`, else #V by 3.
+    """
+    from pxr import Sdf, UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    mesh.CreateNormalsAttr().Set(Vt.Vec3fArray.FromNumpy(normals.astype(np.float32)))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.uniform if per_face else UsdGeom.Tokens.vertex)
+    density = UsdGeom.PrimvarsAPI(mesh).CreatePrimvar(
+        "strainEnergyDensity", Sdf.ValueTypeNames.FloatArray, UsdGeom.Tokens.uniform
+    )
+    density.GetAttr().SetCustomDataByKey("unit", "J/m2")
+    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+    return mesh
+
+
+def extent_of(points: NDArray[np.float32], margin: float = 0.0) -> NDArray[np.float32]:
+    """2 by 3, the corners of the box around `points` (#P by 3) [m]."""
+    return np.array([points.min(axis=0) - margin, points.max(axis=0) + margin], dtype=np.float32)
+
+
+class MeshSamples:
+    """The samples of one mesh: points every frame, topology only where it changes."""
+
+    def __init__(self, mesh: Any) -> None:
+        self.mesh = mesh
+        self._stored = 0
+        self._padding = 0
+
+    def write(self, time: Any, points: NDArray[np.float32], faces: NDArray[np.int32] | None = None) -> None:
+        """Write the points (#P by 3) [m]; `faces` (#F by 4) begin a new topology."""
+        from pxr import Vt
+
+        if faces is not None:
+            self._padding = 1 if len(points) == self._stored else 0
+            used = faces >= 0
+            self.mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)), time)
+            self.mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(faces[used]), time)
+        stored = self._padded(points)
+        self.mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
+        self.mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(extent_of(stored)), time)
+        self._stored = len(stored)
+
+    def _padded(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
+        return np.concatenate([rows, rows[-1:]]) if self._padding else np.ascontiguousarray(rows)
+
+
+class SampledLines:
+    """A group of named polylines along a mesh, each a BasisCurves prim that is shown only while it exists."""
+
+    def __init__(self, stage: Any, path: str, *, start: float, width: float, colour: Sequence[float]) -> None:
+        self.stage = stage
+        self.path = path
+        self.prim: Any = None
+        self._start = start
+        self._width = width
+        self._colour = colour
+        self._taken: set[str] = set()
+        self._members: dict[str, _Line] = {}
+
+    def write(self, time: Any, lines: Mapping[str, Polylines], points: NDArray[np.float32], *, changed: bool) -> None:
+        """Write each line's points at `time`; `changed` says that the lines or the mesh under them are new."""
+        if lines and self.prim is None:
+            self.prim = define_group(self.stage, self.path)
+        for name, parts in lines.items():
+            if name not in self._members:
+                path = f"{self.path}/{valid_name(name, self._taken)}"
+                self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
+            self._members[name].write(time, parts, points, changed=changed, start=self._start)
+        if changed:
+            for name, member in self._members.items():
+                if name not in lines:
+                    member.hide(time, start=self._start)
+
+
+class _Line:
+    def __init__(self, stage: Any, path: str, name: str, width: float, colour: Sequence[float]) -> None:
+        from pxr import Gf, UsdGeom, Vt
+
+        self._curves = UsdGeom.BasisCurves.Define(stage, path)
+        _label(self._curves.GetPrim(), name)
+        self._curves.CreateTypeAttr(UsdGeom.Tokens.linear)
+        self._curves.CreateWrapAttr(UsdGeom.Tokens.nonperiodic)
+        self._curves.CreateWidthsAttr(Vt.FloatArray([width]))
+        self._curves.SetWidthsInterpolation(_CONSTANT)
+        colours = Vt.Vec3fArray([Gf.Vec3f(*(float(channel) for channel in colour))])
+        self._curves.CreateDisplayColorPrimvar(_CONSTANT).Set(colours)
+        self._margin = 0.5 * width
+        self._stored = 0
+        self._padding = 0
+        self._shown = False
+
+    def write(self, time: Any, parts: Polylines, points: NDArray[np.float32], *, changed: bool, start: float) -> None:
+        from pxr import UsdGeom, Vt
+
+        if not self._shown and not time.IsDefault() and time.GetValue() > start:
+            self._see(UsdGeom.Tokens.inherited, time, start)
+        length = sum(len(part) for part in parts)
+        if changed or not self._shown:
+            self._padding = 1 if length == self._stored else 0
+            counts = np.array([len(part) for part in parts], dtype=np.int32)
+            counts[-1] += self._padding
+            self._curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(counts), time)
+        rows = np.concatenate([*parts, parts[-1][-1:]] if self._padding else parts)
+        stored = np.ascontiguousarray(points[rows])
+        self._curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
+        self._curves.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(extent_of(stored, self._margin)), time)
+        self._stored, self._shown = length + self._padding, True
+
+    def hide(self, time: Any, *, start: float) -> None:
+        from pxr import UsdGeom
+
+        if self._shown:
+            self._see(UsdGeom.Tokens.invisible, time, start)
+            self._shown = False
+
+    def _see(self, visibility: str, time: Any, start: float) -> None:
+        from pxr import UsdGeom
+
+        attribute = self._curves.CreateVisibilityAttr()
+        if attribute.GetNumTimeSamples() == 0:
+            # Before its first sample an attribute has that sample's value.
+            before = {UsdGeom.Tokens.inherited: UsdGeom.Tokens.invisible}.get(visibility, UsdGeom.Tokens.inherited)
+            attribute.Set(before, start)
+        attribute.Set(visibility, time)
+
+
+def _label(prim: Any, label: str | None) -> None:
+    if label and label != prim.GetName():
+        prim.SetDisplayName(label)
