@@ -1,0 +1,284 @@
+"""The command line: thin. Options become a scene, a scene is run, a table is printed."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import sys
+import tempfile
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpflat._version import __version__
+from warpflat.errors import InputError
+
+if TYPE_CHECKING:
+    from warpflat.scene import Scene
+
+__all__ = ["cli", "main"]
+
+DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+_EXIT_CODES = """\b
+Exit codes:
+  0    done
+  1    done, but a piece did not converge or has flipped faces
+  2    bad input; one line says what is wrong, where, and what would be right
+  130  interrupted"""
+
+_FILES = """\b
+What comes out, in DIR:
+  metrics.json  errors, energies [J], flips and stages of every piece
+  NAME.obj      the surface [m] with the pattern [m] as texture coordinates
+  frames.usdc   surface and pattern from the development to the end, coloured by energy
+  picture.png   both side by side, with a scale in J/m2"""
+
+
+class _Interrupted(Exception):
+    pass
+
+
+class _Group(click.Group):
+    def invoke(self, ctx: click.Context) -> Any:
+        try:
+            return super().invoke(ctx)
+        except KeyboardInterrupt:
+            # Click would print an empty line of its own.
+            raise _Interrupted from None
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
+    try:
+        code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
+        return code if isinstance(code, int) else DONE
+    except InputError as error:
+        return _fail(str(error))
+    except click.ClickException as error:
+        context = getattr(error, "ctx", None)
+        hint = f"; see {context.command_path} --help" if context is not None else ""
+        return _fail(error.format_message().rstrip(".") + hint)
+    except (KeyboardInterrupt, click.Abort, _Interrupted):
+        click.echo("warpflat: interrupted", err=True)
+        return INTERRUPTED
+    except BrokenPipeError:
+        # The reader of a pipe, such as head, has what it wanted.
+        sys.stderr.close()
+        return DONE
+
+
+def _fail(message: str) -> int:
+    click.echo(f"warpflat: {' '.join(message.split())}", err=True)
+    return BAD_INPUT
+
+
+@click.group(
+    cls=_Group,
+    invoke_without_command=True,
+    context_settings={"help_option_names": ["-h", "--help"], "max_content_width": 110},
+    epilog=_EXIT_CODES,
+)
+@click.version_option(__version__, prog_name="warpflat")
+@click.pass_context
+def cli(context: click.Context) -> None:
+    """Flat sewing patterns from 3D garment surfaces.
+
+    A surface is developed into the plane from a datum line, and the strain energy of its cloth is released by
+    approximate implicit integration.
+
+    \b
+    Examples:
+      warpflat run scenes/dome.toml                       a scene file, into out/dome
+      warpflat flatten front.obj --units cm --fabric denim
+      warpflat fabrics                                    what cloths there are
+      warpflat fabrics denim                              where its values come from
+    """
+    if context.invoked_subcommand is None:
+        click.echo(context.get_help())
+
+
+def _output_options(command: Callable[..., Any]) -> Callable[..., Any]:
+    for option in reversed(
+        [
+            click.option(
+                "--out",
+                type=click.Path(path_type=Path),
+                metavar="DIR",
+                help="Folder for the files.  [default: out/NAME]",
+            ),
+            click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
+            click.option(
+                "--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else."
+            ),
+            click.option(
+                "--device", metavar="NAME", help="Warp device, such as cpu or cuda:0.  [default: Warp's choice]"
+            ),
+        ]
+    ):
+        command = option(command)
+    return command
+
+
+@cli.command(epilog=f"{_FILES}\n\n{_EXIT_CODES}")
+@click.argument("scene", type=click.Path(path_type=Path))
+@_output_options
+def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None) -> int:
+    """Run a scene file.
+
+    A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
+
+    \b
+    Examples:
+      warpflat run scenes/dome.toml
+      warpflat run scenes/bodice.toml --out bodice --json
+    """
+    from warpflat.scene import load_scene
+
+    return _run(load_scene(scene), out, quiet=quiet, as_json=as_json, device=device)
+
+
+@cli.command(epilog=f"{_FILES}\n\n{_EXIT_CODES}")
+@click.argument("mesh", type=click.Path(path_type=Path))
+@click.option("--units", metavar="UNIT", help="Unit of the file: m, cm, mm, in ... Needed unless the file says (USD).")
+@click.option("--component", metavar="WHICH", help="Which connected part: largest, or 0, 1, ... by size.")
+@click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
+@click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
+@click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
+@click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@click.option(
+    "--datum",
+    metavar="LINE",
+    help="The line laid straight first: two vertices A,B, counted from 0 (the shortest path between them), a side "
+    "of the piece (bottom, left, right, top), or a line of the file (a USD curve).  [default: a long line through the "
+    "middle]",
+)
+@click.option("--grain-angle", type=float, metavar="DEGREES", help="Turns the warp from the datum; 45 is the bias.")
+@click.option("--max-steps", type=int, metavar="N", help="Give up after so many steps.")
+@click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
+@click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
+@click.option("--no-picture", is_flag=True, help="Write no picture.png.")
+@_output_options
+def flatten(
+    mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
+) -> int:
+    """Flatten one mesh: OBJ, PLY, STL, GLB or USD.
+
+    \b
+    Examples:
+      warpflat flatten front.obj --units cm
+      warpflat flatten scan.ply --units mm --component largest --fabric jersey
+      warpflat flatten dress.usdc --prim /World/front --datum /World/centre_front
+      warpflat flatten front.obj --units m --datum 120,2087 --out front
+    """
+    from warpflat.scene import make_scene
+
+    tables: dict[str, Any] = {"surface": {"file": str(mesh)}, "relax": {}, "output": {}}
+    places = {
+        "units": ("surface", "units"),
+        "component": ("surface", "component"),
+        "prim": ("surface", "prim"),
+        "max_steps": ("relax", "max_steps"),
+        "time_step": ("relax", "time_step"),
+        "frames": ("output", "frames"),
+    }
+    for option, (table, key) in places.items():
+        if options[option] is not None:
+            tables[table][key] = options[option]
+    if options["component"] is not None and options["component"].isdecimal():
+        tables["surface"]["component"] = int(options["component"])
+    for key in ("name", "fabric", "grain_angle"):
+        if options[key] is not None:
+            tables[key] = options[key]
+    tables["fabric_files"] = list(options["fabric_files"])
+    tables["output"]["picture"] = not options["no_picture"]
+    if datum is not None and re.fullmatch(r"\d+(,\d+)+", datum):
+        vertices = [int(vertex) for vertex in datum.split(",")]
+        ends = {"from": vertices[0], "to": vertices[1]}
+        tables["datum"] = "datum"
+        tables["lines"] = {"datum": ends if len(vertices) == 2 else {"vertices": vertices}}
+    elif datum is not None:
+        # A USD curve becomes a line of its name.
+        tables["datum"] = datum.rstrip("/").rpartition("/")[2]
+    scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
+    return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+
+
+@cli.command()
+@click.argument("name", required=False)
+@click.option("--file", "files", multiple=True, type=click.Path(path_type=Path), help="A fabric file of your own.")
+@click.option("--json", "as_json", is_flag=True, help="Print JSON.")
+def fabrics(name: str | None, files: tuple[Path, ...], as_json: bool) -> None:
+    """List the fabrics, or one in detail with the source of each value.
+
+    \b
+    Examples:
+      warpflat fabrics
+      warpflat fabrics denim
+      warpflat fabrics --file my_fabrics.toml --json
+    """
+    from warpflat.console import fabric_data, fabric_sheet, fabric_table
+    from warpflat.fabric import find_fabric, load_library
+
+    library = load_library(files)
+    shown = list(library.values()) if name is None else [find_fabric(name, library)]
+    if as_json:
+        click.echo(json.dumps({fabric.name: fabric_data(fabric) for fabric in shown}, indent=2))
+    elif name is None:
+        click.echo(fabric_table(shown))
+    else:
+        click.echo(fabric_sheet(shown[0]))
+
+
+def _start_warp() -> None:
+    """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error.
+
+    That a machine has no CUDA driver is printed by Warp's native part straight to the file descriptor, whatever the log
+    level; anything else that it says there is passed on.
+    """
+    import warp
+
+    warp.config.log_level = warp.LOG_ERROR
+    sys.stderr.flush()
+    with tempfile.TemporaryFile() as heard:
+        stderr = os.dup(2)
+        try:
+            os.dup2(heard.fileno(), 2)
+            warp.init()
+        finally:
+            os.dup2(stderr, 2)
+            os.close(stderr)
+        heard.seek(0)
+        for line in heard.read().decode(errors="replace").splitlines():
+            if "Could not find or load the NVIDIA CUDA driver" not in line:
+                click.echo(line, err=True)
+
+
+def _run(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:
+    from warpflat.console import ProgressBar, run_summary, warnings_of
+    from warpflat.scene import run_scene
+
+    _start_warp()
+    folder = out if out is not None else Path("out") / scene.name
+    with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
+        result = run_scene(scene, folder, on_progress=bar, device=device)
+    if not (quiet or as_json):
+        for note in result.notes:
+            click.echo(f"warpflat: note: {note}", err=True)
+    warnings = warnings_of(result.metrics)
+    for warning in warnings:
+        click.echo(f"warpflat: {warning}", err=True)
+    if as_json:
+        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        click.echo(run_summary(result.metrics, result.files, str(folder)))
+    return NOT_CONVERGED if warnings else DONE
+
+
+def _safe_name(mesh: Path) -> str:
+    """The file's name as a name for a piece and its files."""
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", mesh.stem).strip("_.-")
+    return name or "piece"

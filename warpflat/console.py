@@ -1,0 +1,198 @@
+"""What the command line shows: a progress bar, the summary of a run, tables of fabrics."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, fields
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from warpflat.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
+
+if TYPE_CHECKING:
+    from warpflat.flattening import Progress
+
+__all__ = ["ProgressBar", "fabric_data", "fabric_sheet", "fabric_table", "run_summary", "warnings_of"]
+
+_REFRESH = 0.1  # [s]
+
+
+class ProgressBar:
+    """Steps, energy and residual on stderr while a run goes on; nothing where stderr is no terminal or `hidden`."""
+
+    def __init__(self, name: str, *, hidden: bool = False) -> None:
+        """Show nothing yet: `name` is what is being flattened."""
+        self._name = name
+        self._hidden = hidden or not sys.stderr.isatty()
+        self._bar: Any = None
+
+    def __enter__(self) -> ProgressBar:
+        if not self._hidden:
+            from tqdm import tqdm
+
+            self._bar = tqdm(
+                desc=self._name,
+                file=sys.stderr,
+                leave=False,
+                mininterval=_REFRESH,
+                bar_format="{desc}: {n_fmt} steps [{elapsed}{postfix}]",
+            )
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the run stands."""
+        if self._bar is None:
+            return
+        self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
+        told = f"{progress.spring_energy * 1e3:.4g} mJ"
+        if math.isfinite(progress.residual):
+            told += f", residual {progress.residual:.1e}"
+        self._bar.set_postfix_str(told, refresh=False)
+        self._bar.update(max(0, progress.step - self._bar.n))
+
+
+def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
+    """The table at the end of a run, and where its files are.
+
+    Args:
+        metrics: as `metrics.json`.
+        files: their names.
+        folder: where they lie.
+    """
+    head = ("piece", "vertices", "length error", "area error", "energy", "flips", "converged")
+    rows = []
+    for name, piece in metrics["pieces"].items():
+        rows.append(
+            (
+                name,
+                f"{piece['vertices']:,}",
+                f"{100 * piece['length_error']:.3g} %",
+                f"{100 * piece['area_error']:.3g} %",
+                f"{1e3 * piece['spring_energy_j']:.4g} mJ",
+                f"{piece['flipped_faces']:,}",
+                "yes" if _converged(piece) else "NO",
+            )
+        )
+    return f"{_aligned(head, rows)}\n{folder}: {', '.join(files)}"
+
+
+def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
+    """One line for each piece that did not converge or has flipped faces."""
+    lines = []
+    for name, piece in metrics["pieces"].items():
+        last = piece["stages"][-1]
+        if not _converged(piece):
+            lines.append(
+                f"{name} did not converge within {last['steps']:,} steps (residual {last['residual']:.1e}); "
+                "the pattern is not final: raise max_steps"
+            )
+        if piece["flipped_faces"]:
+            lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+    return lines
+
+
+def fabric_table(fabrics: Iterable[Fabric]) -> str:
+    """One line per fabric, with units and grades."""
+    head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "grade", "description")
+    rows = []
+    used: set[str] = set()
+    for fabric in fabrics:
+        grades = "".join(sorted({origin.grade for origin in fabric.provenance.values() if origin.grade}))
+        used |= set(grades)
+        rows.append(
+            (
+                fabric.name,
+                f"{_mark(fabric, 'areal_density')}{fabric.areal_density:.3f}",
+                f"{_mark(fabric, 'stiffness_warp')}{fabric.stiffness_warp:,.0f}",
+                f"{_mark(fabric, 'stiffness_weft')}{fabric.stiffness_weft:,.0f}",
+                f"{_mark(fabric, 'shear_stiffness')}{fabric.shear_stiffness:,.0f}",
+                f"{fabric.poisson_ratio:.2g}",
+                f"{100 * fabric.strain_limit:.3g} %",
+                grades or "-",
+                fabric.description,
+            )
+        )
+    grades_text = ", ".join(f"{grade} {GRADES[grade]}" for grade in sorted(used))
+    notes = [
+        "K: secant tensile stiffness [N/m], G: shear stiffness [N/m per rad]; ~ estimate, > lower bound",
+        f"grades: {grades_text}",
+        f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
+    ]
+    return "\n".join([_aligned(head, rows, left=(0, 8)), "", *notes])
+
+
+def fabric_sheet(fabric: Fabric) -> str:
+    """One fabric: each value with unit, test load, grade and source."""
+    units = {
+        "areal_density": "kg/m2",
+        "stiffness_warp": "N/m",
+        "stiffness_weft": "N/m",
+        "shear_stiffness": "N/m per rad",
+    }
+    rows = []
+    sources: dict[str, str] = {}
+    for key in value_names():
+        value = getattr(fabric, key)
+        if value == ():
+            continue
+        origin = fabric.provenance.get(key, Provenance(source="default"))
+        shown = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
+        if origin.at_least:
+            shown = f">= {shown}"
+        if origin.spread is not None:
+            shown += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
+        number = sources.setdefault(origin.source, f"[{len(sources) + 1}]")
+        rows.append((key, shown, units.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
+    title = f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name
+    parts = [title]
+    if fabric.aliases:
+        parts.append(f"also: {', '.join(fabric.aliases)}")
+    parts += ["", _aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
+    for direction in ("warp", "weft"):
+        points = getattr(fabric, f"curve_{direction}")
+        if points:
+            text = ", ".join(f"{100 * strain:.3g} %: {tension:.3g} N/m" for strain, tension in points)
+            parts.append(f"curve_{direction}: {text}")
+    parts += ["", *(f"{number} {source}" for source, number in sources.items())]
+    used = sorted({origin.grade for origin in fabric.provenance.values() if origin.grade})
+    if used:
+        parts += ["", f"grades: {', '.join(f'{grade} {GRADES[grade]}' for grade in used)}"]
+    return "\n".join(parts)
+
+
+def fabric_data(fabric: Fabric) -> dict[str, Any]:
+    """A fabric as plain data: its values, and under `provenance` where each comes from."""
+    data = {field.name: getattr(fabric, field.name) for field in fields(fabric) if field.name != "provenance"}
+    return {**data, "provenance": {key: asdict(origin) for key, origin in fabric.provenance.items()}}
+
+
+def _converged(piece: Mapping[str, Any]) -> bool:
+    return all(stage["converged"] for stage in piece["stages"][-1:])
+
+
+def _mark(fabric: Fabric, key: str) -> str:
+    origin = fabric.provenance.get(key)
+    if origin is None:
+        return ""
+    return "~" if origin.is_estimate else ">" if origin.at_least else ""
+
+
+def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
+    """Columns under their heads, numbers to the right, those of `left` to the left."""
+    table = [head, *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column in left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )
