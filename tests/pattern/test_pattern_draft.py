@@ -1,0 +1,265 @@
+"""Curves, seams, notches, darts, labels of whole garments."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from warpflat.errors import InputError
+from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment, draft_piece
+from warpflat.pattern.curves import arc_lengths, fit_curve
+from warpflat.pattern.sample import sample_dress
+
+SIZES = ("36", "38", "40", "42", "44")
+
+
+@pytest.fixture(scope="module")
+def dress():
+    return draft_garment(sample_dress(SIZES))
+
+
+def square(name="square", size="", **options):
+    corners = np.array([(0, 0), (0.2, 0), (0.2, 0.3), (0, 0.3), (0, 0)], dtype=float)
+    names = ("bottom", "right", "top", "left")
+    edges = [Edge(name=n, points=corners[i : i + 2]) for i, n in enumerate(names)]
+    return Piece(name=name, size=size, edges=options.pop("edges", edges), **options)
+
+
+def test_all_pieces_of_all_sizes_are_simple_and_contain_their_sewing_line(dress):
+    for pieces in dress.pieces.values():
+        for piece in pieces:
+            cut, sew = shapely.Polygon(piece.cut_line), shapely.Polygon(piece.sew_line)
+            assert cut.is_valid, (piece.name, piece.size)
+            assert sew.is_valid
+            assert sew.difference(cut.buffer(1e-6)).area < 1e-9
+            assert piece.notes == ()
+
+
+def test_seam_sides_agree_within_half_a_millimetre(dress):
+    assert {report.size for report in dress.seams} == set(SIZES)
+    for report in dress.seams:
+        assert abs(report.difference_mm) < 0.5, report
+        assert report.matches
+
+
+def test_a_seam_that_does_not_match_is_reported():
+    a, b = square("a"), square("b", edges=square().edges)
+    taller = [Edge(name=e.name, points=e.points * [1, 1.01]) for e in b.edges]
+    garment = Garment(
+        name="two",
+        pieces={"": [a, square("b", edges=taller)]},
+        seams=[
+            Seam(
+                name="s",
+                sides=((SeamSide(piece="a", edge="right"),), (SeamSide(piece="b", edge="left", reversed=True),)),
+            )
+        ],
+    )
+    (report,) = draft_garment(garment).seams
+    assert report.difference_mm == pytest.approx(3.0, abs=1e-6)
+    assert not report.matches
+
+
+def test_notches_stand_at_the_same_length_on_both_sides_of_every_seam(dress):
+    for size, pieces in dress.pieces.items():
+        for seam, report in zip(dress.garment.seams, (r for r in dress.seams if r.size == size), strict=True):
+            sides = []
+            for side, total in zip(seam.sides, report.length_mm, strict=True):
+                on_side = {(s.piece, s.edge) for s in side}
+                marks = [n for p in pieces for n in p.notches if n.seam == seam.name and (p.name, n.edge) in on_side]
+                sides.append(sorted((n.length * 1000 / total, n.double) for n in marks))
+            first, second = sides
+            joints = len(seam.sides[0]) - 1 + len(seam.sides[1]) - 1
+            assert abs(len(first) - len(second)) <= joints
+            shared = [f for f, _ in first if any(abs(f - g) < 1e-9 for g, _ in second)]
+            assert len(shared) == min(len(first), len(second)) >= 1
+            # As lengths: where there is no ease, the same millimetre.
+            for fraction in shared:
+                a, b = fraction * report.length_mm[0], fraction * report.length_mm[1]
+                assert abs(b - a * (1 + seam.ease)) < 0.5
+
+
+def test_notches_lie_on_the_cut_line_and_point_inwards(dress):
+    for piece in dress.pieces["38"]:
+        cut = shapely.Polygon(piece.cut_line)
+        for notch in piece.notches:
+            for base in notch.base:
+                assert cut.exterior.distance(shapely.Point(base)) < 1e-6
+                assert cut.contains(shapely.Point(base + notch.depth * notch.direction))
+                assert np.linalg.norm(base + notch.depth * notch.direction - base) < 0.0061
+
+
+def test_the_back_is_double_the_front_is_single(dress):
+    pieces = {piece.name: piece for piece in dress.pieces["38"]}
+    armhole = {name: [n.double for n in piece.notches if n.seam == "armhole"] for name, piece in pieces.items()}
+    assert armhole["front bodice"] == [False]
+    assert armhole["back bodice"] == [True]
+    assert sorted(armhole["sleeve"]) == [False, False, True], "front, shoulder joint, back"
+    assert not any(n.double for n in pieces["back bodice"].notches if n.seam == "side")
+
+
+def test_curves_keep_corners_and_stay_within_a_tenth_of_a_millimetre(dress):
+    for piece in dress.pieces["38"]:
+        for edge in piece.edges:
+            points = edge.edge.points @ piece.frame[:, :2].T + piece.frame[:, 2]
+            assert np.abs(edge.line[[0, -1]] - points[[0, -1]]).max() < 1e-12
+            stray = shapely.distance(shapely.LineString(edge.line), shapely.points(points)).max()
+            assert stray <= 1.2e-4
+            assert len(edge.curve.bezier) <= max(1, len(points) // 2)
+
+
+def test_an_arc_needs_few_segments_and_a_straight_line_one():
+    t = np.linspace(0, np.pi / 2, 60)
+    arc = 0.2 * np.column_stack([np.cos(t), np.sin(t)])
+    curve = fit_curve(arc)
+    assert len(curve.bezier) <= 3
+    assert np.abs(np.linalg.norm(curve.sample(), axis=1) - 0.2).max() < 1.2e-4
+    assert curve.length == pytest.approx(0.1 * np.pi, abs=1e-4)
+    assert fit_curve(np.linspace([0, 0], [0.3, 0.1], 50)).straight.tolist() == [True]
+
+
+def test_a_corner_inside_an_edge_stays_sharp():
+    points = np.concatenate([np.linspace([0, 0], [0.1, 0], 20), np.linspace([0.1, 0], [0.1, 0.1], 20)[1:]])
+    curve = fit_curve(points)
+    assert len(curve.bezier) == 2
+    assert np.abs(curve.nodes[1] - [0.1, 0]).max() < 1e-12
+
+
+@settings(max_examples=40, deadline=None, derandomize=True)
+@given(seed=st.integers(0, 10_000), count=st.integers(2, 40))
+def test_any_border_is_fitted_or_kept(seed, count):
+    random = np.random.default_rng(seed)
+    points = np.cumsum(random.normal(size=(count, 2)) * 0.01 + [0.01, 0], axis=0)
+    curve = fit_curve(points)
+    assert np.abs(curve.bezier - points[0]).max() <= 2 * np.abs(points - points[0]).max() + 1e-9, "nothing runs wild"
+    assert np.array_equal(curve.bezier[1:, 0], curve.bezier[:-1, 3])
+    assert shapely.distance(shapely.LineString(curve.sample()), shapely.points(points)).max() <= 1.2e-4
+
+
+def test_samples_stay_within_their_chord_tolerance():
+    t = np.linspace(0, np.pi, 80)
+    curve = fit_curve(0.1 * np.column_stack([np.cos(t), np.sin(t)]))
+    coarse, fine = shapely.LineString(curve.sample(1e-4)), curve.sample(1e-7)
+    assert shapely.distance(coarse, shapely.points(fine)).max() <= 1.0e-4
+    assert len(curve.sample(1e-4)) < len(curve.sample(1e-5)) < len(fine)
+
+
+def test_a_piece_on_the_fold_ends_on_it_exactly(dress):
+    for name in ("front bodice", "skirt front"):
+        (piece,) = (p for p in dress.pieces["38"] if p.name == name)
+        assert piece.cut_line[:, 0].min() == pytest.approx(0, abs=1e-9)
+        assert piece.label.lines[2][0].startswith("Cut 1 on fold")
+        assert all(abs(n.base[0][0]) > 0.01 for n in piece.notches)
+
+
+def test_darts_get_a_drill_hole_at_the_tip_and_a_notch_at_each_leg(dress):
+    (front,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
+    assert [hole.name for hole in front.drill_holes] == ["waist_dart", "bust_dart"]
+    assert front.drill_holes[0].at == pytest.approx([0.095, 0.165])
+    for dart in ("waist_dart", "bust_dart"):
+        assert sum(n.seam == dart for n in front.notches) == 2
+    assert {d.dart.name: d.fold_to for d in front.darts} == {"waist_dart": "left", "bust_dart": "left"}
+    assert front.darts[1].fold_to == "left", "downwards: the left leg is the lower one"
+
+
+def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
+    corners = np.array([(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float)
+    names = ("a", "l", "r", "b", "right", "top", "left")
+    kinds = ("seam", "dart", "dart", "seam", "seam", "seam", "seam")
+    edges = [Edge(name=n, points=corners[i : i + 2], kind=k) for i, (n, k) in enumerate(zip(names, kinds, strict=True))]
+    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
+    assert piece.edge("l").width == 0.010
+    shift = piece.frame[:, 2]
+    cut = shapely.Polygon(piece.cut_line - shift)
+    assert cut.is_valid
+    assert not cut.contains(shapely.Point(0.15, 0.0)), "the wedge is cut away"
+    assert piece.darts[0].fold is None
+    folded = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r")]))
+    assert shapely.Polygon(folded.cut_line - folded.frame[:, 2]).contains(shapely.Point(0.15, 0.0))
+
+
+def test_legs_of_different_length_are_noted():
+    corners = np.array(
+        [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float
+    )
+    kinds = ("seam", "dart", "dart", "seam", "seam", "seam", "seam")
+    edges = [Edge(name=f"e{i}", points=corners[i : i + 2], kind=k) for i, k in enumerate(kinds)]
+    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="e1", right="e2")]))
+    assert any("legs differ by 3.9 mm" in note or "legs differ by 4.0 mm" in note for note in piece.notes)
+
+
+def test_a_fisheye_dart_is_marked_not_cut():
+    eye = Hole(name="waist", kind="dart", points=np.array([(0.1, 0.05), (0.11, 0.15), (0.1, 0.25), (0.09, 0.15)]))
+    out = Hole(name="pocket", points=np.array([(0.02, 0.02), (0.04, 0.02), (0.04, 0.04)]))
+    piece = draft_piece(square(holes=[eye, out]))
+    assert set(piece.fisheyes) == {"waist"}
+    assert set(piece.cutouts) == {"pocket"}
+    tips = sorted((hole.at - piece.frame[:, 2]).tolist() for hole in piece.drill_holes)
+    assert np.allclose(tips, [(0.1, 0.05), (0.1, 0.25)])
+
+
+def test_the_grain_points_up_and_nothing_is_scaled():
+    grain = np.array([(0.05, 0.05), (0.15, 0.15)])
+    piece = draft_piece(square(grain=grain))
+    assert piece.grain[1, 0] == pytest.approx(piece.grain[0, 0])
+    assert piece.grain[1, 1] > piece.grain[0, 1]
+    assert piece.frame[:, :2] @ piece.frame[:, :2].T == pytest.approx(np.eye(2))
+    assert np.linalg.det(piece.frame[:, :2]) == pytest.approx(1.0)
+    assert shapely.Polygon(piece.sew_line).area == pytest.approx(0.06)
+
+
+def test_labels_lie_inside_and_off_the_grain_line(dress):
+    for piece in dress.pieces["38"]:
+        low = piece.label.at - [0.01, piece.label.height / 2]
+        block = shapely.box(*low, *(2 * piece.label.at - low))
+        assert shapely.Polygon(piece.sew_line).contains(block), piece.name
+        assert not block.intersects(shapely.LineString(piece.grain)), piece.name
+
+
+def test_drafting_twice_gives_the_same_to_the_bit():
+    once, again = (draft_garment(sample_dress(("38",))) for _ in range(2))
+    for a, b in zip(once.pieces["38"], again.pieces["38"], strict=True):
+        assert np.array_equal(a.cut_line, b.cut_line)
+
+
+def test_arc_lengths_of_a_unit_square():
+    assert arc_lengths(np.array([(0, 0), (1, 0), (1, 1)], dtype=float)).tolist() == [0.0, 1.0, 2.0]
+
+
+@pytest.mark.parametrize(
+    ("make", "message"),
+    [
+        (lambda: Edge(name="e", points=np.zeros((2, 2))), "no length"),
+        (lambda: Edge(name="e", points=np.zeros((2, 3))), "#P by 2"),
+        (lambda: Edge(name="e", points=np.array([[0, 0], [np.nan, 1]])), "not finite"),
+        (lambda: Edge(name="e", points=np.eye(2), kind="sem"), "did you mean 'seam'"),
+        (lambda: Edge(name="e", points=np.eye(2), allowance=10.0), "between 0 and 0.5"),
+        (lambda: Edge(name="e", points=np.eye(2), kind="fold", allowance=0.01), "must be 0"),
+        (lambda: square(edges=square().edges[:3]), "ends"),
+        (lambda: square(edges=[Edge(name=e.name, points=e.points[::-1]) for e in square().edges[::-1]]), "clockwise"),
+        (lambda: square(quantity=0), "at least 1"),
+        (lambda: square(grain=np.zeros((2, 2))), "two different points"),
+        (lambda: square(darts=[Dart(name="d", left="top", right="left")]), "not 'dart'"),
+        (
+            lambda: square(edges=[*square().edges[:3], Edge(name="top", points=square().edges[3].points)]),
+            "occurs twice",
+        ),
+        (lambda: Seam(name="s", sides=((), ())), "at least one edge"),
+        (lambda: Garment(name="g", pieces={}), "no pieces"),
+        (lambda: Garment(name="g", pieces={"38": [square()]}), "listed under"),
+        (lambda: sample_dress(("39",)), "even numbers"),
+    ],
+)
+def test_bad_input_is_one_line_that_says_what_is_right(make, message):
+    with pytest.raises(InputError, match=message) as error:
+        make()
+    assert "\n" not in str(error.value)
+
+
+def test_a_seam_that_names_a_wrong_edge_says_the_nearest():
+    side = (SeamSide(piece="square", edge="botom"),)
+    with pytest.raises(InputError, match="did you mean 'bottom'"):
+        Garment(name="g", pieces={"": [square()]}, seams=[Seam(name="s", sides=(side, side))])

@@ -1,0 +1,145 @@
+"""Borders of flat meshes as named edges, cracks as darts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from warpflat.errors import InputError
+from warpflat.pattern import draft_piece
+from warpflat.pattern.from_mesh import piece_from_mesh
+
+
+def grid(columns=10, rows=12, width=0.2, height=0.3):
+    x, y = np.meshgrid(np.linspace(0, width, columns + 1), np.linspace(0, height, rows + 1))
+    index = np.arange((columns + 1) * (rows + 1)).reshape(rows + 1, columns + 1)
+    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    lines = {"hem": index[0], "side": index[:, -1], "centre": index[:, 0], "level": index[6]}
+    return faces.astype(np.int32), np.column_stack([x.ravel(), y.ravel()]), lines, index
+
+
+def cracked(opening=0.02):
+    """The grid with its middle column doubled over five rows from below and pulled open."""
+    faces, flat, lines, index = grid()
+    path = index[:6, 5]
+    copies = {int(v): len(flat) + i for i, v in enumerate(path[:-1])}
+    flat = np.concatenate([flat, flat[path[:-1]]])
+    right = flat[faces].mean(axis=1)[:, 0] > 0.1
+    for row in np.flatnonzero(right):
+        faces[row] = [copies.get(int(v), v) for v in faces[row]]
+    share = 1 - flat[:, 1] / flat[path[-1], 1]
+    for v, copy in copies.items():
+        flat[copy, 0] += opening / 2 * share[v]
+        flat[v, 0] -= opening / 2 * share[v]
+    return faces, flat, lines, path, copies
+
+
+def test_edges_take_the_names_of_the_lines_along_them():
+    faces, flat, lines, index = grid()
+    piece = piece_from_mesh(
+        faces, flat, name="panel", lines=lines, kinds={"hem": "hem", "centre": "fold"}, allowances={"side": 0.015}
+    )
+    assert [e.name for e in piece.edges] == ["hem", "side", "edge_1", "centre"]
+    assert [e.kind for e in piece.edges] == ["hem", "seam", "seam", "fold"]
+    assert piece.edge("side").width == 0.015
+    assert piece.on_fold
+    assert list(piece.internal_lines) == ["level"]
+    assert np.array_equal(piece.edge("side").vertices, index[:, -1])
+    assert shapely.Polygon(piece.outline).area == pytest.approx(0.06)
+    assert len(draft_piece(piece).edge("side").curve.bezier) == 1
+
+
+def test_a_line_that_runs_along_two_stretches_names_both():
+    faces, flat, _, index = grid()
+    around = np.concatenate([index[3:7, -1], index[6, -2:0:-1], index[6:2:-1, 0]])
+    piece = piece_from_mesh(faces, flat, name="p", lines={"belt": around})
+    names = [e.name for e in piece.edges]
+    assert {"belt", "belt_2"} <= set(names)
+    assert len(piece.internal_lines) == 1
+
+
+def test_a_crack_is_found_and_becomes_a_dart_that_folds():
+    faces, flat, lines, path, _ = cracked()
+    piece = piece_from_mesh(faces, flat, name="p", lines={k: v for k, v in lines.items() if k != "hem"})
+    assert [d.name for d in piece.darts] == ["dart"]
+    left, right = piece.edge("dart.left"), piece.edge("dart.right")
+    assert left.length == pytest.approx(right.length)
+    assert left.points[-1] == pytest.approx(flat[path[-1]])
+    drafted = draft_piece(piece)
+    cut = shapely.Polygon(drafted.cut_line)
+    assert cut.is_valid
+    assert cut.contains(shapely.Point(drafted.darts[0].tip - np.array([0, 0.1]))), "the wedge stays in the cloth"
+
+
+def test_a_dart_may_be_named_by_its_vertices():
+    faces, flat, _, path, copies = cracked()
+    mouth = (int(path[0]), int(path[-1]), copies[int(path[0])])
+    piece = piece_from_mesh(faces, flat, name="p", darts={"waist": mouth})
+    assert [d.name for d in piece.darts] == ["waist"]
+    assert piece.edge("waist.left").kind == "dart"
+    with pytest.raises(InputError, match="counter-clockwise"):
+        piece_from_mesh(faces, flat, name="p", darts={"waist": mouth[::-1]})
+    with pytest.raises(InputError, match="not on the outer border"):
+        piece_from_mesh(faces, flat, name="p", darts={"waist": (mouth[0], 93, mouth[2])})
+
+
+def test_a_layout_on_its_back_is_turned_over():
+    faces, flat, lines, _ = grid()
+    piece = piece_from_mesh(faces, flat * [-1, 1], name="p", lines=lines)
+    assert np.array_equal(piece.outline, piece_from_mesh(faces, flat, name="p", lines=lines).outline)
+
+
+def test_a_border_inside_becomes_a_cutout():
+    faces, flat, _, _ = grid()
+    middle = np.linalg.norm(flat[faces].mean(axis=1) - [0.1, 0.15], axis=1) < 0.03
+    piece = piece_from_mesh(faces[~middle], flat, name="p")
+    (hole,) = piece.holes
+    assert shapely.Polygon(hole.points).area == pytest.approx(middle.sum() * 0.02 * 0.025)
+
+
+def test_a_smooth_border_without_lines_is_one_closed_edge():
+    t = np.linspace(0, 2 * np.pi, 73)[:-1]
+    flat = np.concatenate([[[0.0, 0.0]], 0.1 * np.column_stack([np.cos(t), np.sin(t)])])
+    ring = np.arange(1, 73)
+    faces = np.column_stack([np.zeros(72), ring, np.roll(ring, -1), np.full(72, -1)]).astype(np.int32)
+    piece = piece_from_mesh(faces, flat, name="disc")
+    assert len(piece.edges) == 1
+    cut = shapely.Polygon(draft_piece(piece).cut_line)
+    assert cut.is_valid
+    assert cut.area == pytest.approx(np.pi * 0.11**2, rel=2e-3)
+
+
+def test_a_ragged_border_has_no_more_corners_than_its_shape():
+    faces, flat, _, index = grid(columns=60, rows=80)
+    ragged = np.concatenate([index[0, 1:-1], index[-1, 1:-1], index[1:-1, 0], index[1:-1, -1]])
+    flat[ragged] += np.random.default_rng(3).uniform(-0.0008, 0.0008, (len(ragged), 2))
+    piece = piece_from_mesh(faces, flat, name="p")
+    assert len(piece.edges) == 4
+    assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted(
+        [index[0, 0], index[0, -1], index[-1, 0], index[-1, -1]]
+    )
+    assert shapely.Polygon(draft_piece(piece).cut_line).is_valid
+
+
+def test_the_grain_follows_the_datum_line_inside_the_piece():
+    faces, flat, lines, _ = grid()
+    angle = np.radians(20)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    piece = piece_from_mesh(faces, flat @ turn.T, name="p", lines=lines, grain_line="centre")
+    along = piece.grain[1] - piece.grain[0]
+    assert along / np.linalg.norm(along) == pytest.approx(turn[:, 1])
+    assert shapely.Polygon(piece.outline).contains(shapely.LineString(piece.grain))
+
+
+def test_unknown_names_and_bad_layouts_are_refused():
+    faces, flat, lines, _ = grid()
+    with pytest.raises(InputError, match="did you mean 'hem'"):
+        piece_from_mesh(faces, flat, name="p", lines=lines, kinds={"hen": "hem"})
+    with pytest.raises(InputError, match="no line 'centr'"):
+        piece_from_mesh(faces, flat, name="p", lines=lines, grain_line="centr")
+    with pytest.raises(InputError, match="#V by 2"):
+        piece_from_mesh(faces, np.zeros((3, 3)), name="p")
+    tetrahedron = np.array([[0, 1, 2, -1], [0, 2, 3, -1], [0, 3, 1, -1], [1, 3, 2, -1]], dtype=np.int32)
+    with pytest.raises(InputError, match="no border"):
+        piece_from_mesh(tetrahedron, np.random.default_rng(0).random((4, 2)), name="p")

@@ -1,0 +1,101 @@
+"""The marker: everything on the cloth, nothing upon anything, the grain along the cloth."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import shapely
+
+from warpflat.errors import InputError
+from warpflat.pattern import draft_garment
+from warpflat.pattern.layout import lay_out, nests
+from warpflat.pattern.marker import Cloth, make_marker, unfolded
+from warpflat.pattern.sample import sample_dress
+
+
+@pytest.fixture(scope="module")
+def dress():
+    return draft_garment(sample_dress(("36", "38")))
+
+
+@pytest.fixture(scope="module", params=[False, True], ids=["two_way", "one_way"])
+def marker(dress, request):
+    return make_marker(dress, Cloth(width=1.4, one_way=request.param), sizes={"38": 1}, seconds=2), request.param
+
+
+def test_every_copy_lies_on_the_cloth_and_none_on_another(marker):
+    plan, _ = marker
+    assert len(plan.placements) == 1 + 2 + 2 + 1 + 2
+    polygons = [shapely.Polygon(copy.cut_line) for copy in plan.placements]
+    cloth = shapely.box(0, 0, plan.length, plan.width).buffer(1e-6)
+    assert all(cloth.contains(polygon) for polygon in polygons)
+    for i, a in enumerate(polygons):
+        assert all(a.distance(b) > 0.0015 for b in polygons[i + 1 :]), "the gap is kept"
+
+
+def test_the_grain_lies_along_the_cloth_and_the_nap_one_way(marker):
+    plan, one_way = marker
+    for copy in plan.placements:
+        along = copy.grain[1] - copy.grain[0]
+        assert abs(along[1]) < 1e-9
+        if one_way:
+            assert along[0] > 0
+        assert (along[0] < 0) == copy.turned
+
+
+def test_pairs_are_mirrored_and_nothing_is_scaled(marker):
+    plan, _ = marker
+    for name in ("back bodice", "sleeve", "skirt back"):
+        assert sorted(c.mirrored for c in plan.placements if c.piece.name == name) == [False, True]
+    for copy in plan.placements:
+        assert abs(np.linalg.det(copy.matrix[:, :2])) == pytest.approx(1.0)
+        assert (np.linalg.det(copy.matrix[:, :2]) < 0) == copy.mirrored
+
+
+def test_a_whole_piece_is_notched_on_both_halves(marker):
+    plan, _ = marker
+    (copy,) = (c for c in plan.placements if c.piece.name == "front bodice")
+    assert len(copy.notches) == 2 * sum(len(n.base) for n in copy.piece.notches)
+    ring = shapely.LinearRing(copy.cut_line)
+    assert max(ring.distance(shapely.Point(slit[0])) for slit in copy.notches) < 1e-5
+
+
+def test_utilisation_is_area_over_cloth(marker):
+    plan, _ = marker
+    area = sum(shapely.Polygon(c.cut_line).area for c in plan.placements)
+    assert plan.utilisation == pytest.approx(area / (plan.length * plan.width))
+    assert 0.6 < plan.utilisation < 1.0
+
+
+def test_a_half_on_the_fold_is_cut_whole(dress):
+    (front,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
+    whole = shapely.Polygon(unfolded(front))
+    assert whole.area == pytest.approx(2 * shapely.Polygon(front.cut_line).area, rel=1e-4)
+    assert whole.bounds[0] == pytest.approx(-whole.bounds[2], abs=1e-5)
+
+
+def test_reversible_cloth_may_cut_both_of_a_pair_one_way_up(dress):
+    plan = make_marker(dress, Cloth(width=1.4, reversible=True), sizes={"38": 1}, seconds=2)
+    assert len(plan.placements) == 8
+    assert plan.utilisation > 0.6
+
+
+def test_bad_cloth_and_names_are_refused(dress):
+    with pytest.raises(InputError, match="mm wide, the cloth"):
+        make_marker(dress, Cloth(width=0.3), seconds=1)
+    with pytest.raises(InputError, match="no size"):
+        make_marker(dress, Cloth(width=1.4), sizes={"99": 1}, seconds=1)
+    with pytest.raises(InputError, match="no piece is of fabric"):
+        make_marker(dress, Cloth(width=1.4), fabric="lining", seconds=1)
+    with pytest.raises(InputError, match=r"between 0\.1 and 10 m"):
+        Cloth(width=1400.0)
+
+
+def test_the_sheet_keeps_pieces_apart_and_sizes_together(dress):
+    sheet = lay_out(nests(dress), width=1.0)
+    boxes = [shapely.box(*placed.box.reshape(-1)) for placed in sheet.placed]
+    for i, a in enumerate(boxes):
+        assert all(a.distance(b) > 0.0099 for b in boxes[i + 1 :])
+    assert sheet.size[0] <= 1.0 + 1e-9
+    assert all([p.size for p in placed.pieces] == ["36", "38"] for placed in sheet.placed)
+    assert all(shapely.box(0, 0, *sheet.size).contains(box) for box in boxes)

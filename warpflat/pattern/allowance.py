@@ -1,0 +1,361 @@
+"""The cut line: each edge's own allowance, corners mitred or squared, hems and darts shaped so that they fold flat.
+
+The cut line is the border of a union of simple polygons: the piece, a strip beside every edge, a fill at every corner,
+a cap over every dart. A union cannot cross itself, whatever the angles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+
+if TYPE_CHECKING:
+    from shapely import Geometry, Polygon
+
+__all__ = ["CutOutline", "Side", "Wedge", "cut_outline"]
+
+Vector = NDArray[np.float64]
+
+#: Precision [m] to which the union is snapped, far below what any cutter resolves.
+GRID = 1e-7
+#: Slits and spikes narrower than twice this [m] are rounding, not shape.
+CLOSE = 2e-6
+#: A mitre may run this many (wider) allowances past the corner; beyond it the corner is squared off.
+MITRE_REACH = 1.75
+#: A hem folds up along itself; its ends mirror the side seams if these meet it at 90 degrees, give or take this [rad].
+HEM_SLANT = np.radians(40.0)
+#: A dart that opens wider than this [rad] cannot be pressed to one side: it is cut out with allowances on its legs.
+WIDEST_DART = np.radians(90.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Side:
+    """One edge as the cut line sees it: `points` #P by 2 [m] counter-clockwise, `width` [m], `kind` as in `Edge`."""
+
+    name: str
+    points: Vector
+    width: float
+    kind: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Wedge:
+    """A dart that is folded, not cut: its legs (both #P by 2 [m], left from the border, right to the border)."""
+
+    name: str
+    left: Vector
+    right: Vector
+    fold_to: str
+
+    @property
+    def tip(self) -> Vector:
+        return self.left[-1]
+
+    @property
+    def middle(self) -> Vector:
+        """Unit vector from the tip along the line on which the wedge is folded."""
+        both = _unit(self.left[0] - self.tip) + _unit(self.right[-1] - self.tip)
+        return _unit(both)
+
+    @property
+    def opening(self) -> float:
+        """Angle [rad] between the legs at the tip."""
+        a, b = _unit(self.left[0] - self.tip), _unit(self.right[-1] - self.tip)
+        return float(np.arctan2(abs(a[0] * b[1] - a[1] * b[0]), a @ b))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CutOutline:
+    """The cut line, #P by 2 [m] counter-clockwise and closed (first point not repeated), and what is odd about it."""
+
+    points: Vector
+    notes: tuple[str, ...]
+
+
+def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
+    """The line along which a piece is cut.
+
+    Args:
+        sides: the outline in order, counter-clockwise; a `Wedge` stands for the two legs of a folded dart.
+
+    Returns:
+        A simple closed line. It contains the outline; on the fold both coincide.
+
+    Raises:
+        InputError: if the piece reaches across the line of its own fold.
+    """
+    import shapely
+
+    notes: list[str] = []
+    body = shapely.Polygon(np.concatenate([_leading(side) for side in sides]))
+    parts: list[Geometry] = [body]
+    strips = [_strip(side, body) if isinstance(side, Side) else shapely.Polygon() for side in sides]
+    count = len(sides)
+    for index, side in enumerate(sides):
+        before, after = (index - 1) % count, (index + 1) % count
+        follows = sides[after]
+        if isinstance(side, Wedge):
+            parts += _dart_parts(sides, strips, index, before, after, body)
+        elif isinstance(follows, Side):
+            parts += _corner_parts(side, follows, strips, index, after, body)
+    whole = _union([*parts, *strips])
+    # Parts that meet along a slanted line (a dart's fold, a hem's mirror) leave slits of rounding: close them.
+    for distance in (CLOSE, -2 * CLOSE, CLOSE):
+        whole = whole.buffer(distance, join_style="mitre", mitre_limit=200)
+    for side in sides:
+        if isinstance(side, Side) and side.kind == "fold":
+            half = _half_plane(side.points[0], side.points[-1], body)
+            over = body.difference(half)
+            if over.area > 1e-6:
+                raise InputError(
+                    f"edge {side.name!r} lies on the fold, but {over.area * 1e6:.0f} mm2 of the piece lie beyond it; "
+                    "a half piece lies on one side of its fold"
+                )
+            whole = _common(whole, half)
+    polygon = max(shapely.get_parts(whole), key=lambda part: part.area)
+    pockets = [shapely.Polygon(ring) for ring in polygon.interiors]
+    if any(pocket.area > 1e-6 for pocket in pockets):
+        notes.append("allowances on two sides of a narrow gap meet and close it: make them narrower there")
+    ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
+    points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
+    return CutOutline(points=points, notes=tuple(notes))
+
+
+def _leading(side: Side | Wedge) -> Vector:
+    """Points of the outline without the last one."""
+    return np.concatenate([side.left[:-1], side.right[:-1]]) if isinstance(side, Wedge) else side.points[:-1]
+
+
+def _strip(side: Side, body: Polygon) -> Geometry:
+    """The cloth beside an edge, square at both ends, without what would fall on the piece or beyond it."""
+    import shapely
+
+    if side.width <= 0:
+        return shapely.Polygon()
+    start, end = side.points[:-1], side.points[1:]
+    direction = end - start
+    length = np.linalg.norm(direction, axis=1)
+    start, end, direction = start[length > 1e-9], end[length > 1e-9], direction[length > 1e-9]
+    direction = direction / np.linalg.norm(direction, axis=1)[:, None]
+    out = side.width * np.column_stack([direction[:, 1], -direction[:, 0]])
+    quads = shapely.polygons(np.stack([start, end, end + out, start + out], axis=1))
+    fills = [
+        fill
+        for corner, a, b in zip(end[:-1], direction[:-1], direction[1:], strict=True)
+        if (fill := _corner_fill(corner, a, b, side.width, side.width)) is not None
+    ]
+    strip = _minus(_union([*quads, *fills]), body)
+    return _touching(strip, side.points)
+
+
+def _union(parts: Sequence[Geometry]) -> Geometry:
+    """The union of polygons, snapped to the grid: slivers of rounding between touching parts close."""
+    import shapely
+
+    return _areas(shapely.union_all([shapely.set_precision(part, GRID) for part in parts], grid_size=GRID))
+
+
+def _minus(area: Geometry, other: Geometry) -> Geometry:
+    return _areas(area.difference(other, grid_size=GRID))
+
+
+def _common(area: Geometry, other: Geometry) -> Geometry:
+    return _areas(area.intersection(other, grid_size=GRID))
+
+
+def _areas(geometry: Geometry) -> Geometry:
+    """Without the points and lines in which polygons may touch."""
+    import shapely
+
+    if geometry.geom_type in ("Polygon", "MultiPolygon"):
+        return geometry
+    return shapely.MultiPolygon([p for p in shapely.get_parts(geometry) if p.geom_type == "Polygon"])
+
+
+def _touching(strip: Geometry, line: Vector) -> Geometry:
+    """The parts of a strip that lie along its edge: a wide strip may pass through a narrow piece and come out again."""
+    import shapely
+
+    parts = shapely.get_parts(strip)
+    if len(parts) <= 1:
+        return strip
+    edge = shapely.LineString(line)
+    kept = [part for part in parts if part.buffer(2 * GRID).intersection(edge).length > 1e-5]
+    return _union(kept)
+
+
+def _corner_fill(corner: Vector, a: Vector, b: Vector, width_a: float, width_b: float) -> Polygon | None:
+    """The cloth between two strips where the outline turns left from direction `a` to `b` (unit vectors).
+
+    The outer lines of the strips run on until they meet. Where that is too far they are squared off; where a strip is
+    so much wider that its line would have to turn back, its square end stays and the narrow one runs up against it.
+    """
+    import shapely
+
+    sine, cosine = float(a[0] * b[1] - a[1] * b[0]), float(a @ b)
+    turn = np.arctan2(sine, cosine)
+    if turn <= 1e-6 or max(width_a, width_b) <= 0:
+        return None
+    normal_a, normal_b = np.array([a[1], -a[0]]), np.array([b[1], -b[0]])
+    end_a, end_b = corner + width_a * normal_a, corner + width_b * normal_b
+    # At a spike (a half turn) both outer lines are parallel; any reach beyond the limit is squared off alike.
+    sine = max(sine, 1e-9)
+    reach_a, reach_b = (width_b - width_a * cosine) / sine, (width_a - width_b * cosine) / sine
+    if reach_a < 0:
+        ring = [corner, corner + width_b / cosine * normal_a, end_b]
+    elif reach_b < 0:
+        ring = [corner, end_a, corner + width_a / cosine * normal_b]
+    else:
+        limit = MITRE_REACH * max(width_a, width_b)
+        ring = [corner, end_a, end_a + min(reach_a, limit) * a, end_b - min(reach_b, limit) * b, end_b]
+    polygon = shapely.Polygon(ring)
+    return polygon if polygon.is_valid else shapely.MultiPoint(ring).convex_hull
+
+
+def _corner_parts(
+    side: Side, follows: Side, strips: list[Geometry], index: int, after: int, body: Polygon
+) -> list[Geometry]:
+    """What is added where two edges meet; a hem's strip is trimmed in place."""
+    a, b = _unit(side.points[-1] - side.points[-2]), _unit(follows.points[1] - follows.points[0])
+    corner = side.points[-1]
+    turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
+    if abs(turn - np.pi / 2) < HEM_SLANT and {side.kind, follows.kind} == {"hem", "seam"}:
+        if side.kind == "hem":
+            hem, inwards, seam, beyond = index, -a, after, -b
+            width, hem_width = follows.width, side.width
+        else:
+            hem, inwards, seam, beyond = after, b, index, a
+            width, hem_width = side.width, follows.width
+        if width > 0 and hem_width > 0:
+            return _folded_hem(corner, inwards, beyond, hem, seam, width, hem_width, strips, body)
+    fill = _corner_fill(corner, a, b, side.width, follows.width)
+    return [] if fill is None else [fill]
+
+
+def _folded_hem(
+    corner: Vector,
+    inwards: Vector,
+    beyond: Vector,
+    hem: int,
+    seam: int,
+    width: float,
+    hem_width: float,
+    strips: list[Geometry],
+    body: Polygon,
+) -> list[Geometry]:
+    """The end of a hem, mirrored on the hem line, so that turned up it covers the seam allowance exactly.
+
+    `inwards` runs from the corner along the hem, `beyond` from the corner along the seam, away from the piece.
+    """
+    down = np.array([inwards[1], -inwards[0]])
+    down = down if down @ beyond > 0 else -down
+    out = np.array([beyond[1], -beyond[0]])
+    out = out if out @ inwards < 0 else -out
+    reach = hem_width + MITRE_REACH * width
+    run_on = _box(corner, beyond, (0, reach), out, (0, width))
+    run_on = _common(run_on, _box(corner, inwards, (-3 * reach, reach), -down, (0, 3 * reach)))
+    strips[seam] = _without_beyond(strips[seam], corner, inwards, down, 3 * width)
+    worn = _union([body, strips[seam], run_on])
+    # A slightly curved hem leaves the mirror line; the first millimetres below it are hem in any case.
+    core = _common(_box(corner, inwards, (0, reach), down, (0, 0.003)), strips[hem])
+    turned = _union([_reflect(worn, corner, inwards), core])
+    turned = _common(turned, _box(corner, inwards, (-reach, reach), down, (0, hem_width)))
+    end = _box(corner, inwards, (-reach, hem_width), down, (0, 2 * hem_width))
+    strips[hem] = _minus(strips[hem], _minus(end, turned))
+    return [run_on, _common(turned, end)]
+
+
+def _dart_parts(
+    sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, before: int, after: int, body: Polygon
+) -> list[Geometry]:
+    """The cap over a dart: the neighbour's cut line mirrored on the leg, then on the fold, so that it folds flat."""
+    import shapely
+
+    wedge, left, right = sides[index], sides[before], sides[after]
+    if not isinstance(wedge, Wedge) or not isinstance(left, Side) or not isinstance(right, Side):
+        raise InputError("two darts meet in one point of the border: leave an edge between them")
+    tip, mouth_left, mouth_right = wedge.tip, wedge.left[0], wedge.right[-1]
+    to_left, to_right = _unit(mouth_left - tip), _unit(mouth_right - tip)
+    along_left, along_right = _unit(left.points[-1] - left.points[-2]), -_unit(right.points[1] - right.points[0])
+    strips[before], end_left = _at_leg(strips[before], left.width, mouth_left, to_left, along_left, mouth_right)
+    strips[after], end_right = _at_leg(strips[after], right.width, mouth_right, to_right, along_right, mouth_left)
+    parts: list[Geometry] = [end_left, end_right]
+    # A curved leg leaves its chord, on which the wedge is folded.
+    parts += [shapely.Polygon(leg).buffer(0) for leg in (wedge.left, wedge.right) if len(leg) > 2]
+    leg = max(float(np.linalg.norm(mouth_left - tip)), float(np.linalg.norm(mouth_right - tip)))
+    radius = leg + 4 * max(left.width, right.width)
+    if wedge.fold_to == "left":
+        covered, near, line = _union([body, strips[before], end_left]), to_left, mouth_left
+    else:
+        covered, near, line = _union([body, strips[after], end_right]), to_right, mouth_right
+    half = shapely.Polygon([tip, tip + radius * near, tip + radius * wedge.middle])
+    cap = _common(_reflect(covered, line, near), half)
+    cap = _union([part for part in shapely.get_parts(cap) if part.distance(shapely.Point((line + tip) / 2)) < 1e-6])
+    return [*parts, cap, _reflect(cap, tip, wedge.middle)]
+
+
+def _at_leg(
+    strip: Geometry, width: float, mouth: Vector, leg: Vector, along: Vector, other_mouth: Vector
+) -> tuple[Geometry, Geometry]:
+    """A strip that ends on the prolonged leg of a dart: what is trimmed, and what is added.
+
+    `along` is the unit direction in which the edge runs into the mouth of the dart.
+    """
+    import shapely
+
+    if width <= 0:
+        return strip, shapely.Polygon()
+    inwards = np.array([-leg[1], leg[0]])
+    inwards = inwards if inwards @ (other_mouth - mouth) > 0 else -inwards
+    trimmed = _without_beyond(strip, mouth, leg, inwards, 3 * width)
+    out = np.array([along[1], -along[0]])
+    out = out if out @ leg > 0 else -out
+    run_on = _box(mouth, along, (0, MITRE_REACH * width), out, (0, width))
+    return trimmed, _without_beyond(run_on, mouth, leg, inwards, 3 * width)
+
+
+def _without_beyond(area: Geometry, point: Vector, direction: Vector, side: Vector, radius: float) -> Geometry:
+    """`area` without what lies within `radius` of `point` on the `side` of the line through it along `direction`."""
+    return _minus(area, _box(point, direction, (-radius, radius), side, (0, radius)))
+
+
+def _box(point: Vector, along: Vector, reach: tuple[float, float], side: Vector, depth: tuple[float, float]) -> Polygon:
+    """The parallelogram from `point` over `reach` [m] along one unit vector and over `depth` [m] along another."""
+    import shapely
+
+    corners = [(reach[0], depth[0]), (reach[1], depth[0]), (reach[1], depth[1]), (reach[0], depth[1])]
+    return shapely.Polygon([point + a * along + d * side for a, d in corners])
+
+
+def _reflect(area: Geometry, point: Vector, direction: Vector) -> Geometry:
+    """Mirror image on the line through `point` along the unit vector `direction`."""
+    import shapely
+    from shapely.affinity import affine_transform
+
+    x, y = float(direction[0]), float(direction[1])
+    matrix = np.array([[2 * x * x - 1, 2 * x * y], [2 * x * y, 2 * y * y - 1]])
+    shift = point - matrix @ point
+    return shapely.set_precision(affine_transform(area, [*matrix.reshape(-1).tolist(), *shift.tolist()]), GRID)
+
+
+def _half_plane(start: Vector, end: Vector, body: Polygon) -> Polygon:
+    """The side of the fold on which the piece lies, large enough for the piece and its allowances."""
+    import shapely
+
+    direction = _unit(end - start)
+    inwards = np.array([-direction[1], direction[0]])
+    x0, y0, x1, y1 = body.bounds
+    size = 2 * (x1 - x0 + y1 - y0) + 2.0
+    a, b = start - size * direction, start + size * direction
+    return shapely.Polygon([a, b, b + size * inwards, a + size * inwards])
+
+
+def _unit(vector: Vector) -> Vector:
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 1e-12 else np.array([1.0, 0.0])

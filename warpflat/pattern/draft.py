@@ -1,0 +1,327 @@
+"""A garment ready for the cutting table: clean curves, cut lines, notches, drill holes, grain and labels.
+
+Everything that the files show is worked out here once; the writers of DXF, SVG, PDF and JSON only draw it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_outline
+from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
+from warpflat.pattern.label import Label, default_grain, place_label
+from warpflat.pattern.notches import Notch, SeamReport, dart_notches, seam_notches, seam_reports
+from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Piece
+
+__all__ = ["DraftedDart", "DraftedEdge", "DraftedGarment", "DraftedPiece", "DrillHole", "draft_garment", "draft_piece"]
+
+Vector = NDArray[np.float64]
+
+#: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
+ALONG_GRAIN = np.radians(1.0)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedEdge:
+    """An edge of the sewing line as a clean curve.
+
+    Attributes:
+        edge: as it came in.
+        curve: fitted, from corner to corner.
+        line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
+        width: the allowance [m] that it got.
+    """
+
+    edge: Edge
+    curve: Curve
+    line: Vector
+    width: float
+
+    @property
+    def name(self) -> str:
+        return self.edge.name
+
+    @property
+    def kind(self) -> str:
+        return self.edge.kind
+
+    @property
+    def length(self) -> float:
+        """Length [m] along the sewing line."""
+        return float(arc_lengths(self.line)[-1])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedDart:
+    """A dart's lines: the legs are edges; `fold` is 2 by 2 [m], from the tip to the cut line (None where it is cut)."""
+
+    dart: Dart
+    tip: Vector
+    fold: Vector | None
+    fold_to: str
+    opening: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrillHole:
+    """A point [m] marked through the cloth."""
+
+    name: str
+    at: Vector
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedPiece:
+    """One piece in one size with all its lines, in metres, grain upwards, its fixed point of grading in the origin.
+
+    Attributes:
+        piece: as it came in.
+        frame: 2 by 3, from the piece's coordinates to these (a rotation and a shift, never a scale).
+        edges: the sewing line in order, dart legs included.
+        cut_line: #P by 2 [m], closed, counter-clockwise, first point not repeated.
+        darts, drill_holes, notches: see their classes.
+        internal_lines, cutouts, fisheyes: #P by 2 [m] by name; the latter two closed.
+        grain: 2 by 2 [m], from and to, upwards.
+        label: what is written on it, and where.
+        notes: what the cutter should know, one sentence each.
+    """
+
+    piece: Piece
+    frame: Vector
+    edges: tuple[DraftedEdge, ...]
+    cut_line: Vector
+    darts: tuple[DraftedDart, ...]
+    drill_holes: tuple[DrillHole, ...]
+    notches: tuple[Notch, ...]
+    internal_lines: Mapping[str, Vector]
+    cutouts: Mapping[str, Vector]
+    fisheyes: Mapping[str, Vector]
+    grain: Vector
+    label: Label
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return self.piece.name
+
+    @property
+    def size(self) -> str:
+        return self.piece.size
+
+    @property
+    def sew_line(self) -> Vector:
+        """#P by 2 [m], the closed sewing line, dart legs included, first point not repeated."""
+        return np.concatenate([edge.line[:-1] for edge in self.edges])
+
+    @property
+    def fold_edges(self) -> tuple[DraftedEdge, ...]:
+        """The edges that lie on the fold of the cloth."""
+        return tuple(edge for edge in self.edges if edge.kind == "fold")
+
+    def edge(self, name: str) -> DraftedEdge:
+        """The edge of that name; InputError with the nearest name otherwise."""
+        self.piece.edge(name)
+        return next(edge for edge in self.edges if edge.name == name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedGarment:
+    """All pieces by size, and how well the sides of every seam agree."""
+
+    garment: Garment
+    pieces: Mapping[str, tuple[DraftedPiece, ...]]
+    seams: tuple[SeamReport, ...]
+
+    @property
+    def name(self) -> str:
+        return self.garment.name
+
+    def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
+        """One piece in every size, in the order of the sizes."""
+        return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
+
+
+def draft_garment(garment: Garment, *, tolerance: float = 1e-4, sizes: Sequence[str] | None = None) -> DraftedGarment:
+    """Draft every piece of a garment and match the notches of its seams.
+
+    Args:
+        garment: flat pieces and seams.
+        tolerance: how far [m] a fitted curve may lie from the points of an edge.
+        sizes: only these; None drafts all.
+
+    Raises:
+        InputError: an unknown size, or a half piece that reaches across its fold.
+    """
+    chosen = garment.sizes if sizes is None else tuple(sizes)
+    for size in chosen:
+        garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
+    drafted: dict[str, tuple[DraftedPiece, ...]] = {}
+    reports: list[SeamReport] = []
+    for size in chosen:
+        pieces = {
+            piece.name: draft_piece(piece, garment=garment.name, tolerance=tolerance) for piece in garment.pieces[size]
+        }
+        notches = seam_notches(garment.seams, pieces)
+        drafted[size] = tuple(
+            replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
+        )
+        reports += seam_reports(garment.seams, pieces, size)
+    return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports))
+
+
+def draft_piece(piece: Piece, *, garment: str = "", tolerance: float = 1e-4) -> DraftedPiece:
+    """Draft one piece on its own: every line but the notches that its seams would give it."""
+    frame = _frame(piece)
+    edges = tuple(_draft_edge(edge, frame, tolerance) for edge in piece.edges)
+    wedges, darts = _darts(piece, edges)
+    edges = tuple(_widened(edge, piece, darts) for edge in edges)
+    cut = cut_outline(_sides(piece, edges, wedges))
+    notes = [*cut.notes]
+    for dart in piece.darts:
+        left, right = (next(e for e in edges if e.name == leg) for leg in (dart.left, dart.right))
+        if abs(left.length - right.length) > 0.001:
+            notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
+    drafted_darts = tuple(_dart_lines(dart, wedges, edges, cut.points) for dart in piece.darts)
+    holes = {hole.name: (hole.kind, _moved(hole.points, frame)) for hole in piece.holes}
+    fisheyes = {name: points for name, (kind, points) in holes.items() if kind == "dart"}
+    drills = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts]
+    drills += [DrillHole(name=name, at=end) for name, points in fisheyes.items() for end in _far_ends(points)]
+    internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    sew_line = np.concatenate([edge.line[:-1] for edge in edges])
+    grain = default_grain(sew_line) if piece.grain is None else _moved(piece.grain, frame)
+    obstacles = [grain, *internal.values()]
+    obstacles += [np.concatenate([_line(edges, d.left), _line(edges, d.right)]) for d in piece.darts]
+    obstacles += [np.concatenate([p, p[:1]]) for _, p in holes.values()]
+    folds = [edge.line for edge in edges if edge.kind == "fold"]
+    return DraftedPiece(
+        piece=piece,
+        frame=frame,
+        edges=edges,
+        cut_line=cut.points,
+        darts=drafted_darts,
+        drill_holes=tuple(drills),
+        notches=dart_notches(piece, wedges, cut.points),
+        internal_lines=internal,
+        cutouts={name: points for name, (kind, points) in holes.items() if kind == "cutout"},
+        fisheyes=fisheyes,
+        grain=grain,
+        label=place_label(piece, garment, sew_line, obstacles, folds),
+        notes=tuple(notes),
+    )
+
+
+def _frame(piece: Piece) -> Vector:
+    """Turns the grain upwards and brings the fixed point of grading into the origin.
+
+    The fixed point is the lower end of the fold, else of the longest straight edge along the grain (a centre back),
+    else the middle of the lower border.
+    """
+    if piece.grain is None:
+        turn = np.eye(2)
+    else:
+        x, y = (piece.grain[1] - piece.grain[0]) / np.linalg.norm(piece.grain[1] - piece.grain[0])
+        turn = np.array([[y, -x], [x, y]])
+    outline = piece.outline @ turn.T
+    low, high = outline.min(axis=0), outline.max(axis=0)
+    anchor = np.array([(low[0] + high[0]) / 2, low[1]])
+    longest = 0.3 * (high[1] - low[1])
+    for edge in sorted(piece.edges, key=lambda e: e.kind != "fold"):
+        ends = edge.points[[0, -1]] @ turn.T
+        span = ends[1] - ends[0]
+        length = float(np.linalg.norm(span))
+        if edge.kind != "fold" and (abs(span[0]) > ALONG_GRAIN * length or edge.length > length * 1.0001):
+            continue
+        if edge.kind == "fold" or length > longest:
+            anchor, longest = ends[np.argmin(ends[:, 1])], length
+            if edge.kind == "fold":
+                break
+    return np.column_stack([turn, -anchor])
+
+
+def _moved(points: Vector, frame: Vector) -> Vector:
+    return points @ frame[:, :2].T + frame[:, 2]
+
+
+def _draft_edge(edge: Edge, frame: Vector, tolerance: float) -> DraftedEdge:
+    points = _moved(edge.points, frame)
+    curve = fit_curve(points[[0, -1]] if edge.kind == "fold" else points, tolerance)
+    return DraftedEdge(edge=edge, curve=curve, line=curve.sample(), width=edge.width)
+
+
+def _darts(piece: Piece, edges: tuple[DraftedEdge, ...]) -> tuple[dict[str, Wedge], dict[str, bool]]:
+    """The darts that are folded, and by name whether each is."""
+    wedges, folded = {}, {}
+    for dart in piece.darts:
+        left, right = _line(edges, dart.left), _line(edges, dart.right)
+        wedge = Wedge(name=dart.name, left=left, right=right, fold_to=dart.fold_to or _fold_to(left, right))
+        # Legs that are one line (a dart of no width) have nothing to fold.
+        folded[dart.name] = not dart.cut and SAME_POINT < wedge.opening <= WIDEST_DART
+        if folded[dart.name]:
+            wedges[dart.name] = wedge
+    return wedges, folded
+
+
+def _fold_to(left: Vector, right: Vector) -> str:
+    tip = left[-1]
+    away = (left[0] + right[-1]) / 2 - tip
+    if abs(away[0]) > abs(away[1]):
+        return "left" if left[0, 1] < right[-1, 1] else "right"
+    return "left" if abs(left[0, 0]) < abs(right[-1, 0]) else "right"
+
+
+def _widened(edge: DraftedEdge, piece: Piece, folded: Mapping[str, bool]) -> DraftedEdge:
+    """The legs of a dart that is cut out are seams, with a seam's allowance if they name none."""
+    if edge.kind != "dart":
+        return edge
+    dart = next(d for d in piece.darts if edge.name in (d.left, d.right))
+    if folded[dart.name]:
+        return replace(edge, width=0.0)
+    return replace(edge, width=0.010) if edge.edge.allowance is None else edge
+
+
+def _sides(piece: Piece, edges: tuple[DraftedEdge, ...], wedges: Mapping[str, Wedge]) -> list[Side | Wedge]:
+    by_left = {dart.left: dart for dart in piece.darts if dart.name in wedges}
+    by_right = {dart.right for dart in by_left.values()}
+    sides: list[Side | Wedge] = []
+    for edge in edges:
+        if edge.name in by_left:
+            sides.append(wedges[by_left[edge.name].name])
+        elif edge.name not in by_right:
+            sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
+    return sides
+
+
+def _dart_lines(
+    dart: Dart, wedges: Mapping[str, Wedge], edges: tuple[DraftedEdge, ...], cut_line: Vector
+) -> DraftedDart:
+    import shapely
+
+    left, right = _line(edges, dart.left), _line(edges, dart.right)
+    wedge = wedges.get(dart.name)
+    opening = float(np.linalg.norm(left[0] - right[-1]))
+    if wedge is None:
+        return DraftedDart(dart=dart, tip=left[-1], fold=None, fold_to="", opening=opening)
+    reach = max(float(np.linalg.norm(leg - wedge.tip)) for leg in (left[0], right[-1])) + 0.2
+    ray = shapely.LineString([wedge.tip, wedge.tip + reach * wedge.middle]).intersection(shapely.Polygon(cut_line))
+    parts = [part for part in shapely.get_parts(ray) if part.length > 0]
+    first = min(parts, key=lambda part: part.distance(shapely.Point(wedge.tip)))
+    ends = np.asarray(first.coords)[[0, -1]]
+    far = ends[np.argmax(np.linalg.norm(ends - wedge.tip, axis=1))]
+    return DraftedDart(
+        dart=dart, tip=wedge.tip, fold=np.stack([wedge.tip, far]), fold_to=wedge.fold_to, opening=opening
+    )
+
+
+def _line(edges: tuple[DraftedEdge, ...], name: str) -> Vector:
+    return next(edge.line for edge in edges if edge.name == name)
+
+
+def _far_ends(points: Vector) -> tuple[Vector, Vector]:
+    """The two points of a closed line that are farthest apart: the tips of a fish-eye dart."""
+    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
+    a, b = np.unravel_index(int(distance.argmax()), distance.shape)
+    return points[a], points[b]

@@ -1,0 +1,236 @@
+"""A drafted piece as strokes and words: what every picture of it shows, whatever the file format."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
+from warpflat.pattern.draft import DraftedEdge, DraftedPiece
+from warpflat.pattern.notches import Notch
+
+__all__ = ["Drawing", "Stroke", "Words", "draw_nest", "draw_piece", "grain_strokes"]
+
+Vector = NDArray[np.float64]
+
+#: Arrow heads: length and half width [m].
+ARROW, BARB = 0.006, 0.002
+#: The bracket that says "on fold" stands this far [m] inside the fold.
+BRACKET = 0.014
+#: Radius [m] of the circle around a drill hole.
+DRILL = 0.002
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Stroke:
+    """One line.
+
+    Attributes:
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout".
+        name: what it is called in files, unique among the strokes of a piece; empty for mere decoration.
+        points: #P by 2 [m].
+        closed: the last point joins the first.
+        curve: the same line as Béziers, where there is one.
+    """
+
+    role: str
+    name: str
+    points: Vector
+    closed: bool = False
+    curve: Curve | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Words:
+    """One line of text, centred on `at` [m]; `height` of its capitals [m], `angle` [rad] counter-clockwise.
+
+    A `tag` names a size on its own line: it takes that line's colour, on a white ground.
+    """
+
+    text: str
+    at: Vector
+    height: float
+    angle: float = 0.0
+    bold: bool = False
+    tag: bool = False
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drawing:
+    """All strokes and words of one piece in one size (or of the label of a nest)."""
+
+    piece: DraftedPiece
+    strokes: tuple[Stroke, ...]
+    words: tuple[Words, ...]
+
+
+def draw_piece(piece: DraftedPiece) -> Drawing:
+    """Everything that one piece in one size shows."""
+    strokes = [
+        _cut(piece),
+        *(_edge(edge) for edge in piece.edges),
+        *_details(piece),
+        *grain_strokes(piece.grain),
+        *_internal(piece),
+    ]
+    words = _label(piece, piece.size)
+    for edge in piece.fold_edges:
+        fold_strokes, fold_words = _bracket(edge)
+        strokes += fold_strokes
+        words += fold_words
+    return Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words))
+
+
+def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
+    """One piece in all its sizes, one upon the other: cut lines, darts and notches of each; label and grain once."""
+    if len(pieces) == 1:
+        return (draw_piece(pieces[0]),)
+    drawings = []
+    middle = len(pieces) // 2
+    edge = _telling_edge(pieces)
+    for index, piece in enumerate(pieces):
+        strokes = [
+            _cut(piece),
+            *(_edge(e) for e in piece.edges if e.kind in ("dart", "fold")),
+            *_details(piece),
+        ]
+        words: list[Words] = []
+        if index == middle:
+            strokes += [*grain_strokes(piece.grain), *_internal(piece)]
+            words += _label(piece, ", ".join(p.size for p in pieces))
+            for fold in piece.fold_edges:
+                fold_strokes, fold_words = _bracket(fold)
+                strokes += fold_strokes
+                words += fold_words
+        drawings.append(
+            Drawing(piece=piece, strokes=tuple(strokes), words=(*words, *_size_tags(piece, edge, index, len(pieces))))
+        )
+    return tuple(drawings)
+
+
+def _cut(piece: DraftedPiece) -> Stroke:
+    return Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)
+
+
+def _edge(edge: DraftedEdge) -> Stroke:
+    role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
+    return Stroke(role=role, name=edge.name, points=edge.line, curve=edge.curve)
+
+
+def _details(piece: DraftedPiece) -> list[Stroke]:
+    strokes = [
+        Stroke(role="dart_fold", name=f"{dart.dart.name}.fold", points=dart.fold)
+        for dart in piece.darts
+        if dart.fold is not None
+    ]
+    for index, notch in enumerate(piece.notches):
+        strokes += _slits(notch, index)
+    for hole in piece.drill_holes:
+        turn = np.linspace(0, 2 * np.pi, 17)[:-1]
+        ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
+        strokes.append(Stroke(role="drill", name="", points=ring, closed=True))
+        for axis in np.eye(2):
+            cross = np.stack([hole.at - 1.5 * DRILL * axis, hole.at + 1.5 * DRILL * axis])
+            strokes.append(Stroke(role="drill", name="", points=cross))
+    for role, lines in (("cutout", piece.cutouts), ("dart", piece.fisheyes)):
+        strokes += [Stroke(role=role, name=name, points=line, closed=True) for name, line in lines.items()]
+    return strokes
+
+
+def _slits(notch: Notch, index: int) -> list[Stroke]:
+    strokes = []
+    for slit, base in enumerate(notch.base):
+        name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
+        strokes.append(Stroke(role="notch", name=name, points=np.stack([base, base + notch.depth * notch.direction])))
+    return strokes
+
+
+def _internal(piece: DraftedPiece) -> list[Stroke]:
+    return [
+        Stroke(role="internal", name=name, points=line, curve=fit_curve(line))
+        for name, line in piece.internal_lines.items()
+    ]
+
+
+def grain_strokes(grain: Vector) -> list[Stroke]:
+    """The grain line (2 by 2 [m]) with an arrow at either end."""
+    low, high = grain
+    strokes = [Stroke(role="grain", name="grain", points=grain)]
+    strokes += [_arrow(high, high - low, "grain"), _arrow(low, low - high, "grain")]
+    return strokes
+
+
+def _arrow(tip: Vector, direction: Vector, role: str) -> Stroke:
+    along = direction / max(float(np.linalg.norm(direction)), 1e-12)
+    across = np.array([-along[1], along[0]])
+    points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
+    return Stroke(role=role, name="", points=points)
+
+
+def _bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
+    """A line beside the fold whose two arms point to it, with words along it."""
+    start, end = edge.line[0], edge.line[-1]
+    span = end - start
+    length = float(np.linalg.norm(span))
+    along = span / length
+    inwards = np.array([-along[1], along[0]])
+    depth = min(BRACKET, length / 4)
+    a, b = start + 0.15 * span, start + 0.85 * span
+    points = np.stack([a, a + depth * inwards, b + depth * inwards, b])
+    strokes = [Stroke(role="grain", name="", points=points), _arrow(a, -inwards, "grain"), _arrow(b, -inwards, "grain")]
+    angle = float(np.arctan2(along[1], along[0]))
+    if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
+        angle += np.pi
+    height = min(0.0035, length / 20)
+    words = Words(text="PLACE ON FOLD", at=(a + b) / 2 + (depth / 2) * inwards, height=height, angle=angle)
+    return strokes, [words]
+
+
+def _label(piece: DraftedPiece, sizes: str) -> list[Words]:
+    words = []
+    y = piece.label.at[1] + piece.label.height / 2
+    for index, (text, height) in enumerate(piece.label.lines):
+        step = height * piece.label.height / max(sum(h for _, h in piece.label.lines), 1e-12)
+        y -= step
+        if text == f"Size {piece.size}":
+            text = f"Size {sizes}" if sizes == piece.size else f"Sizes {sizes}"
+        at = np.array([piece.label.at[0], y + (step - height) / 2 + height / 2])
+        words.append(Words(text=text, at=at, height=height, bold=index == 0))
+    return words
+
+
+def _telling_edge(pieces: tuple[DraftedPiece, ...]) -> str:
+    """The edge on which the sizes lie farthest apart: there a size can be read off its own line."""
+
+    def spread(name: str) -> float:
+        middles = [_at_share(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
+        start, end = pieces[0].edge(name).line[[0, -1]]
+        along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
+        shift = middles[1] - middles[0]
+        return abs(float(shift[0] * along[1] - shift[1] * along[0]))
+
+    names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
+    shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
+    return max(shared, key=lambda name: spread(name) * pieces[0].edge(name).length ** 0.5, default="")
+
+
+def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:
+    """The size on its own cut line, staggered along an edge so that the tags of neighbouring sizes do not collide."""
+    import shapely
+
+    if not edge:
+        return []
+    ring = shapely.LinearRing(piece.cut_line)
+    words = []
+    for start in (0.08, 0.62):
+        at = _at_share(piece.edge(edge).line, start + 0.3 * (index + 0.5) / count)
+        on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+        words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
+    return words
+
+
+def _at_share(line: Vector, share: float) -> Vector:
+    arc = arc_lengths(line)
+    return np.array([np.interp(share * arc[-1], arc, line[:, k]) for k in (0, 1)])

@@ -1,0 +1,264 @@
+"""From a flat mesh to a piece: its border walked, split into named edges, its cracks read as darts."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError, nearest
+from warpflat.pattern.label import default_grain
+from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
+from warpflat.surface.topology import border_loops
+
+__all__ = ["piece_from_mesh"]
+
+Vector = NDArray[np.float64]
+
+#: A corner is measured over this much border [m] on either side: single steps of a ragged border turn anywhere.
+WINDOW = 0.012
+#: A border that turns back by more than this [rad] is the tip of a crack: a dart that opens by less than 40 degrees.
+TIP = np.radians(140.0)
+#: The two legs of a crack are as long as each other, within this share.
+LEGS = 0.05
+
+
+def piece_from_mesh(
+    faces: NDArray[np.int32],
+    positions: ArrayLike,
+    *,
+    name: str,
+    lines: Mapping[str, ArrayLike] | None = None,
+    kinds: Mapping[str, str] | None = None,
+    allowances: Mapping[str, float] | None = None,
+    darts: Mapping[str, tuple[int, int, int]] | None = None,
+    grain_line: str | None = None,
+    corner_angle: float = np.radians(35.0),
+    size: str = "",
+    fabric: str = "",
+    quantity: int = 1,
+    paired: bool = True,
+) -> Piece:
+    """Make a piece of a flat mesh.
+
+    The border is split at its corners, at the ends of darts and wherever a feature line begins or ends to run along
+    it. An edge is named by the line along it ("side"; a second stretch is "side_2"), others "edge_1", "edge_2" ...;
+    the legs of a dart "NAME.left" and "NAME.right". Border loops inside become cutouts, feature lines inside internal
+    lines.
+
+    Args:
+        faces: #F by 4, -1 in the last column of a triangle, consistently wound.
+        positions: #V by 2 [m]; a layout that lies on its back (negative area) is turned over.
+        name: of the piece.
+        lines: feature lines by name, vertex indices along mesh edges.
+        kinds: kind by edge name ("fold", "hem", "cut"); edges not named are seams.
+        allowances: allowance [m] by edge name.
+        darts: by name, the vertices (left mouth, tip, right mouth) in border order, counter-clockwise. Other cracks are
+            found where the border turns back sharply between two equally long legs that end in corners.
+        grain_line: the feature line whose direction, from its first vertex to its last, is the grain; None takes y.
+        corner_angle: [rad], a border vertex that turns by more is a corner.
+        size, fabric, quantity, paired: as in :class:`Piece`.
+
+    Raises:
+        InputError: unknown names, a mesh without a border, dart vertices that are not on it, or a border that crosses
+            itself.
+    """
+    flat = np.asarray(positions, dtype=np.float64)
+    if flat.ndim != 2 or flat.shape[1] != 2 or not np.isfinite(flat).all():
+        raise InputError(f"piece {name!r}: positions have shape {flat.shape}; they must be #V by 2, finite, in metres")
+    curves = {key: np.asarray(value, dtype=np.int32) for key, value in (lines or {}).items()}
+    loops = border_loops(faces, np.column_stack([flat, np.zeros(len(flat))]))
+    if not loops:
+        raise InputError(f"piece {name!r}: the mesh is closed and has no border; cut it open first")
+    areas = [_area(flat[loop]) for loop in loops]
+    outer = int(np.argmax(np.abs(areas)))
+    if areas[outer] < 0:
+        flat = flat * [-1.0, 1.0]
+    loop, holes = loops[outer], [hole for i, hole in enumerate(loops) if i != outer]
+    labels = _labels(loop, curves)
+    corners = _corners(flat[loop], corner_angle)
+    named = _dart_places(loop, darts or {}, name)
+    corners |= {place for places in named.values() for place in places}
+    found = _cracks(flat[loop], corners, {places[1] for places in named.values()})
+    named |= {(f"dart_{i + 1}" if len(found) > 1 else "dart"): places for i, places in enumerate(found)}
+    changes = {i for i in range(len(loop)) if labels[i] != labels[i - 1]}
+    inside_leg = {place for places in named.values() for place in _between(places, len(loop))}
+    splits = sorted((corners | changes) - inside_leg | {p[1] for p in named.values()}) or [0]
+    edges = _edges(flat, loop, splits, labels, named, kinds or {}, allowances or {}, name)
+    grain = None
+    if grain_line is not None:
+        if grain_line not in curves:
+            raise InputError(f"piece {name!r}: no line {grain_line!r} for the grain; {nearest(grain_line, curves)}")
+        grain = _grain(flat, loop, curves[grain_line], grain_line, name)
+    return Piece(
+        name=name,
+        size=size,
+        fabric=fabric,
+        quantity=quantity,
+        paired=paired,
+        edges=edges,
+        darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in named],
+        internal_lines=_internal(flat, faces, loops, curves),
+        grain=grain,
+        holes=[Hole(name=f"hole_{i + 1}", points=flat[hole[::-1]]) for i, hole in enumerate(holes)],
+    )
+
+
+def _area(ring: Vector) -> float:
+    following = np.roll(ring, -1, axis=0)
+    return float((ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]).sum() / 2)
+
+
+def _turns(ring: Vector) -> Vector:
+    """#P, by how much [rad] the border turns at each vertex, over `WINDOW` on either side, but at least a step."""
+    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    window = min(WINDOW, float(step.sum()) / 24)
+    count = len(ring)
+    around = np.concatenate([[0.0], np.cumsum(np.tile(step, 3))])[: 3 * count]
+    here = np.arange(count, 2 * count)
+    before = np.minimum(np.searchsorted(around, around[here] - window - 1e-12), here - 1)
+    after = np.maximum(np.searchsorted(around, around[here] + window + 1e-12, side="right") - 1, here + 1)
+    arrive, leave = ring - ring[before % count], ring[after % count] - ring
+    cross = arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0]
+    return np.asarray(np.arctan2(cross, np.einsum("ij,ij->i", arrive, leave)))
+
+
+def _corners(ring: Vector, angle: float) -> set[int]:
+    """Vertices at which the border turns by more than `angle` [rad], and most within the window around them."""
+    turns = np.abs(_turns(ring))
+    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    window = min(WINDOW, float(step.sum()) / 24)
+    total, along = float(step.sum()), np.concatenate([[0.0], np.cumsum(step)[:-1]])
+    corners: list[int] = []
+    for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
+        apart = [abs(float(along[i] - along[j])) for j in corners]
+        # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
+        if all(min(d, total - d) > window for d in apart):
+            corners.append(i)
+    return set(corners)
+
+
+def _labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]) -> list[str]:
+    """For each border edge, from loop[i] to loop[i + 1], the feature line along it, or ""."""
+    label: dict[tuple[int, int], str] = {}
+    for key, curve in curves.items():
+        for a, b in zip(curve[:-1].tolist(), curve[1:].tolist(), strict=True):
+            label.setdefault((min(a, b), max(a, b)), key)
+    around = [*loop.tolist(), int(loop[0])]
+    return [label.get((min(a, b), max(a, b)), "") for a, b in pairwise(around)]
+
+
+def _dart_places(
+    loop: NDArray[np.int32], darts: Mapping[str, tuple[int, int, int]], name: str
+) -> dict[str, tuple[int, int, int]]:
+    """Places in the loop of each dart's left mouth, tip and right mouth."""
+    where = {vertex: place for place, vertex in enumerate(loop.tolist())}
+    places = {}
+    for key, dart in darts.items():
+        for vertex in dart:
+            if vertex not in where:
+                raise InputError(f"piece {name!r}: dart {key!r}: vertex {vertex} is not on the outer border")
+        left, tip, right = (where[vertex] for vertex in dart)
+        if (tip - left) % len(loop) >= (right - left) % len(loop):
+            raise InputError(
+                f"piece {name!r}: dart {key!r}: give its vertices counter-clockwise: left mouth, tip, right mouth"
+            )
+        places[key] = (left, tip, right)
+    return places
+
+
+def _cracks(ring: Vector, corners: set[int], known: set[int]) -> list[tuple[int, int, int]]:
+    """Sharp inward tips between two legs of equal length that end in the nearest corners."""
+    turns = _turns(ring)
+    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    count = len(ring)
+    found = []
+    for tip in np.flatnonzero(turns < -TIP).tolist():
+        if tip in known:
+            continue
+        left = next((k for k in range(1, count) if (tip - k) % count in corners), 0)
+        right = next((k for k in range(1, count) if (tip + k) % count in corners), 0)
+        legs = (
+            float(sum(step[(tip - k) % count] for k in range(1, left + 1))),
+            float(sum(step[(tip + k) % count] for k in range(right))),
+        )
+        if left and right and abs(legs[0] - legs[1]) <= LEGS * max(legs):
+            found.append(((tip - left) % count, tip, (tip + right) % count))
+    return found
+
+
+def _between(places: tuple[int, int, int], count: int) -> set[int]:
+    """Places strictly between the two mouths of a dart."""
+    return {(places[0] + k) % count for k in range(1, (places[2] - places[0]) % count)}
+
+
+def _edges(
+    flat: Vector,
+    loop: NDArray[np.int32],
+    splits: Sequence[int],
+    labels: Sequence[str],
+    darts: Mapping[str, tuple[int, int, int]],
+    kinds: Mapping[str, str],
+    allowances: Mapping[str, float],
+    name: str,
+) -> list[Edge]:
+    legs = {places[0]: f"{key}.left" for key, places in darts.items()}
+    legs |= {places[1]: f"{key}.right" for key, places in darts.items()}
+    count, used, plain = len(loop), dict[str, int](), 0
+    stretches: list[tuple[str, NDArray[np.int32]]] = []
+    for start, end in zip(splits, [*splits[1:], splits[0] + count], strict=True):
+        vertices = loop[np.arange(start, end + 1) % count]
+        title = legs.get(start, labels[start])
+        if not title:
+            plain += 1
+            title = f"edge_{plain}"
+        used[title] = used.get(title, 0) + 1
+        stretches.append((title if used[title] == 1 else f"{title}_{used[title]}", vertices))
+    names = [title for title, _ in stretches]
+    for what, mapping in (("kinds", kinds), ("allowances", allowances)):
+        for key in mapping:
+            if key not in names:
+                raise InputError(f"piece {name!r}: {what} name an edge {key!r} that it has not; {nearest(key, names)}")
+    return [
+        Edge(
+            name=title,
+            points=flat[vertices],
+            kind="dart" if title in legs.values() else kinds.get(title, "seam"),
+            allowance=allowances.get(title),
+            vertices=vertices,
+        )
+        for title, vertices in stretches
+    ]
+
+
+def _internal(
+    flat: Vector, faces: NDArray[np.int32], loops: Sequence[NDArray[np.int32]], curves: Mapping[str, NDArray[np.int32]]
+) -> dict[str, Vector]:
+    """The stretches of feature lines that do not run along a border."""
+    border = {
+        (min(a, b), max(a, b)) for loop in loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+    }
+    internal: dict[str, Vector] = {}
+    for key, curve in curves.items():
+        runs: list[list[int]] = [[]]
+        for a, b in zip(curve[:-1].tolist(), curve[1:].tolist(), strict=True):
+            if (min(a, b), max(a, b)) in border:
+                runs.append([])
+            else:
+                runs[-1] += [b] if runs[-1] else [a, b]
+        for index, run in enumerate([run for run in runs if run]):
+            internal[key if index == 0 else f"{key}_{index + 1}"] = flat[run]
+    return internal
+
+
+def _grain(flat: Vector, loop: NDArray[np.int32], line: NDArray[np.int32], key: str, name: str) -> Vector:
+    """Along the line's ends, but inside the piece: a datum line is often its border."""
+    span = flat[line[-1]] - flat[line[0]]
+    length = float(np.linalg.norm(span))
+    if length < 1e-6:
+        raise InputError(f"piece {name!r}: line {key!r} is closed and gives the grain no direction")
+    x, y = span / length
+    turn = np.array([[y, -x], [x, y]])
+    return default_grain(flat[loop] @ turn.T) @ turn

@@ -1,0 +1,256 @@
+"""The marker: all copies of all pieces nested on cloth of a given width, by the `sparrow` solver (spyrrow)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError, nearest
+from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
+
+__all__ = ["Cloth", "Copy", "Marker", "make_marker"]
+
+Vector = NDArray[np.float64]
+
+#: Copies are nested as polygons that are larger by up to this [m], with far fewer corners.
+SIMPLER = 1e-3
+#: Two placed copies may touch, but not share more than this area [m2].
+OVERLAP = 1e-8
+
+
+@dataclass(frozen=True, kw_only=True)
+class Cloth:
+    """What a fabric allows on the cutting table.
+
+    Attributes:
+        width: usable width between the selvedges [m].
+        one_way: all pieces point the same way along the warp (nap, pile, one-way prints); else they may turn round.
+        reversible: both faces look alike, so that pairs may be cut either way up; else one of each pair is mirrored.
+        gap: between pieces, and to the selvedges and ends [m].
+    """
+
+    width: float
+    one_way: bool = False
+    reversible: bool = False
+    gap: float = 0.002
+
+    def __post_init__(self) -> None:
+        if not 0.1 <= self.width <= 10:
+            raise InputError(f"cloth width {self.width!r} m; it must be between 0.1 and 10 m")
+        if not 0 <= self.gap < self.width / 10:
+            raise InputError(f"gap {self.gap!r} m between pieces; it must be 0 or more, and small against the cloth")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Copy:
+    """One copy on the cloth, all lines placed [m]: warp along x, `matrix` 2 by 3 from the drafted piece.
+
+    A half on the fold is whole here: cut line and notches of both halves, `fold_lines` where they meet.
+    """
+
+    piece: DraftedPiece
+    mirrored: bool
+    turned: bool
+    matrix: Vector
+    cut_line: Vector
+    fold_lines: tuple[Vector, ...]
+    grain: Vector
+    label_at: Vector
+    notches: tuple[Vector, ...]
+
+    @property
+    def label(self) -> str:
+        side = " (mirrored)" if self.mirrored else ""
+        return f"{self.piece.name} {self.piece.size}".strip() + side
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Marker:
+    """A lay plan: cloth from 0 to `length` along x and 0 to `width` across [m]."""
+
+    fabric: str
+    width: float
+    length: float
+    placements: tuple[Copy, ...]
+
+    @property
+    def utilisation(self) -> float:
+        """Area of the pieces over the area of the cloth that they take."""
+        import shapely
+
+        used = sum(float(shapely.Polygon(copy.cut_line).area) for copy in self.placements)
+        return used / (self.width * self.length)
+
+
+def make_marker(
+    garment: DraftedGarment,
+    cloth: Cloth,
+    *,
+    fabric: str = "",
+    sizes: Mapping[str, int] | None = None,
+    seconds: int = 5,
+    seed: int = 0,
+) -> Marker:
+    """Nest the pieces of a garment on one ply of cloth, face up, as short as found in the given time.
+
+    Pieces lie with their grain along the cloth; a half on the fold is cut unfolded; of a pair one copy is mirrored.
+
+    Args:
+        garment: drafted.
+        cloth: width, and what the fabric allows.
+        fabric: only pieces of that fabric; "" where all have the same.
+        sizes: how many garments of each size; None makes one of each drafted size.
+        seconds: time for the solver.
+        seed: the same seed explores alike, but what is reached depends on the machine's speed.
+
+    Raises:
+        InputError: an unknown size or fabric, or a piece wider than the cloth.
+    """
+    wanted = dict.fromkeys(garment.pieces, 1) if sizes is None else sizes
+    copies = _copies(garment, fabric, wanted)
+    tries = [copies]
+    if cloth.reversible and any(mirrored for _, mirrored in copies):
+        tries.append([(piece, False) for piece, _ in copies])
+    share = max(1, seconds // len(tries))
+    plans = [_nest(garment.name, plan, cloth, share, seed) for plan in tries]
+    placements = min(plans, key=_length)
+    marker = Marker(
+        fabric=fabric, width=cloth.width, length=_length(placements) + cloth.gap, placements=tuple(placements)
+    )
+    _check(marker)
+    return marker
+
+
+def _length(placements: list[Copy]) -> float:
+    return max(float(copy.cut_line[:, 0].max()) for copy in placements)
+
+
+def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
+    """Where sparrow puts the copies; in the order in which the cutter meets them."""
+    import spyrrow
+
+    items, matrices, usable = [], [], cloth.width - 2 * cloth.gap
+    for index, (piece, mirrored) in enumerate(copies):
+        matrix = _onto_cloth(mirrored)
+        cut = unfolded(piece) @ matrix.T
+        across = float(np.ptp(cut[:, 1]))
+        if across + SIMPLER > usable:
+            raise InputError(
+                f"piece {piece.name!r} size {piece.size} is {across * 1000:.0f} mm wide, the cloth "
+                f"{usable * 1000:.0f} mm between its margins; give wider cloth or divide the piece"
+            )
+        matrices.append(matrix)
+        angles = [0.0] if cloth.one_way else [0.0, 180.0]
+        items.append(spyrrow.Item(str(index), [(x * 1000, y * 1000) for x, y in _simpler(cut).tolist()], 1, angles))
+    instance = spyrrow.StripPackingInstance(name, usable * 1000, items)
+    config = spyrrow.StripPackingConfig(
+        total_computation_time=seconds, num_workers=1, seed=seed, min_items_separation=cloth.gap * 1000 or None
+    )
+    placements = []
+    for item in instance.solve(config).placed_items:
+        piece, mirrored = copies[int(item.id)]
+        placements.append(_placed(piece, mirrored, matrices[int(item.id)], item.rotation, item.translation, cloth.gap))
+    return sorted(placements, key=lambda copy: (copy.cut_line[:, 0].min(), copy.cut_line[:, 1].min()))
+
+
+def _check(marker: Marker) -> None:
+    """The solver's word is not taken for it: copies must not overlap and must lie on the cloth."""
+    import shapely
+
+    polygons = [shapely.Polygon(copy.cut_line) for copy in marker.placements]
+    for a, b in shapely.STRtree(polygons).query(polygons, predicate="intersects").T:
+        if a < b and polygons[a].intersection(polygons[b]).area > OVERLAP:
+            raise RuntimeError(f"the nesting overlaps: {marker.placements[a].label}, {marker.placements[b].label}")
+    for copy in marker.placements:
+        low, high = copy.cut_line.min(axis=0), copy.cut_line.max(axis=0)
+        if low.min() < -1e-6 or high[0] > marker.length + 1e-6 or high[1] > marker.width + 1e-6:
+            raise RuntimeError(f"the nesting puts {copy.label} beyond the cloth")
+
+
+def unfolded(piece: DraftedPiece) -> Vector:
+    """#P by 2 [m], the cut line of the whole piece: a half is joined to its mirror image along the fold."""
+    import shapely
+
+    whole = shapely.Polygon(piece.cut_line)
+    for edge in piece.fold_edges:
+        mirror = shapely.transform(whole, _mirror(edge))
+        # Both halves end on the fold within rounding; a hair of overlap joins them.
+        joined = shapely.union_all([half.buffer(2e-6, join_style="mitre") for half in (whole, mirror)])
+        whole = max(shapely.get_parts(joined.buffer(-2e-6, join_style="mitre")), key=lambda part: part.area)
+    return np.asarray(shapely.orient_polygons(shapely.Polygon(whole.exterior)).exterior.coords)[:-1]
+
+
+def _mirror(edge: DraftedEdge) -> Callable[[Vector], Vector]:
+    """The mirror on the line of a fold, for #P by 2 points."""
+    start = edge.line[0]
+    x, y = (edge.line[-1] - start) / np.linalg.norm(edge.line[-1] - start)
+    turn = np.array([[2 * x * x - 1, 2 * x * y], [2 * x * y, 2 * y * y - 1]])
+    return lambda points: (points - start) @ turn.T + start
+
+
+def _slits(piece: DraftedPiece) -> list[Vector]:
+    """Every notch of the whole piece, 2 by 2 [m], from the cut line inwards."""
+    slits = [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
+    for edge in piece.fold_edges:
+        slits += [_mirror(edge)(slit) for slit in slits]
+    return slits
+
+
+def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:
+    copies = []
+    for size, count in sizes.items():
+        if size not in garment.pieces:
+            raise InputError(f"no size {size!r} in {garment.name!r}; {nearest(size, garment.pieces)}")
+        if count < 1:
+            raise InputError(f"{count} garments of size {size}; it must be 1 or more")
+        for piece in garment.pieces[size]:
+            if fabric and piece.piece.fabric != fabric:
+                continue
+            total = piece.piece.quantity * count
+            pairs = piece.piece.paired and not piece.piece.on_fold and piece.piece.quantity % 2 == 0
+            copies += [(piece, pairs and k % 2 == 1) for k in range(total)]
+    if not copies:
+        known = {piece.piece.fabric for pieces in garment.pieces.values() for piece in pieces}
+        raise InputError(f"no piece is of fabric {fabric!r}; {nearest(fabric, known)}")
+    return copies
+
+
+def _onto_cloth(mirrored: bool) -> Vector:
+    """2 by 2: the grain, upwards in a drafted piece, comes to lie along x."""
+    return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
+
+
+def _simpler(cut: Vector) -> Vector:
+    """A polygon with few corners that contains the cut line."""
+    import shapely
+
+    exact = shapely.Polygon(cut)
+    simple = exact.buffer(SIMPLER / 2, join_style="mitre", mitre_limit=2).simplify(SIMPLER / 2)
+    simple = simple if simple.contains(exact) else exact
+    return np.asarray(shapely.orient_polygons(shapely.Polygon(simple.exterior)).exterior.coords)[:-1]
+
+
+def _placed(
+    piece: DraftedPiece, mirrored: bool, linear: Vector, degrees: float, shift: tuple[float, float], margin: float
+) -> Copy:
+    angle = np.radians(degrees)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
+
+    def moved(points: Vector) -> Vector:
+        return points @ matrix[:, :2].T + matrix[:, 2]
+
+    return Copy(
+        piece=piece,
+        mirrored=mirrored,
+        turned=abs(np.cos(angle) + 1) < 1e-6,
+        matrix=matrix,
+        cut_line=moved(unfolded(piece)),
+        fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
+        grain=moved(piece.grain),
+        label_at=moved(piece.label.at[None])[0],
+        notches=tuple(moved(slit) for slit in _slits(piece)),
+    )

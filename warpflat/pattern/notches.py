@@ -1,0 +1,217 @@
+"""Seams measured and notched: the same mark at the same length on both sides of every seam."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.pattern.allowance import Wedge
+from warpflat.pattern.curves import arc_lengths
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+
+if TYPE_CHECKING:
+    from warpflat.pattern.draft import DraftedPiece
+
+__all__ = ["Notch", "SeamReport", "dart_notches", "seam_notches", "seam_reports"]
+
+Vector = NDArray[np.float64]
+
+#: Notches are cut this deep [m], and never deeper than this share of the allowance.
+DEPTH, SHARE = 0.005, 0.6
+#: Depth [m] on an edge without allowance.
+RAW_DEPTH = 0.003
+#: The two slits of a double notch stand this far [m] apart.
+DOUBLE_SPACING = 0.008
+#: Seams shorter than this [m] get no notch of their own; longer ones get one per `SPACING` [m].
+SHORTEST, SPACING = 0.080, 0.200
+#: A notch this close [m] to a joint of edges would be lost in it.
+CLEAR = 0.012
+#: Sides of a seam may differ by this [m].
+SEAM_TOLERANCE = 5e-4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Notch:
+    """One notch.
+
+    Attributes:
+        seam: the seam, or the dart, that it belongs to.
+        edge: the edge on which it stands.
+        length: its place [m] along the seam from the seam's start, measured on this side.
+        at: its point [m] on the sewing line.
+        base: where it starts on the cut line [m]; a double notch has two.
+        direction: unit vector into the piece.
+        depth: [m].
+    """
+
+    seam: str
+    edge: str
+    length: float
+    at: Vector
+    base: tuple[Vector, ...]
+    direction: Vector
+    depth: float
+
+    @property
+    def double(self) -> bool:
+        return len(self.base) == 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamReport:
+    """How the two sides of a seam agree in one size.
+
+    Attributes:
+        name, size: of the seam.
+        sides: each side's edges, as "piece.edge + piece.edge".
+        length_mm: of both sides [mm].
+        ease: what the seam asks for.
+        difference_mm: what the second side is too long (or, negative, too short) for that ease [mm].
+    """
+
+    name: str
+    size: str
+    sides: tuple[str, str]
+    length_mm: tuple[float, float]
+    ease: float
+    difference_mm: float
+
+    @property
+    def matches(self) -> bool:
+        return abs(self.difference_mm) <= SEAM_TOLERANCE * 1000
+
+
+def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
+    """Lengths of both sides of every seam, along the fitted sewing lines."""
+    reports = []
+    for seam in seams:
+        first, second = (_Chain(side, pieces).length for side in seam.sides)
+        reports.append(
+            SeamReport(
+                name=seam.name,
+                size=size,
+                sides=(" + ".join(map(str, seam.sides[0])), " + ".join(map(str, seam.sides[1]))),
+                length_mm=(first * 1000, second * 1000),
+                ease=seam.ease,
+                difference_mm=(second - first * (1 + seam.ease)) * 1000,
+            )
+        )
+    return reports
+
+
+class _Chain:
+    """One side of a seam as one long line, run in the seam's direction."""
+
+    def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
+        self.side = side
+        self.pieces = [pieces[s.piece] for s in side]
+        self.edges = [piece.edge(s.edge) for piece, s in zip(self.pieces, side, strict=True)]
+        self.lines = [edge.line[::-1] if s.reversed else edge.line for edge, s in zip(self.edges, side, strict=True)]
+        self.arcs = [arc_lengths(line) for line in self.lines]
+        self.joints = np.concatenate([[0.0], np.cumsum([arc[-1] for arc in self.arcs])])
+
+    @property
+    def length(self) -> float:
+        return float(self.joints[-1])
+
+    def index(self, length: float) -> int:
+        """The edge on which that length falls."""
+        return int(np.clip(np.searchsorted(self.joints, length, side="right") - 1, 0, len(self.lines) - 1))
+
+    def piece_name(self, length: float) -> str:
+        return self.side[self.index(length)].piece
+
+    def notch(self, seam: str, length: float, double: bool) -> Notch:
+        """A notch at that length; both slits of a double one lie as far to either side of it."""
+        index = self.index(length)
+        piece, edge = self.pieces[index], self.edges[index]
+        local = length - self.joints[index]
+        at, direction = self._frame(index, local)
+        offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
+        base = tuple(_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets)
+        depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
+        return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
+
+    def _frame(self, index: int, length: float) -> tuple[Vector, Vector]:
+        """Point on the sewing line and unit normal into the piece."""
+        line, arc = self.lines[index], self.arcs[index]
+        length = float(np.clip(length, 0.0, arc[-1]))
+        step = int(np.clip(np.searchsorted(arc, length) - 1, 0, len(line) - 2))
+        span = float(arc[step + 1] - arc[step])
+        at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
+        # The direction over a few millimetres: that of a single short chord would jitter.
+        near, far = (np.array([np.interp(x, arc, line[:, k]) for k in (0, 1)]) for x in (length - 2e-3, length + 2e-3))
+        tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        inwards = np.array([-tangent[1], tangent[0]])
+        return at, -inwards if self.side[index].reversed else inwards
+
+
+def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> dict[str, list[Notch]]:
+    """Notches by piece.
+
+    Both sides of a seam get a notch at the same fraction of the seam's length, which is the same length wherever the
+    sides are equal; ease is spread evenly. Fractions are not symmetric about the middle, so that a side sewn on the
+    wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
+    other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
+    """
+    notches: dict[str, list[Notch]] = {}
+    for seam in seams:
+        first, second = (_Chain(side, pieces) for side in seam.sides)
+        for fraction in _fractions(seam, first, second):
+            places = [(chain, fraction * chain.length) for chain in (first, second)]
+            names = [chain.piece_name(length).lower() for chain, length in places]
+            back = any("back" in name for name in names) and not any("front" in name for name in names)
+            for chain, length in places:
+                notch = chain.notch(seam.name, length, back if seam.double is None else seam.double)
+                notches.setdefault(chain.piece_name(length), []).append(notch)
+        for chain, other in ((first, second), (second, first)):
+            for joint in chain.joints[1:-1] / chain.length:
+                if np.abs(other.joints - joint * other.length).min() > CLEAR:
+                    notch = other.notch(seam.name, float(joint * other.length), double=False)
+                    notches.setdefault(other.piece_name(float(joint * other.length)), []).append(notch)
+    return notches
+
+
+def _fractions(seam: Seam, first: _Chain, second: _Chain) -> list[float]:
+    if seam.notches is not None:
+        return list(seam.notches)
+    if first.length < SHORTEST:
+        return []
+    count = max(1, round(first.length / SPACING))
+    fractions = (np.arange(count) + 0.42) / count
+    joints = np.concatenate([first.joints / first.length, second.joints / second.length])
+    return [float(f) for f in fractions if np.abs(joints - f).min() * first.length > CLEAR]
+
+
+def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut_line: Vector) -> tuple[Notch, ...]:
+    """A single notch at the end of each leg of every folded dart, in the direction of the leg."""
+    notches = []
+    for dart in piece.darts:
+        wedge = wedges.get(dart.name)
+        if wedge is None:
+            continue
+        for name, mouth in ((dart.left, wedge.left[0]), (dart.right, wedge.right[-1])):
+            inwards = (wedge.tip - mouth) / max(float(np.linalg.norm(wedge.tip - mouth)), 1e-12)
+            base = _base(mouth, inwards, 0.05, cut_line)
+            width = float(np.linalg.norm(base - mouth))
+            depth = min(DEPTH, SHARE * width) if width > 1e-4 else RAW_DEPTH
+            notches.append(
+                Notch(seam=dart.name, edge=name, length=0.0, at=mouth, base=(base,), direction=inwards, depth=depth)
+            )
+    return tuple(notches)
+
+
+def _base(at: Vector, inwards: Vector, width: float, cut_line: Vector) -> Vector:
+    """Where the cut line is met, straight out from a point of the sewing line."""
+    import shapely
+
+    ring = shapely.LinearRing(cut_line)
+    ray = shapely.LineString([at + 1e-5 * inwards, at - (2 * width + 0.005) * inwards])
+    hits = shapely.get_coordinates(ray.intersection(ring))
+    if len(hits) == 0:
+        return np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+    return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])

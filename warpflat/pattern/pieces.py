@@ -1,0 +1,383 @@
+"""What a pattern is made of: edges, darts, pieces, seams, a garment in its sizes. Checked at the door."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError, nearest
+
+__all__ = ["DEFAULT_ALLOWANCE", "EDGE_KINDS", "Dart", "Edge", "Garment", "Hole", "Piece", "Seam", "SeamSide"]
+
+#: Allowance [m] of an edge that names none, by its kind.
+DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
+EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
+
+#: Ends of neighbouring edges that are closer than this [m] are one corner.
+SAME_POINT = 1e-6
+#: How far [m] an edge on the fold of the cloth may stray from straight.
+FOLD_STRAIGHT = 5e-4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Edge:
+    """One named stretch of a piece's outline, from corner to corner.
+
+    Attributes:
+        name: unique in its piece; it survives into every file.
+        points: #P by 2 [m], from the first corner to the last, in the direction of the outline (counter-clockwise).
+        kind: "seam", "hem", "fold" (lies on the fold of the cloth), "cut" (raw, no allowance) or "dart" (a dart's leg).
+        allowance: [m]; None for the default of the kind.
+        vertices: #P, the mesh vertex of each point, where the edge comes from a mesh.
+    """
+
+    name: str
+    points: NDArray[np.float64]
+    kind: str = "seam"
+    allowance: float | None = None
+    vertices: NDArray[np.int32] | None = None
+
+    def __post_init__(self) -> None:
+        if self.kind not in EDGE_KINDS:
+            raise InputError(f"edge {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, EDGE_KINDS)}")
+        points = _points(self.points, f"edge {self.name!r}", at_least=2)
+        if float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < SAME_POINT:
+            raise InputError(f"edge {self.name!r} has no length; an edge runs between two different corners")
+        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
+            raise InputError(f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
+        if self.kind == "fold" and self.allowance:
+            raise InputError(f"edge {self.name!r} lies on the fold: its allowance must be 0, not {self.allowance!r} m")
+        object.__setattr__(self, "points", points)
+
+    @property
+    def width(self) -> float:
+        """The allowance [m] that is added to this edge."""
+        return DEFAULT_ALLOWANCE[self.kind] if self.allowance is None else float(self.allowance)
+
+    @property
+    def length(self) -> float:
+        """Length [m] along the points."""
+        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Dart:
+    """A wedge that is sewn shut: two neighbouring edges of kind "dart" that meet in its tip.
+
+    Attributes:
+        name: unique in its piece.
+        left: the edge that runs from the border to the tip (it comes first, counter-clockwise).
+        right: the edge that runs from the tip back to the border.
+        fold_to: the side to which the wedge is pressed, "left" or "right"; None lets the piece decide: downwards for
+            a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
+        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts.
+    """
+
+    name: str
+    left: str
+    right: str
+    fold_to: str | None = None
+    cut: bool = False
+
+    def __post_init__(self) -> None:
+        if self.fold_to not in (None, "left", "right"):
+            raise InputError(f"dart {self.name!r}: fold_to is {self.fold_to!r}; it must be 'left', 'right' or None")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Hole:
+    """A closed line inside a piece.
+
+    Attributes:
+        name: unique in its piece.
+        points: #P by 2 [m], the first not repeated.
+        kind: "cutout" (cut away) or "dart" (a fish-eye dart: sewn shut, not cut; drill holes at its two ends).
+    """
+
+    name: str
+    points: NDArray[np.float64]
+    kind: str = "cutout"
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("cutout", "dart"):
+            raise InputError(
+                f"hole {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, ('cutout', 'dart'))}"
+            )
+        points = _points(self.points, f"hole {self.name!r}", at_least=3)
+        if np.linalg.norm(points[0] - points[-1]) < SAME_POINT:
+            points = points[:-1]
+        object.__setattr__(self, "points", points)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Piece:
+    """One piece of cloth in one size, flat, in metres.
+
+    Attributes:
+        name, size, fabric: for the label, the files' block names and the grouping of the marker.
+        quantity: how often it is cut; an even number of a piece that is not its own mirror image is cut in pairs.
+        edges: in order, closed and counter-clockwise; an edge of kind "fold" makes it a half on the fold of the cloth.
+        darts: their legs are edges of the outline.
+        internal_lines: #P by 2 [m] by name: feature lines, placement lines; drawn, not cut.
+        grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
+        holes: cutouts and fish-eye darts.
+        paired: False where all copies are cut the same way up, not left and right.
+    """
+
+    name: str
+    size: str = ""
+    fabric: str = ""
+    quantity: int = 1
+    edges: Sequence[Edge]
+    darts: Sequence[Dart] = ()
+    internal_lines: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
+    grain: NDArray[np.float64] | None = None
+    holes: Sequence[Hole] = ()
+    paired: bool = True
+
+    def __post_init__(self) -> None:
+        where = f"piece {self.name!r}" + (f" size {self.size}" if self.size else "")
+        if not self.name:
+            raise InputError("a piece has no name; every piece needs one, files and seams refer to it")
+        if self.quantity < 1:
+            raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
+        object.__setattr__(self, "edges", tuple(self.edges))
+        object.__setattr__(self, "darts", tuple(self.darts))
+        object.__setattr__(self, "holes", tuple(self.holes))
+        lines = {k: _points(v, f"{where}, line {k!r}", at_least=2) for k, v in self.internal_lines.items()}
+        object.__setattr__(self, "internal_lines", lines)
+        if self.grain is not None:
+            grain = _points(self.grain, f"{where}, grain", at_least=2)
+            if len(grain) != 2 or np.linalg.norm(grain[1] - grain[0]) < SAME_POINT:
+                raise InputError(f"{where}: the grain needs two different points, from and to")
+            object.__setattr__(self, "grain", grain)
+        _check_names(self, where)
+        _check_outline(self, where)
+        _check_darts(self, where)
+
+    @property
+    def on_fold(self) -> bool:
+        """True for the half of a symmetric piece."""
+        return any(edge.kind == "fold" for edge in self.edges)
+
+    @property
+    def outline(self) -> NDArray[np.float64]:
+        """#P by 2 [m], the closed outline along all edges, dart legs included, first point not repeated."""
+        return np.concatenate([edge.points[:-1] for edge in self.edges])
+
+    def edge(self, name: str) -> Edge:
+        """The edge of that name; InputError with the nearest name otherwise."""
+        for edge in self.edges:
+            if edge.name == name:
+                return edge
+        raise InputError(f"piece {self.name!r} has no edge {name!r}; {nearest(name, [e.name for e in self.edges])}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamSide:
+    """One stretch of a seam's side: an edge of a piece, walked in the seam's direction.
+
+    Attributes:
+        piece, edge: names.
+        reversed: the seam runs against the edge's own (counter-clockwise) direction.
+    """
+
+    piece: str
+    edge: str
+    reversed: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.piece}.{self.edge}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Seam:
+    """Two sides that are sewn together, each a chain of one or more edges in the same direction.
+
+    Attributes:
+        name: unique in the garment.
+        sides: exactly two, each a sequence of `SeamSide`.
+        ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
+        notches: fractions of the seam's length in (0, 1) that get notches on both sides; None places them by length.
+        double: double notches; None means double where a back takes part and no front does.
+    """
+
+    name: str
+    sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
+    ease: float = 0.0
+    notches: tuple[float, ...] | None = None
+    double: bool | None = None
+
+    def __post_init__(self) -> None:
+        if len(self.sides) != 2 or not all(self.sides):
+            raise InputError(
+                f"seam {self.name!r} has {len(self.sides)} sides; it must have two, each at least one edge"
+            )
+        if not -0.5 < self.ease < 5:
+            raise InputError(f"seam {self.name!r}: ease {self.ease!r}; it must lie between -0.5 and 5 (0.03 is 3 %)")
+        if any(not 0 < f < 1 for f in self.notches or ()):
+            raise InputError(f"seam {self.name!r}: notches {self.notches}; each must be a fraction between 0 and 1")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Garment:
+    """All pieces of a garment in one or more sizes, and the seams between them (the same in every size).
+
+    Attributes:
+        name: for labels and files.
+        pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
+        seams: by name of piece and edge.
+        sample_size: the size that files of one size show; None takes the middle one.
+    """
+
+    name: str
+    pieces: Mapping[str, Sequence[Piece]]
+    seams: Sequence[Seam] = ()
+    sample_size: str | None = None
+
+    def __post_init__(self) -> None:
+        if not self.pieces or not all(self.pieces.values()):
+            raise InputError(f"garment {self.name!r} has no pieces; every size needs at least one")
+        names: set[str] | None = None
+        for size, pieces in self.pieces.items():
+            here = [piece.name for piece in pieces]
+            doubled = sorted({n for n in here if here.count(n) > 1})
+            if doubled:
+                raise InputError(
+                    f"garment {self.name!r}, size {size}: piece {doubled[0]!r} occurs twice; names are unique"
+                )
+            if names is not None and set(here) != names:
+                odd = sorted(set(here) ^ names)[0]
+                raise InputError(
+                    f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
+                )
+            names = set(here)
+            for piece in pieces:
+                if piece.size != size:
+                    raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
+            self._check_seams(size)
+        if self.sample_size is not None and self.sample_size not in self.pieces:
+            raise InputError(
+                f"garment {self.name!r} has no size {self.sample_size!r}; {nearest(self.sample_size, self.pieces)}"
+            )
+        seen = [seam.name for seam in self.seams]
+        if len(set(seen)) < len(seen):
+            raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")
+
+    def _check_seams(self, size: str) -> None:
+        for seam in self.seams:
+            for side in (*seam.sides[0], *seam.sides[1]):
+                try:
+                    edge = self.piece(side.piece, size).edge(side.edge)
+                except InputError as error:
+                    raise InputError(f"seam {seam.name!r}, size {size}: {error}") from None
+                if edge.kind == "fold":
+                    raise InputError(f"seam {seam.name!r}: edge {side} lies on the fold and cannot be sewn")
+
+    @property
+    def sizes(self) -> tuple[str, ...]:
+        """The sizes in their order."""
+        return tuple(self.pieces)
+
+    @property
+    def sample(self) -> str:
+        """The size shown where only one is."""
+        return self.sample_size if self.sample_size is not None else self.sizes[len(self.sizes) // 2]
+
+    def piece(self, name: str, size: str) -> Piece:
+        """The piece of that name and size; InputError with the nearest name otherwise."""
+        if size not in self.pieces:
+            raise InputError(f"garment {self.name!r} has no size {size!r}; {nearest(size, self.pieces)}")
+        for piece in self.pieces[size]:
+            if piece.name == name:
+                return piece
+        raise InputError(f"no piece {name!r} in {self.name!r}; {nearest(name, [p.name for p in self.pieces[size]])}")
+
+    def __iter__(self) -> Iterator[Piece]:
+        for pieces in self.pieces.values():
+            yield from pieces
+
+
+def _points(points: ArrayLike, where: str, *, at_least: int) -> NDArray[np.float64]:
+    array = np.asarray(points, dtype=np.float64)
+    if array.ndim != 2 or array.shape[1] != 2 or len(array) < at_least:
+        raise InputError(f"{where}: points have shape {array.shape}; they must be #P by 2 with #P at least {at_least}")
+    if not np.isfinite(array).all():
+        row = int(np.flatnonzero(~np.isfinite(array).all(axis=1))[0])
+        raise InputError(f"{where}: point {row} is not finite; all coordinates are metres")
+    return array
+
+
+def _check_names(piece: Piece, where: str) -> None:
+    for what, names in (
+        ("edge", [e.name for e in piece.edges]),
+        ("dart", [d.name for d in piece.darts]),
+        ("hole", [h.name for h in piece.holes]),
+    ):
+        doubled = sorted({n for n in names if names.count(n) > 1})
+        if doubled:
+            raise InputError(f"{where}: {what} {doubled[0]!r} occurs twice; names are unique in a piece")
+
+
+def _check_outline(piece: Piece, where: str) -> None:
+    import shapely
+
+    if not piece.edges:
+        raise InputError(f"{where} has no edges; its outline needs at least one")
+    for edge, follows in zip(piece.edges, [*piece.edges[1:], piece.edges[0]], strict=True):
+        gap = float(np.linalg.norm(edge.points[-1] - follows.points[0]))
+        if gap > SAME_POINT:
+            raise InputError(
+                f"{where}: edge {edge.name!r} ends {gap * 1000:.3f} mm from where {follows.name!r} starts; "
+                "edges follow each other and share their corners"
+            )
+        if edge.kind == "fold":
+            _check_straight(edge, where)
+    outline = piece.outline
+    if len(outline) < 3:
+        raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
+    polygon = shapely.Polygon(outline)
+    if not polygon.is_valid or polygon.area <= 0:
+        raise InputError(f"{where}: the outline crosses itself ({shapely.is_valid_reason(polygon)} [m])")
+    if not polygon.exterior.is_ccw:
+        raise InputError(f"{where}: the outline runs clockwise; list its edges counter-clockwise")
+
+
+def _check_straight(edge: Edge, where: str) -> None:
+    start, end = edge.points[0], edge.points[-1]
+    span = float(np.linalg.norm(end - start))
+    if span < SAME_POINT:
+        raise InputError(f"{where}: fold edge {edge.name!r} is closed; a fold is straight")
+    direction = (end - start) / span
+    offset = edge.points - start
+    stray = float(np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max())
+    if stray > FOLD_STRAIGHT:
+        raise InputError(
+            f"{where}: fold edge {edge.name!r} strays {stray * 1000:.2f} mm from straight; a fold strays at most "
+            f"{FOLD_STRAIGHT * 1000:.1f} mm (constrain it to a line)"
+        )
+
+
+def _check_darts(piece: Piece, where: str) -> None:
+    names = [edge.name for edge in piece.edges]
+    legs = []
+    for dart in piece.darts:
+        for leg in (dart.left, dart.right):
+            if piece.edge(leg).kind != "dart":
+                raise InputError(
+                    f"{where}: dart {dart.name!r} uses edge {leg!r} of kind {piece.edge(leg).kind!r}, not 'dart'"
+                )
+        if names[(names.index(dart.left) + 1) % len(names)] != dart.right:
+            raise InputError(
+                f"{where}: dart {dart.name!r}: edge {dart.right!r} must follow {dart.left!r} (the left leg comes "
+                "first, counter-clockwise, and ends in the tip)"
+            )
+        legs += [dart.left, dart.right]
+    for edge in piece.edges:
+        if edge.kind == "dart" and legs.count(edge.name) != 1:
+            raise InputError(
+                f"{where}: edge {edge.name!r} is of kind 'dart' but belongs to {legs.count(edge.name)} darts, not 1"
+            )
