@@ -19,7 +19,7 @@ from warpflat.surface.geodesic import signed_distance_and_station
 from warpflat.surface.lines import line_between, line_on_plane
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import border_loops, half_edges, triangulate
-from warpflat.untangle import untangle
+from warpflat.surface.untangle import untangle
 
 __all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmonic_layout", "profile_layout"]
 
@@ -107,8 +107,8 @@ def develop(surface: Surface, datum: IntArray) -> Development:
             return Development(positions=positions, method=method, notes=tuple(notes))
         notes.append(f"the {method} development mirrors or crushes {folded:,} of {len(surface.faces):,} faces")
         if folded <= _FEW * len(surface.faces):
-            mended = untangle(cells, positions, least=_LEAST_AREA)
-            if mended is not None:
+            mended, left = untangle(surface, positions, least_area=_LEAST_AREA)
+            if left == 0 and not _winds_twice(cells, mended):
                 notes.append("they were turned back, with a few faces around them")
                 return Development(positions=mended, method=method, mended=True, notes=tuple(notes))
     _refuse_tubes(surface)
@@ -120,6 +120,22 @@ def develop(surface: Surface, datum: IntArray) -> Development:
 def _mirrored(cells: CellArrays, positions: FloatArray) -> int:
     body = cells.area / cells.weight
     return len(np.unique(cells.face[signed_cell_areas(cells.corner, positions) <= _LEAST_AREA * body]))
+
+
+def _winds_twice(cells: CellArrays, positions: FloatArray) -> bool:
+    """Whether the faces go around some inner vertex more than once, or around a border vertex by more than a full turn.
+
+    Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
+    """
+    p = positions[cells.corner]
+    whole = cells.weight == 1.0
+    turn = np.zeros(len(positions))
+    for k in range(3):
+        u, v = p[:, (k + 1) % 3] - p[:, k], p[:, (k + 2) % 3] - p[:, k]
+        angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
+        counts = whole | (k == 1)
+        turn += np.bincount(cells.corner[counts, k], angle[counts], minlength=len(turn))
+    return bool((turn > 2 * np.pi + 1e-6).any())
 
 
 def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:

@@ -24,6 +24,7 @@ from warpflat.surface.topology import (
     triangulate,
     unfold_quad_diagonals,
 )
+from warpflat.surface.untangle import untangle
 
 __all__ = [
     "Surface",
@@ -52,5 +53,6 @@ __all__ = [
     "signed_distance_and_station",
     "triangulate",
     "unfold_quad_diagonals",
+    "untangle",
     "with_lines",
 ]
