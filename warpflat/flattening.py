@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
@@ -22,6 +22,9 @@ from warpflat.network import SpringNetwork
 from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, relax
 from warpflat.strain import WornStrain, layout_errors, worn_strain
 from warpflat.surface import Surface, line_from_indices, read_surface
+
+if TYPE_CHECKING:
+    from warpflat.export import PicturePiece
 
 __all__ = ["Flattening", "Progress", "Stage", "flatten"]
 
@@ -186,12 +189,11 @@ class Flattening:
         Raises:
             InputError: the folder cannot be written.
         """
-        from warpflat.export import FrameWriter, PicturePiece, prepare_folder, write_json, write_obj, write_picture
+        from warpflat.export import FrameWriter, prepare_folder, write_json, write_picture
 
         to = prepare_folder(folder)
         name = self.surface.name
-        files = [f"{name}.obj"]
-        write_obj(to / files[0], self.surface, self.positions)
+        files = [self.write_obj(to)]
         if frames:
             files.append("frames.usdc")
             with FrameWriter(to / files[-1]) as writer:
@@ -201,30 +203,36 @@ class Flattening:
                 writer.write(name, positions=self.positions, face_energy_density=self.face_energy_density)
         if picture:
             files.append("picture.png")
-            lines = (
-                self.surface.lines
-                if self.datum_name in self.surface.lines
-                else {**self.surface.lines, self.datum_name: self.datum}
-            )
-            write_picture(
-                to / files[-1],
-                [
-                    PicturePiece(
-                        name=name,
-                        surface=self.surface,
-                        faces=self.faces,
-                        positions=self.positions,
-                        face_energy_density=self.face_energy_density,
-                        lines=lines,
-                        surface_lines=lines,
-                        datum=self.datum_name,
-                        captions=self.captions(),
-                    )
-                ],
-            )
+            write_picture(to / files[-1], [self.picture_piece()])
         files.append("metrics.json")
         write_json(to / files[-1], self.metrics())
         return files
+
+    def write_obj(self, folder: Path) -> str:
+        """Write `NAME.obj` and return its name."""
+        from warpflat.export import write_obj
+
+        file = f"{self.surface.name}.obj"
+        write_obj(folder / file, self.surface, self.positions)
+        return file
+
+    def picture_piece(self) -> PicturePiece:
+        """Its row in a picture."""
+        from warpflat.export import PicturePiece
+
+        lines = dict(self.surface.lines)
+        lines.setdefault(self.datum_name, self.datum)
+        return PicturePiece(
+            name=self.surface.name,
+            surface=self.surface,
+            faces=self.faces,
+            positions=self.positions,
+            face_energy_density=self.face_energy_density,
+            lines=lines,
+            surface_lines=lines,
+            datum=self.datum_name,
+            captions=self.captions(),
+        )
 
     def captions(self) -> dict[str, str]:
         """The key measures as short texts."""
