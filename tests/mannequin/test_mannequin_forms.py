@@ -1,0 +1,190 @@
+"""Forms: pieces, seams, ease and blending."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpflat.errors import InputError
+from warpflat.mannequin import Mannequin, form_from_mapping, form_names
+from warpflat.mannequin.blend import blended
+from warpflat.mannequin.checks import self_intersections
+from warpflat.mannequin.profiles import convex_girth
+
+
+@pytest.fixture(scope="module")
+def body() -> Mannequin:
+    return Mannequin.from_size("EU 38", resolution_mm=15)
+
+
+@pytest.mark.parametrize("name", form_names())
+@pytest.mark.parametrize("half", [False, True])
+def test_shipped_forms_are_disks_with_matching_seams(body: Mannequin, name: str, half: bool) -> None:
+    form = body.form(name, half=half)
+    for key, piece in form.pieces.items():
+        faces, vertices = piece.surface.faces, piece.surface.vertices
+        ends = np.sort(np.stack([faces, np.roll(faces, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+        assert len(vertices) - len(np.unique(ends, axis=0)) + len(faces) == 1, key
+        assert len(self_intersections(vertices, faces)) == 0, key
+        loop = np.concatenate([ids[:-1] for ids in piece.edges.values()])
+        assert len(np.unique(loop)) == len(loop)
+        assert piece.datum in piece.surface.lines
+        assert piece.fold is None or piece.fold in piece.edges
+        assert np.array_equal(piece.surface.vertices, form.vertices[piece.grid_vertices])
+    assert form.seams
+    for seam in form.seams:
+        a, b = (form.pieces[p].surface.vertices[v] for p, v in zip(seam.pieces, seam.vertices, strict=True))
+        assert len(a) > 2
+        assert np.array_equal(a, b)
+
+
+def test_basic_block(body: Mannequin) -> None:
+    whole = body.form("basic_block")
+    assert list(whole.pieces) == ["front_bodice", "back_bodice", "front_skirt", "back_skirt"]
+    names = {(s.edges[0], s.pieces) for s in whole.seams}
+    assert ("shoulder left", ("front_bodice", "back_bodice")) in names
+    assert ("waist", ("front_bodice", "front_skirt")) in names
+    assert ("side right", ("front_skirt", "back_skirt")) in names
+    assert set(whole.pieces["front_bodice"].edges) == {
+        "waist", "side left", "armhole left", "shoulder left", "neck", "shoulder right", "armhole right", "side right",
+    }  # fmt: skip
+    assert {"centre front", "princess front left", "bust", "underbust", "chest front"} <= set(
+        whole.pieces["front_bodice"].surface.lines
+    )
+    half = body.form("basic_block", half=True)
+    assert half.pieces["front_bodice"].fold == "centre front"
+    assert half.pieces["back_skirt"].fold == "centre back"
+    assert (half.pieces["front_bodice"].surface.vertices[:, 0] > -1e-6).all()
+    # The skirt hangs straight from the hip.
+    hip, knee = (convex_girth(whole.vertices[body.layout.lines[k]]) for k in ("hip", "knee"))
+    assert knee == pytest.approx(hip, rel=1e-6)
+
+
+def test_princess_dress_has_panels_and_shirt_has_sleeves(body: Mannequin) -> None:
+    dress = body.form("princess_dress")
+    assert len(dress.pieces) == 6
+    assert sum(s.name.startswith("princess") for s in dress.seams) == 4
+    shirt = body.form("tshirt")
+    under = [s for s in shirt.seams if s.pieces == ("sleeve_left", "sleeve_left")]
+    assert len(under) == 1
+    assert under[0].edges == ("underarm left", "underarm left 2")
+    assert sum("armhole" in s.name for s in shirt.seams) == 4
+    assert set(body.form("tshirt", half=True).pieces) == {"front", "back", "sleeve_left"}
+
+
+def test_ease_is_what_the_tape_reads_more(body: Mannequin) -> None:
+    form = form_from_mapping(
+        "loose", {"like": "bodice", "profiles": {"bust": {"ease_cm": 8.0}, "waist": {"ease_cm": 5.0, "scale": 1.1}}}
+    )
+    made = body.form(form)
+    girth = {k: convex_girth(made.vertices[body.layout.lines[k]]) for k in ("bust", "waist", "underbust")}
+    assert girth["bust"] == pytest.approx(0.96, abs=1e-6)
+    assert girth["waist"] == pytest.approx(0.72 * 1.1 + 0.05, abs=1e-6)
+    assert girth["underbust"] == pytest.approx(body.levels()["underbust"].girth, abs=1e-9)
+    # Neckline and shoulder seams hold the garment: they stay.
+    for line in ("neck", "shoulder left"):
+        assert np.array_equal(made.vertices[body.layout.lines[line]], body.line(line))
+    # The chest follows the eased bust smoothly.
+    moved = np.linalg.norm(made.vertices - body.vertices, axis=1)
+    column = body.layout.lines["centre front"][body.layout.level_row["bust"] :]
+    assert (np.abs(np.diff(moved[column])) < 0.006).all()
+
+
+def test_offset_grows_girth_by_two_pi(body: Mannequin) -> None:
+    made = body.form(form_from_mapping("off", {"like": "skirt", "profiles": {"hip": {"offset_cm": 2.0}}}))
+    assert convex_girth(made.vertices[body.layout.lines["hip"]]) == pytest.approx(0.96 + 2 * np.pi * 0.02, abs=1e-6)
+
+
+def test_a_line_is_the_hip_blown_up(body: Mannequin) -> None:
+    made = body.form("a_line_skirt")
+    hip = body.line("hip")[:-1]
+    knee = made.vertices[body.layout.lines["knee"]][:-1]
+    middle = 0.5 * (hip.min(axis=0) + hip.max(axis=0))
+    assert np.allclose((knee - middle)[:, [0, 2]], 1.35 * (hip - middle)[:, [0, 2]], atol=1e-9)
+    # Ruled: every column between hip and knee is straight.
+    rows = made.vertices[body.layout.rings[body.layout.level_row["knee"] : body.layout.level_row["hip"] + 1]]
+    way = rows[-1] - rows[0]
+    off = np.cross(rows - rows[0], way / np.linalg.norm(way, axis=1, keepdims=True))
+    assert np.abs(off).max() < 1e-9
+
+
+def test_bridging_removes_hollows(body: Mannequin) -> None:
+    made = body.form(form_from_mapping("flat", {"like": "bodice", "profiles": {"bust": {"bridge": True}}}))
+    row = made.vertices[body.layout.lines["bust"]][:, [0, 2]]
+    length = np.linalg.norm(np.diff(row, axis=0), axis=1).sum()
+    assert length == pytest.approx(convex_girth(row[:-1]), rel=1e-9)
+    assert np.linalg.norm(np.diff(body.line("bust"), axis=0), axis=1).sum() > length + 1e-4
+
+
+def test_weighted_blend_lies_between(body: Mannequin) -> None:
+    a, b = body.form("skirt"), body.form("a_line_skirt")
+    mixed = body.form(form_from_mapping("mix", {"like": "skirt", "blend": {"with": "a_line_skirt", "weight": 0.25}}))
+    assert np.allclose(mixed.vertices, 0.75 * a.vertices + 0.25 * b.vertices)
+    assert list(mixed.pieces) == list(a.pieces)
+    with pytest.raises(InputError, match="one resolution"):
+        blended(a.vertices, b.vertices[:-1], 0.5)
+
+
+def test_sizes_of_one_form_correspond(body: Mannequin) -> None:
+    other = Mannequin.from_size("EU 44", resolution_mm=15).form("dress")
+    mine = body.form("dress")
+    for name, piece in mine.pieces.items():
+        assert np.array_equal(piece.surface.faces, other.pieces[name].surface.faces)
+        assert {k: v.tolist() for k, v in piece.edges.items()} == {
+            k: v.tolist() for k, v in other.pieces[name].edges.items()
+        }
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"peices": {}}, "did you mean 'pieces'"),
+        ({}, "pieces is missing"),
+        ({"pieces": {"a": {"brick": ["x"]}}}, "did you mean 'bricks'"),
+        ({"pieces": {"a": {"bricks": []}}}, "bricks is empty"),
+        ({"like": "skirt", "profiles": {"hip": {"ease": 2}}}, "did you mean 'ease_cm'"),
+        ({"like": "skirt", "profiles": {"hip": {"scale": 40}}}, r"from 0\.5 to 6"),
+        ({"like": "skirt", "profiles": {"hip": {"scale": "big"}}}, "a number"),
+        ({"like": "skirt", "profiles": {"hip": {"bridge": 1}}}, "true or false"),
+        ({"like": "skirt", "blend": {"weight": 0.5}}, "with is missing"),
+        ({"like": "skrit"}, "did you mean 'skirt'"),
+        ({"like": "skirt", "ruled": [["hip"]]}, "pair of levels"),
+        ({"pieces": "front"}, "a table is needed"),
+    ],
+)
+def test_scene_mistakes_are_named(data: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        form_from_mapping("mine", data)
+
+
+@pytest.mark.parametrize(
+    ("data", "words"),
+    [
+        ({"like": "skirt", "profiles": {"neck": {"ease_cm": 2}}}, "cannot be adjusted"),
+        ({"like": "skirt", "profiles": {"knee": {"like": "biceps"}}}, "level of the same part"),
+        ({"like": "skirt", "profiles": {"knee": {"raise_cm": 40}}}, "less than 1 cm above"),
+        ({"like": "skirt", "ruled": [["hip", "neck"]]}, "ruled"),
+        ({"pieces": {"a": {"bricks": ["waist-hip/*"]}}}, "not one disk"),
+        (
+            {"pieces": {"a": {"bricks": ["waist-abdomen/front-left-centre", "hip-thigh/back-left-side"]}}},
+            "not one disk",
+        ),
+        ({"pieces": {"a": {"bricks": ["waist-hip/front-*"]}, "b": {"bricks": ["waist-hip/*-left-*"]}}}, "two pieces"),
+        ({"pieces": {"a": {"bricks": ["waist-hip/front-*"], "datum": "center front"}}}, "did you mean 'centre front'"),
+        ({"pieces": {"a": {"bricks": ["waist-hip/front-*"], "datum": "centre back"}}}, "does not run through it"),
+    ],
+)
+def test_forms_that_cannot_be_made(body: Mannequin, data: dict[str, object], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        body.form(form_from_mapping("mine", data))
+    with pytest.raises(InputError, match="did you mean 'skirt'"):
+        body.form("skrt")
+
+
+def test_tube_can_be_opened_along_a_line(body: Mannequin) -> None:
+    form = form_from_mapping(
+        "tube", {"pieces": {"skirt": {"bricks": ["waist-knee/*"], "datum": "centre front", "open": ["centre back"]}}}
+    )
+    made = body.form(form)
+    assert set(made.pieces["skirt"].edges) == {"waist", "knee", "centre back", "centre back 2"}
+    assert [s.pieces for s in made.seams] == [("skirt", "skirt")]

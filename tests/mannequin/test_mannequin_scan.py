@@ -1,0 +1,259 @@
+"""Mannequins on body scans: two real bodies, changed ones, and things that are no bodies."""
+
+from __future__ import annotations
+
+import functools
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpflat.errors import InputError
+from warpflat.mannequin import Mannequin, ScanOptions
+from warpflat.mannequin.checks import self_intersections
+from warpflat.mannequin.closest import Closest
+
+needs_bodies = pytest.mark.skipif(
+    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
+)
+
+# Measured on the meshes: height [m], length of the trunk's section [m].
+KNOWN = {
+    "female": {"waist": (1.017, 0.655), "bust": (1.176, 0.851), "hip": (0.858, 0.873)},
+    "male": {"waist": (1.073, 0.748), "bust": (1.280, 0.974)},
+}
+_READ: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+
+
+def scan(sex: str) -> tuple[np.ndarray, np.ndarray]:
+    if sex not in _READ:
+        rows = (Path(os.environ["WARPFLAT_DATA"]) / f"body_{sex}.obj").read_text().splitlines()
+        points = np.array([[float(x) for x in r.split()[1:4]] for r in rows if r.startswith("v ")])
+        faces = [[int(x.split("/")[0]) - 1 for x in r.split()[1:]] for r in rows if r.startswith("f ")]
+        _READ[sex] = points, np.array([[*f, -1][:4] for f in faces])
+    return _READ[sex]
+
+
+def on_scan(points: np.ndarray, faces: np.ndarray, resolution_mm: float = 20.0, **options: object) -> Mannequin:
+    return Mannequin.from_scan(points, faces, options=ScanOptions(**options), resolution_mm=resolution_mm)
+
+
+@functools.cache
+def _plain(sex: str) -> Mannequin:
+    return on_scan(*scan(sex))
+
+
+def closest(points: np.ndarray, faces: np.ndarray) -> Closest:
+    return Closest(points, np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]]).astype(np.int64))
+
+
+@needs_bodies
+@pytest.mark.parametrize("sex", list(KNOWN))
+def test_levels_are_where_the_body_has_them(sex: str) -> None:
+    body = _plain(sex)
+    levels = body.levels()
+    for level, (height, girth) in KNOWN[sex].items():
+        assert abs(levels[level].height - height) < 0.010, level
+        section = levels[level].section
+        assert section is not None
+        assert abs(section - girth) < 0.005, level
+        # The tape bridges hollows, so it reads no more than the section, and little less.
+        assert 0.97 * section < levels[level].girth <= section + 1e-6
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+@needs_bodies
+@pytest.mark.parametrize("sex", list(KNOWN))
+def test_mannequin_lies_on_the_scan(sex: str) -> None:
+    from scipy.spatial import ConvexHull
+
+    points, faces = scan(sex)
+    body = on_scan(points, faces, 10.0)
+    layout = body.layout
+    surface = closest(points, faces)
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    # Rows against the hull of the scan's own section at their height.
+    worst: list[float] = []
+    for row in layout.rings[layout.level_row["hip"] : layout.level_row["bust"] + 1 : 4]:
+        ring = body.vertices[row]
+        height = float(ring[:, 1].mean())
+        d = points[:, 1] - height
+        cut = []
+        for a, b in ((0, 1), (1, 2), (2, 0)):
+            i, j = triangles[:, a], triangles[:, b]
+            cross = (d[i] > 0) != (d[j] > 0)
+            t = (d[i] / np.where(d[i] == d[j], 1.0, d[i] - d[j]))[cross, None]
+            cut.append((1 - t) * points[i[cross]] + t * points[j[cross]])
+        flat = np.concatenate(cut)[:, [0, 2]]
+        flat = flat[np.abs(flat[:, 0]) < np.abs(ring[:, 0]).max() + 0.012]
+        hull = flat[ConvexHull(flat).vertices]
+        edges = np.roll(hull, -1, axis=0) - hull
+        t = np.clip(np.einsum("pnd,nd->pn", ring[:, None, [0, 2]] - hull, edges) / (edges**2).sum(axis=1), 0.0, 1.0)
+        away = np.linalg.norm(ring[:, None, [0, 2]] - hull - t[..., None] * edges, axis=2).min(axis=1)
+        worst.append(float(away.mean()))
+    assert max(worst) < 0.005
+    assert float(np.mean(worst)) < 0.003
+    sheet = np.unique(
+        np.concatenate([layout.front.ravel(), layout.back.ravel(), *[y.ravel() for y in layout.yokes.values()]])
+    )
+    assert surface(body.vertices[sheet])[2].mean() < 0.005
+
+
+def changed(points: np.ndarray, kind: str) -> np.ndarray:
+    v = points.copy()
+    size = np.ptp(v[:, 1])
+    y = v[:, 1] / size
+    middle = 0.05
+    trunk = np.abs(v[:, 0]) < 0.15 * size
+    if kind == "belly":
+        ahead = (v[:, 2] > middle) & trunk
+        v[ahead, 2] = middle + (v[ahead, 2] - middle) * (1 + np.exp(-0.5 * ((y[ahead] - 0.6) / 0.07) ** 2))
+        v[trunk, 0] *= 1 + 0.3 * np.exp(-0.5 * ((y[trunk] - 0.6) / 0.08) ** 2)
+    elif kind == "broad":
+        v *= [1.2, 1.0, 1.3]
+    elif kind == "slim":
+        v *= [0.88, 1.0, 0.85]
+    elif kind == "stooped":
+        t = np.clip((y - 0.65) / 0.35, 0.0, 1.0)
+        bend = np.radians(18.0) * t**1.3
+        over = v[:, 1] - 0.65 * size
+        v[:, 2] += np.where(t > 0, over * np.sin(bend) * 0.5, 0.0)
+        v[:, 1] = np.where(t > 0, 0.65 * size + over * np.cos(0.7 * bend), v[:, 1])
+    elif kind == "tall":
+        v *= 1.2
+    elif kind == "noisy":
+        v += np.random.default_rng(0).normal(0.0, 0.002, v.shape)
+    return v
+
+
+OTHERS = {"female": ("belly", "broad", "stooped", "noisy"), "male": ("belly", "slim", "tall")}
+
+
+@needs_bodies
+@pytest.mark.parametrize(("sex", "kind"), [(sex, kind) for sex, kinds in OTHERS.items() for kind in kinds])
+def test_other_bodies(sex: str, kind: str) -> None:
+    points, faces = scan(sex)
+    plain = _plain(sex).levels()
+    body = on_scan(changed(points, kind), faces)
+    levels = body.levels()
+    size = 1.2 if kind == "tall" else 1.0
+    for level in ("bust", "waist", "hip"):
+        assert abs(levels[level].height - size * plain[level].height) < 0.02, level
+    if kind == "tall":
+        assert levels["waist"].girth == pytest.approx(1.2 * plain["waist"].girth, rel=0.005)
+    if kind == "belly":
+        assert levels["waist"].girth > 1.2 * plain["waist"].girth
+        assert levels["abdomen"].girth > levels["waist"].girth
+    if kind == "slim":
+        assert 0.84 < levels["bust"].girth / plain["bust"].girth < 0.89
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+@needs_bodies
+def test_units_and_poses_are_recognised() -> None:
+    points, faces = scan("female")
+    plain = _plain("female")
+    c, s = np.cos(0.6), np.sin(0.6)
+    poses = {
+        "centimetres": (100.0 * points, "unit was told"),
+        "lying on its back, in inches": (points[:, [0, 2, 1]] * [1.0, 1.0, -1.0] / 0.0254, "head was found towards -z"),
+        "z up": (points[:, [0, 2, 1]] * [1.0, -1.0, 1.0], "head was found towards +z"),
+        "facing -z": (points * [-1.0, 1.0, -1.0], "found to face"),
+        "turned": (points @ np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]), "found to face"),
+    }
+    for name, (moved, words) in poses.items():
+        body = on_scan(moved, faces)
+        assert any(words in note for note in body.notes), name
+        away = np.linalg.norm(body.vertices - plain.vertices, axis=1)
+        assert away.mean() < 0.0001, name
+        assert away.max() < 0.001, name
+
+
+@needs_bodies
+def test_holes_at_hands_and_feet() -> None:
+    points, faces = scan("female")
+    middle = points[faces[:, :3]].mean(axis=1)
+    kept = faces[(middle[:, 1] > 0.03) & (np.abs(middle[:, 0]) < 0.44)]
+    assert len(kept) < len(faces) - 500
+    body, plain = on_scan(points, kept), _plain("female")
+    for level in ("bust", "waist", "hip"):
+        assert abs(body.levels()[level].girth - plain.levels()[level].girth) < 0.004
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+@needs_bodies
+def test_landmarks_and_mirroring() -> None:
+    points, faces = scan("female")
+    body = on_scan(points, faces, landmarks={"waist": 1.05})
+    assert body.levels()["waist"].height == pytest.approx(1.05)
+    lopsided = points + np.outer(
+        0.02 * np.exp(-0.5 * ((points[:, 1] - 1.1) / 0.1) ** 2) * (points[:, 0] > 0.05), [1, 0, 0]
+    )
+    even = on_scan(lopsided, faces, mirror=True)
+    assert np.abs(even.vertices[even.layout.mirror] * [-1, 1, 1] - even.vertices).max() < 1e-9
+    with pytest.raises(InputError, match="does not lie above"):
+        on_scan(points, faces, landmarks={"waist": 0.6})
+
+
+@needs_bodies
+@pytest.mark.parametrize(
+    ("options", "factor", "words"),
+    [
+        ({}, 17.3, "a body's height in none of"),
+        ({"unit": "cm"}, 1.0, "tall if its unit is cm"),
+        ({"facing": "+x"}, 1.0, "does not face"),
+        ({"up": "+x"}, 1.0, "with the given up axis no two separate legs"),
+    ],
+)
+def test_bodies_that_are_refused(options: dict[str, str], factor: float, words: str) -> None:
+    points, faces = scan("female")
+    with pytest.raises(InputError, match=words):
+        on_scan(points * factor, faces, **options)
+
+
+def _box(size: tuple[float, float, float], at: tuple[float, float, float]) -> tuple[np.ndarray, np.ndarray]:
+    import trimesh
+
+    box = trimesh.creation.box(size, trimesh.transformations.translation_matrix(at)).subdivide().subdivide()
+    return np.asarray(box.vertices), np.asarray(box.faces)
+
+
+def _joined(parts: list[tuple[np.ndarray, np.ndarray]]) -> tuple[np.ndarray, np.ndarray]:
+    starts = np.cumsum([0, *[len(p) for p, _ in parts]])
+    return np.concatenate([p for p, _ in parts]), np.concatenate(
+        [f + s for (_, f), s in zip(parts, starts, strict=False)]
+    )
+
+
+def test_no_bodies_are_refused() -> None:
+    legs = [_box((0.05, 0.7, 0.05), (x, 0.35, z)) for x in (-0.3, 0.3) for z in (-0.3, 0.3)]
+    seat, rest = _box((0.7, 0.06, 0.7), (0.0, 0.73, 0.0)), _box((0.7, 0.8, 0.06), (0.0, 1.16, -0.3))
+    chair = _joined([*legs, seat, rest])
+    table = _joined(
+        [_box((0.05, 1.3, 0.6), (x, 0.65, 0.0)) for x in (-0.5, 0.5)] + [_box((1.2, 0.08, 0.7), (0.0, 1.34, 0.0))]
+    )
+    for thing in (chair, table):
+        with pytest.raises(InputError, match="no two separate legs"):
+            on_scan(*thing)
+
+
+def test_broken_meshes_and_options_are_refused() -> None:
+    points = np.random.default_rng(0).normal(size=(200, 3))
+    faces = np.random.default_rng(1).integers(200, size=(300, 3))
+    with pytest.raises(InputError, match="faces; a body scan has thousands"):
+        on_scan(points, faces[:5])
+    with pytest.raises(InputError, match="there are 200 vertices"):
+        on_scan(points, np.where(faces == 3, 900, faces))
+    with pytest.raises(InputError, match="not finite"):
+        on_scan(np.where(points > 2.0, np.nan, points), faces)
+    with pytest.raises(InputError, match="#V by 3"):
+        on_scan(points[:, :2], faces)
+    with pytest.raises(InputError, match="unit 'ft' is unknown"):
+        on_scan(points, faces, unit="ft")
+    with pytest.raises(InputError, match="is no axis"):
+        on_scan(points, faces, up="y")
+    with pytest.raises(InputError, match="one axis"):
+        on_scan(points, faces, up="+y", facing="-y")
+    with pytest.raises(InputError, match="did you mean 'waist'"):
+        on_scan(points, faces, landmarks={"waste": 1.0})

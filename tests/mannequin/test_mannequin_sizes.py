@@ -1,0 +1,189 @@
+"""Size tables, measurements, and the bodies that are built to them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from warpflat.errors import InputError
+from warpflat.mannequin import Mannequin
+from warpflat.mannequin.checks import self_intersections
+from warpflat.mannequin.layout import make_layout
+from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names
+from warpflat.mannequin.normals import face_normals
+from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth, superellipse_exponent
+
+SIZES = [name for name in size_names() if not name.startswith("UK")]
+GIRTHS = ("bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee", "ankle", "neck")
+
+
+@pytest.fixture(scope="module")
+def bodies() -> dict[str, Mannequin]:
+    return {name: Mannequin.from_size(name, resolution_mm=25) for name in SIZES}
+
+
+def _area(body: Mannequin) -> float:
+    corner = body.vertices[body.layout.faces]
+    return 0.5 * float(np.linalg.norm(np.cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]), axis=1).sum())
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_tape_reads_what_the_table_says(bodies: dict[str, Mannequin], size: str) -> None:
+    wished, levels = measurements_from_size(size), bodies[size].levels()
+    for name in GIRTHS:
+        assert abs(levels[name].girth - wished.lengths[name]) < 0.001, name
+    for name, level in (("shoulder", "shoulder left"), ("chest_width", "chest front"), ("back_width", "chest back")):
+        assert abs(levels[level].girth - wished.lengths[name]) < 0.001, name
+    for name in ("bust", "waist", "hip", "knee"):
+        assert levels[name].height == pytest.approx(wished.heights[name], abs=1e-9)
+    nape = bodies[size].line("centre back")[-1]
+    under = bodies[size].line("side left")[-1]
+    assert nape[1] - under[1] == pytest.approx(wished.heights["nape"] - wished.heights["underarm"], abs=0.001)
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_surface_is_sound(bodies: dict[str, Mannequin], size: str) -> None:
+    body = bodies[size]
+    assert np.isfinite(body.vertices).all()
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    # No quad is folded over its diagonal, so no normal turns against its neighbours'.
+    q = body.vertices[body.layout.faces]
+    first = np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0])
+    second = np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 0])
+    assert (np.einsum("ij,ij->i", first, second) > 0).all()
+    rings = body.layout.rings[: body.layout.level_row["bust"] + 1]
+    trunk = np.isin(body.layout.faces, rings).all(axis=1)
+    middle = q.mean(axis=1)
+    away = middle * [1.0, 0.0, 1.0] - [0.0, 0.0, float(middle[trunk, 2].mean())]
+    assert (np.einsum("ij,ij->i", face_normals(body.vertices, body.layout.faces), away)[trunk] > 0).all()
+
+
+def test_left_and_right_are_mirror_images(bodies: dict[str, Mannequin]) -> None:
+    body = bodies["EU 38"]
+    other = body.vertices[body.layout.mirror] * [-1.0, 1.0, 1.0]
+    assert np.abs(other - body.vertices).max() < 1e-5
+
+
+@pytest.mark.parametrize("table", ["EU", "US", "JIS", "men"])
+def test_area_and_girth_grow_with_size(bodies: dict[str, Mannequin], table: str) -> None:
+    row = [bodies[name] for name in SIZES if name.startswith(table + " ")]
+    areas = [_area(body) for body in row]
+    assert np.all(np.diff(areas) > 0.005)
+    for level in ("bust", "waist", "hip", "neck", "armhole left"):
+        assert np.all(np.diff([body.levels()[level].girth for body in row]) > 0.0), level
+
+
+def test_sizes_correspond_vertex_by_vertex(bodies: dict[str, Mannequin]) -> None:
+    small, large = bodies["EU 36"], bodies["men 56"]
+    assert np.array_equal(small.layout.faces, large.layout.faces)
+    assert list(small.layout.bricks) == list(large.layout.bricks)
+    # A graded nest: halfway between two sizes lies a body, not a tangle.
+    q = (0.5 * (small.vertices + large.vertices))[small.layout.faces]
+    assert (np.linalg.norm(np.cross(q[:, 2] - q[:, 0], q[:, 3] - q[:, 1]), axis=1) > 0).all()
+
+
+def test_dress_form_not_vase(bodies: dict[str, Mannequin]) -> None:
+    body = bodies["EU 38"]
+    front, back = body.line("centre front"), body.line("centre back")
+    princess = body.line("princess front left")
+    row = body.layout.level_row
+    # Bust points stand ahead of the breastbone and of the ribs below; the seat behind the small of the back.
+    assert princess[row["bust"], 2] > front[row["bust"], 2] + 0.004
+    assert princess[row["bust"], 2] > princess[row["underbust"], 2] + 0.02
+    assert back[row["waist"], 2] > back[row["hip"], 2] + 0.02
+    # The blades stand out behind the small of the back, on the centre line and more so beside it.
+    blade = body.line("princess back left")
+    assert back[row["waist"], 2] > back[row["chest"], 2] + 0.005
+    assert blade[row["waist"], 2] > blade[row["chest"], 2] + 0.005
+    # Depth and width of the waist are a body's, not a pipe's.
+    waist = body.line("waist")
+    assert 0.70 < np.ptp(waist[:, 2]) / np.ptp(waist[:, 0]) < 0.90
+
+
+@pytest.mark.parametrize("edge", [8.0, 15.0])
+def test_resolution_keeps_the_body(edge: float, bodies: dict[str, Mannequin]) -> None:
+    fine = Mannequin.from_size("EU 38", resolution_mm=edge)
+    for level in ("bust", "waist", "hip", "neck"):
+        assert fine.levels()[level].girth == pytest.approx(bodies["EU 38"].levels()[level].girth, abs=1e-6)
+    assert _area(fine) == pytest.approx(_area(bodies["EU 38"]), rel=0.01)
+    edges = np.linalg.norm(np.diff(fine.line("waist"), axis=0), axis=1)
+    assert edges.mean() == pytest.approx(edge / 1000.0, rel=0.35)
+
+
+def test_aliases_and_statures() -> None:
+    assert measurements_from_size("UK 10").lengths == measurements_from_size("eu38").lengths
+    tall = measurements_from_size("men 50/188")
+    assert tall.lengths["hip"] == pytest.approx(0.964 + 2 * 0.012)
+    assert tall.heights["nape"] == pytest.approx(1.522 + 2 * 0.054)
+
+
+def test_missing_measurements_are_completed_and_said() -> None:
+    made = measurements_from_values(bust=0.88, waist=0.70)
+    assert made.lengths["waist"] == 0.70
+    assert made.lengths["hip"] == pytest.approx(0.96)
+    assert any(note.startswith("hip = 96.0 cm") for note in made.notes)
+    assert not any(note.startswith("waist") for note in made.notes)
+    body = Mannequin.from_measurements(bust=0.88, waist=0.70, resolution_mm=25)
+    assert body.levels()["waist"].girth == pytest.approx(0.70, abs=1e-6)
+    assert body.notes == made.notes
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ({"waist": 3.0}, r"waist = 3 m: valid range 0\.45 to 1\.8 m"),
+        ({"bust": -0.88}, r"bust = -0\.88 m: valid range"),
+        ({"bust": float("nan")}, "valid range"),
+        ({"bust": 0.60, "waist": 1.30}, r"bust = 0\.6 m does not go with waist = 1\.3 m: valid range 0\.9"),
+        ({"bust": 0.88, "hip": 1.80}, r"hip = 1\.8 m does not go with"),
+        ({"neck": 0.37}, "at least one of bust, waist, hip"),
+        ({"bust": 0.88, "wasit": 0.7}, "did you mean 'waist'"),
+        ({"bust": True}, "a number of metres"),
+    ],
+)
+def test_nonsense_is_refused_with_the_valid_range(given: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        measurements_from_values(**given)
+    assert "\n" not in str(caught.value)
+
+
+def test_unknown_size_and_stature() -> None:
+    with pytest.raises(InputError, match="did you mean 'EU 38'"):
+        Mannequin.from_size("EU 39")
+    with pytest.raises(InputError, match="stature after '/'"):
+        Mannequin.from_size("men 50/tall")
+    with pytest.raises(InputError, match="2 to 40 mm"):
+        make_layout(100.0)
+
+
+def test_odd_but_valid_bodies_are_built() -> None:
+    for given in (
+        {"bust": 1.30, "waist": 1.25, "hip": 1.35},
+        {"bust": 0.74, "waist": 0.56, "hip": 0.80, "stature": 1.5},
+    ):
+        body = Mannequin.from_measurements(resolution_mm=20, **given)
+        for name, value in given.items():
+            if name != "stature":
+                assert body.levels()[name].girth == pytest.approx(value, abs=1e-6)
+        assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+def test_tape_bridges_hollows() -> None:
+    star = np.array([[1.0, 0.0], [0.1, 0.1], [0.0, 1.0], [-1.0, 0.0], [0.0, -1.0]])
+    assert convex_girth(star) == pytest.approx(4 * np.sqrt(2.0))
+    row = np.column_stack([star[:, 0], np.full(5, 0.3), star[:, 1]])
+    assert convex_girth(scale_to_girth(row, 0.5)) == pytest.approx(0.5)
+    with pytest.raises(InputError, match="one line"):
+        convex_girth(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]))
+
+
+def test_superellipse_fills_its_box() -> None:
+    assert superellipse_exponent(np.pi / 4) == pytest.approx(2.0)
+    with pytest.raises(InputError, match=r"0\.6 to 0\.97"):
+        superellipse_exponent(0.99)
+
+
+def test_arc_lengths_close() -> None:
+    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+    assert arc_lengths(square, closed=True)[-1] == 4.0
+    assert arc_lengths(square)[-1] == 3.0

@@ -1,0 +1,247 @@
+"""Blending: a form's surface from the body's, by ease, scale, offset of profiles, or by mixing profiles and forms."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.errors import InputError, nearest
+from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Ids, Layout
+from warpflat.mannequin.profiles import Floats, arc_lengths, convex_girth, scale_to_girth
+from warpflat.mannequin.sheet import sheet_laplacian
+
+__all__ = ["Adjustment", "adjusted_vertices", "blended"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Adjustment:
+    """What is done to one profile, in this order.
+
+    Attributes:
+        like: another profile whose outline is taken, as far as `weight` says.
+        weight: 0 keeps the own outline, 1 takes all of the other's.
+        bridge: hollows are bridged, as cloth hangs from bust point to bust point.
+        scale: blow-up about the profile's middle.
+        offset_cm: distance that the profile moves outward [cm].
+        ease_cm: what a tape around the profile reads more [cm].
+        raise_cm: how far the profile moves up [cm], down if negative.
+    """
+
+    like: str | None = None
+    weight: float = 1.0
+    bridge: bool = False
+    scale: float = 1.0
+    offset_cm: float = 0.0
+    ease_cm: float = 0.0
+    raise_cm: float = 0.0
+
+    @staticmethod
+    def ranges() -> dict[str, tuple[float, float]]:
+        """Least and greatest valid value of every number."""
+        return {
+            "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "ease_cm": (-30.0, 400.0),
+            "raise_cm": (-60.0, 60.0),
+        }  # fmt: skip
+
+
+def blended(first: Floats, second: Floats, weight: float) -> Floats:
+    """The surface between two forms of one layout; `weight` 0 is the first, 1 the second.
+
+    Raises:
+        InputError: if the forms are of different layouts or the weight is not from 0 to 1.
+    """
+    if first.shape != second.shape:
+        raise InputError(f"blend: the forms have {len(first)} and {len(second)} vertices; use one resolution for both")
+    if not 0.0 <= weight <= 1.0:
+        raise InputError(f"blend: weight {weight:g}: valid range 0 to 1")
+    return (1.0 - weight) * first + weight * second
+
+
+def adjusted_vertices(
+    layout: Layout, vertices: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]] = ()
+) -> Floats:
+    """The body's vertices with some profiles moved; what lies between follows smoothly.
+
+    Args:
+        layout: the grid.
+        vertices: #V by 3, the body [m].
+        profiles: what is done, by level: a closed level of the trunk, ``chest``, or an arm level.
+        ruled: pairs of levels (upper, lower) of trunk or arms between which the rows are straight.
+
+    Raises:
+        InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
+    """
+    arm_levels = ARM_LEVELS[1:]
+    known = [*RING_LEVELS, "chest", *arm_levels]
+    for level, change in profiles.items():
+        for name in (level, change.like):
+            if name is not None and name not in known:
+                raise InputError(f"form: profile {name!r} cannot be adjusted: {nearest(name, known)}")
+        if change.like and ((change.like in arm_levels) != (level in arm_levels) or "chest" in (level, change.like)):
+            raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
+    out = vertices.copy()
+    if profiles or ruled:
+        _move_rings(out, layout, vertices, profiles, ruled)
+        _move_sheet(out, layout, vertices, profiles.get("chest"))
+        _move_arms(out, layout, vertices, profiles, ruled)
+        _move_neck(out, layout, vertices)
+    return out
+
+
+def _changed(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
+    """A closed level row, #P by 3, after one adjustment."""
+    new = row.copy()
+    if other is not None:
+        new[:, [0, 2]] += change.weight * (other - row)[:, [0, 2]]
+    if change.bridge:
+        new = _bridged(new)
+    middle = 0.5 * (new.min(axis=0) + new.max(axis=0))
+    new = middle + (new - middle) * np.array([change.scale, 1.0, change.scale])
+    grow = 2.0 * math.pi * change.offset_cm / 100.0 + change.ease_cm / 100.0
+    if grow:
+        girth = convex_girth(new) + grow
+        if girth <= 0.2 * convex_girth(row):
+            raise InputError(f"form: {grow * 100:g} cm of ease leave no girth (profile is {girth * 100:.0f} cm then)")
+        tangent = np.roll(new, -1, axis=0) - np.roll(new, 1, axis=0)
+        normal = np.column_stack([-tangent[:, 2], np.zeros(len(new)), tangent[:, 0]])
+        normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+        outward = np.sign(np.sum(normal * (new - new.mean(axis=0))))
+        new = scale_to_girth(new + outward * normal * grow / (2.0 * math.pi), girth)
+    new[:, 1] += change.raise_cm / 100.0
+    return new
+
+
+def _bridged(row: Floats) -> Floats:
+    """A closed level row with every vertex that lies in a hollow moved to the straight line across it."""
+    from scipy.spatial import ConvexHull
+
+    touch = np.sort(ConvexHull(row[:, [0, 2]]).vertices)
+    s = arc_lengths(row, closed=True)
+    at = np.append(s[touch], s[-1] + s[touch[0]])
+    around = np.vstack([row[touch], row[touch[:1]]])
+    own = np.where(s[:-1] < at[0], s[:-1] + s[-1], s[:-1])
+    return np.column_stack([np.interp(own, at, around[:, i]) for i in range(3)])
+
+
+def _move_rings(
+    out: Floats, layout: Layout, body: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]]
+) -> None:
+    from scipy.interpolate import PchipInterpolator
+
+    rows = np.array([layout.level_row[level] for level in RING_LEVELS])
+    moves = []
+    for level in RING_LEVELS:
+        row = body[layout.rings[layout.level_row[level]]]
+        change = profiles.get(level)
+        other = body[layout.rings[layout.level_row[change.like]]] if change and change.like else None
+        moves.append(_changed(row, other, change) - row if change else np.zeros_like(row))
+    heights = [
+        float(body[layout.rings[r[0]], 1].mean() + m[:, 1].mean()) for r, m in zip(rows[:, None], moves, strict=True)
+    ]
+    for (low, h0), (high, h1) in itertools.pairwise(zip(RING_LEVELS, heights, strict=True)):
+        if h1 - h0 < 0.01:
+            raise InputError(f"form: profile {high} comes to lie less than 1 cm above {low}; lower raise_cm")
+    between = np.arange(rows[0], rows[-1] + 1)
+    ids = layout.rings[between]
+    # Against height, not row number: the spacing of rows changes from one band to the next.
+    y = body[layout.rings[:, 0], 1]
+    out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
+    for pair in ruled:
+        if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
+            continue
+        _rule(out, layout.rings, layout.level_row, pair, RING_LEVELS)
+
+
+def _rule(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str, str], known: Sequence[str]) -> None:
+    for level in pair:
+        if level not in known:
+            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, known)}")
+    a, b = sorted((row_of[pair[0]], row_of[pair[1]]))
+    if a == b:
+        raise InputError(f"form: ruled: {pair[0]} and {pair[1]} are the same level")
+    first, last = out[grid[a]], out[grid[b]]
+    share = (out[grid[a : b + 1], 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
+    out[grid[a : b + 1]] = first + share[:, None, None] * (last - first)
+
+
+def _move_sheet(out: Floats, layout: Layout, body: Floats, chest: Adjustment | None) -> None:
+    """Chest and shoulders follow the bust's rows; neckline and shoulder seams stay."""
+    from scipy import sparse
+    from scipy.sparse.linalg import spsolve
+
+    bust = layout.level_row["bust"]
+    ids, laplacian, local = sheet_laplacian(layout, bust - 3)
+    move = out - body
+    held = np.zeros(len(ids), bool)
+    for line in ("neck", "shoulder left", "shoulder right"):
+        held[local[layout.lines[line]]] = True
+    held[local[layout.rings[bust - 3 : bust + 1].ravel()]] = True
+    if chest is not None:
+        for grid in (layout.front, layout.back):
+            row = grid[0]
+            distance = chest.offset_cm / 100.0 + chest.ease_cm / 200.0 / math.pi
+            normals = _row_normals(body[row])
+            move[row] = distance * normals + (chest.scale - 1.0) * (body[row] - body[row].mean(axis=0))
+            held[local[row]] = True
+    operator = laplacian[~held]
+    unknown, known = operator[:, np.flatnonzero(~held)], operator[:, np.flatnonzero(held)]
+    right = -(known @ move[ids[held]])
+    solved = spsolve((unknown.T @ unknown + 1e-12 * sparse.identity(unknown.shape[1])).tocsc(), unknown.T @ right)
+    out[ids[~held]] = body[ids[~held]] + np.asarray(solved).reshape(-1, 3)
+
+
+def _row_normals(row: Floats) -> Floats:
+    tangent = np.gradient(row, axis=0)
+    normal = np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]])
+    return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+
+
+def _move_arms(
+    out: Floats, layout: Layout, body: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]]
+) -> None:
+    from scipy.interpolate import PchipInterpolator
+
+    for grid in layout.arms.values():
+        moves = [out[grid[0]] - body[grid[0]]]
+        for level in ARM_LEVELS[1:]:
+            row = body[grid[layout.arm_row[level]]]
+            change = profiles.get(level)
+            other = body[grid[layout.arm_row[change.like]]] if change and change.like else None
+            moves.append(_arm_move(row, other, change) if change else np.zeros_like(row))
+        rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
+        out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
+        for pair in ruled:
+            if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
+                _rule_arm(out, grid, layout.arm_row, pair)
+
+
+def _rule_arm(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str, str]) -> None:
+    for level in pair:
+        if level not in row_of:
+            raise InputError(f"form: ruled: arm level {level!r} is unknown: {nearest(level, row_of)}")
+    a, b = sorted((row_of[pair[0]], row_of[pair[1]]))
+    share = (np.arange(a, b + 1) - a) / max(b - a, 1)
+    out[grid[a : b + 1]] = out[grid[a]] + share[:, None, None] * (out[grid[b]] - out[grid[a]])
+
+
+def _arm_move(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
+    """How an arm's closed row moves: in its own plane, about its middle."""
+    middle = row.mean(axis=0)
+    length = arc_lengths(row, closed=True)[-1]
+    shape = row - middle
+    if other is not None:
+        second = other - other.mean(axis=0)
+        shape = (1.0 - change.weight) * shape + change.weight * second
+    factor = change.scale * (1.0 + (2.0 * math.pi * change.offset_cm + change.ease_cm) / 100.0 / max(length, 1e-9))
+    if factor <= 0.2:
+        raise InputError(f"form: an arm profile of {length * 100:.0f} cm cannot shrink to {factor:.0%}")
+    return middle + factor * shape - row
+
+
+def _move_neck(out: Floats, layout: Layout, body: Floats) -> None:
+    share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
+    out[layout.neck] = body[layout.neck] + share * (out[layout.neck[0]] - body[layout.neck[0]])

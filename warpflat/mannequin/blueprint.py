@@ -1,0 +1,94 @@
+"""What a body has to tell before the grid can be laid on it: profiles, the curves about neck and armhole, the arms.
+
+Size tables and scans both answer with a :class:`Blueprint`; one builder lays the same grid on either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+from warpflat.mannequin.profiles import Floats
+
+__all__ = ["ArmCurves", "Blueprint", "Profile", "QuarterCurves"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Profile:
+    """One closed horizontal curve with the places of the vertical lines on it.
+
+    Attributes:
+        curve: #P by 2, (x, z) [m], from centre front over the body's left side, not repeated.
+        centre_front, side_left, centre_back, side_right: arc lengths [m] along the curve.
+        princess: share of each quarter from its centre line to the princess line, by quarter name.
+        girth: what a tape must read around the finished row [m].
+    """
+
+    curve: Floats
+    centre_front: float
+    side_left: float
+    centre_back: float
+    side_right: float
+    princess: Mapping[str, float]
+    girth: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class QuarterCurves:
+    """The curves that bound one quarter of the chest, the shoulder and the neck. All #P by 3 [m].
+
+    Attributes:
+        neckline: from the centre line to the side neck point.
+        bend: share of the neckline at which the yoke row starts.
+        shoulder: from the side neck point to the shoulder point; the same in front and back.
+        armhole: from the shoulder point to the underarm point.
+        notch: share of the armhole at which the across-chest row ends.
+        chest: the across-chest row, from the centre line to the notch.
+        centre: the centre line from the bust level to the neckline.
+    """
+
+    neckline: Floats
+    bend: float
+    shoulder: Floats
+    armhole: Floats
+    notch: float
+    chest: Floats
+    centre: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ArmCurves:
+    """Closed curves around one arm, each from the underarm line forward. All #P by 3 [m].
+
+    Attributes:
+        biceps, elbow, wrist: the curves; the first point is on the underarm line, the opposite one on the overarm line.
+    """
+
+    biceps: Floats
+    elbow: Floats
+    wrist: Floats
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Blueprint:
+    """A body, ready for the grid.
+
+    Attributes:
+        profile: the profile at a height [m] between the ankle and the bust.
+        heights: height [m] of every closed level.
+        quarters: the curves of the four quarters by name.
+        arms: the curves of the two arms, ``left`` and ``right``.
+        neck: what the neck base measures along its curve [m].
+        collar: #P by 3 [m], closed curve at the upper end of the neck, from centre front over the left.
+        attract: for #P by 3 points of chest and shoulder the places [m] on the body to draw them to, or None.
+        mirror: whether the left and the right side are to be averaged.
+    """
+
+    profile: Callable[[float], Profile]
+    heights: Mapping[str, float]
+    quarters: Mapping[str, QuarterCurves]
+    arms: Mapping[str, ArmCurves]
+    neck: float
+    collar: Floats
+    attract: Callable[[Floats], Floats] | None = None
+    mirror: bool = False

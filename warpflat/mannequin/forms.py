@@ -1,0 +1,207 @@
+"""Forms: which bricks make a garment's pieces, and how far the garment stands off the body."""
+
+from __future__ import annotations
+
+import functools
+import importlib.resources
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import TYPE_CHECKING, Any
+
+from warpflat.errors import InputError, nearest
+from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
+from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
+from warpflat.mannequin.profiles import Floats
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.mannequin import Mannequin
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["Form", "FormResult", "PieceRecipe", "form_from_mapping", "form_names", "realise", "shipped_form"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class PieceRecipe:
+    """One piece of a form.
+
+    Attributes:
+        bricks: patterns as ``shoulder-waist/front-*``; the piece is their union.
+        datum: the feature line from which the piece is first developed; it becomes the grain.
+        open: feature lines along which the piece is cut although both sides belong to it, as a sleeve's underarm.
+    """
+
+    bricks: tuple[str, ...]
+    datum: str = ""
+    open: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Form:
+    """A garment on the mannequin.
+
+    Attributes:
+        name: what the form is called.
+        pieces: recipes by piece name.
+        profiles: what is done to the body's profiles, by level.
+        ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
+        blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
+    """
+
+    name: str
+    pieces: Mapping[str, PieceRecipe]
+    profiles: Mapping[str, Adjustment] = field(default_factory=dict)
+    ruled: tuple[tuple[str, str], ...] = ()
+    blend: tuple[Form, float] | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FormResult:
+    """A form on one body.
+
+    Attributes:
+        name: the form's.
+        vertices: the mannequin's vertices moved to the form, #V by 3 [m]; its layout holds for them.
+        pieces: by name; each is one disk.
+        seams: pairs of piece edges that are the same curve in space.
+    """
+
+    name: str
+    vertices: Floats
+    pieces: Mapping[str, FormPiece]
+    seams: tuple[FormSeam, ...]
+
+
+@functools.cache
+def _shipped() -> dict[str, Any]:
+    text = importlib.resources.files("warpflat.data").joinpath("forms.toml").read_text(encoding="utf-8")
+    return tomllib.loads(text)
+
+
+def form_names() -> list[str]:
+    """Names of the forms that ship with the package."""
+    return list(_shipped())
+
+
+def shipped_form(name: str) -> Form:
+    """A form of ``data/forms.toml``.
+
+    Raises:
+        InputError: if there is none of that name.
+    """
+    if name not in _shipped():
+        raise InputError(f"form {name!r} is unknown: {nearest(name, form_names())}")
+    return form_from_mapping(name, _shipped()[name])
+
+
+def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
+    """A form from a scene file's table.
+
+    Args:
+        name: what the form is called.
+        data: keys ``pieces`` (by name: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
+            :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``like``
+            (a shipped form whose pieces and profiles are taken over where this one gives none).
+
+    Raises:
+        InputError: for an unknown key or a value of the wrong kind.
+    """
+    where = f"form {name}"
+    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like"}, where)
+    base = shipped_form(str(data["like"])) if "like" in data else None
+    pieces = dict(base.pieces) if base and "pieces" not in data else {}
+    for piece, recipe in _table(data.get("pieces", {}), f"{where}: pieces").items():
+        _check_keys(_table(recipe, f"{where}: piece {piece}"), {"bricks", "datum", "open"}, f"{where}: piece {piece}")
+        bricks = _strings(recipe.get("bricks"), f"{where}: piece {piece}: bricks")
+        if not bricks:
+            raise InputError(f"{where}: piece {piece}: bricks is empty; name at least one, as waist-hip/front-*")
+        pieces[piece] = PieceRecipe(
+            bricks=bricks, datum=str(recipe.get("datum", "")),
+            open=_strings(recipe.get("open", []), f"{where}: piece {piece}: open"),
+        )  # fmt: skip
+    if not pieces:
+        raise InputError(f"{where}: pieces is missing; give at least one [pieces.NAME] with its bricks")
+    profiles = dict(base.profiles) if base else {}
+    known = {f.name for f in fields(Adjustment)}
+    for level, values in _table(data.get("profiles", {}), f"{where}: profiles").items():
+        _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
+        profiles[level] = _adjustment(values, f"{where}: profile {level}")
+    ruled = list(base.ruled) if base else []
+    for pair in data.get("ruled", []):
+        levels = _strings(pair, f"{where}: ruled")
+        if len(levels) != 2:
+            raise InputError(f"{where}: ruled: each entry is a pair of levels, as ['hip', 'knee']; got {list(levels)}")
+        ruled.append((levels[0], levels[1]))
+    blend = base.blend if base else None
+    if "blend" in data:
+        mix = _table(data["blend"], f"{where}: blend")
+        _check_keys(mix, {"with", "weight"}, f"{where}: blend")
+        if "with" not in mix:
+            raise InputError(f"{where}: blend: with is missing; name a form: {', '.join(form_names())}")
+        weight = _number(mix.get("weight", 0.5), f"{where}: blend: weight", 0.0, 1.0)
+        blend = (shipped_form(str(mix["with"])), weight)
+    return Form(name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend)
+
+
+def realise(mannequin: Mannequin, form: Form, *, half: bool = False) -> FormResult:
+    """A form's surface on a body, cut into its pieces.
+
+    Args:
+        mannequin: the body.
+        form: the garment.
+        half: symmetric pieces as their left half, on the fold.
+
+    Raises:
+        InputError: for an unknown brick, line or level, or a piece that is not one disk.
+    """
+    vertices = _surface(mannequin, form)
+    recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
+    pieces, seams = cut_pieces(mannequin.layout, vertices, recipes, half=half)
+    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=seams)
+
+
+def _surface(mannequin: Mannequin, form: Form) -> Floats:
+    vertices = adjusted_vertices(mannequin.layout, mannequin.vertices, form.profiles, form.ruled)
+    if form.blend is None:
+        return vertices
+    other, weight = form.blend
+    return blended(vertices, _surface(mannequin, other), weight)
+
+
+def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:
+    ranges = Adjustment.ranges()
+    numbers = {k: _number(v, f"{where}: {k}", *ranges[k]) for k, v in values.items() if k in ranges}
+    bridge = values.get("bridge", False)
+    if not isinstance(bridge, bool):
+        raise InputError(f"{where}: bridge = {bridge!r}: true or false is needed")
+    return Adjustment(like=str(values["like"]) if "like" in values else None, bridge=bridge, **numbers)
+
+
+def _number(value: object, where: str, low: float, high: float) -> float:
+    if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
+        raise InputError(f"{where} = {value!r}: a number from {low:g} to {high:g} is needed")
+    return float(value)
+
+
+def _strings(value: object, where: str) -> tuple[str, ...]:
+    if isinstance(value, str):
+        return (value,)
+    if not isinstance(value, (list, tuple)) or not all(isinstance(v, str) for v in value):
+        raise InputError(f"{where} = {value!r}: a list of names is needed")
+    return tuple(value)
+
+
+def _table(value: object, where: str) -> Mapping[str, Any]:
+    if not isinstance(value, Mapping):
+        raise InputError(f"{where} = {value!r}: a table is needed")
+    return value
+
+
+def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:
+    for key in data:
+        if key not in known:
+            raise InputError(f"{where}: key {key!r} is unknown: {nearest(key, known)}")

@@ -1,0 +1,277 @@
+"""The grid of the mannequin: which vertex is where, independent of anybody's size.
+
+Closed rings run from the ankle to the bust and on to the across-chest row, whose ends dip into the armholes. Above it
+the front and the back are separate patches up to the yoke row, which starts at the bend of the neckline; four small
+patches climb from there to the shoulder seams. No corner of the grid is then sharper than about sixty degrees, which a
+single grid from chest to neck and shoulder cannot offer.
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+
+__all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Ids", "Layout", "make_layout"]
+
+Ids = NDArray[np.int32]
+
+#: Closed horizontal levels, bottom up.
+RING_LEVELS = ("ankle", "knee", "thigh", "hip", "abdomen", "waist", "underbust", "bust")
+ARM_LEVELS = ("armhole", "biceps", "elbow", "wrist")
+#: In the order in which a ring runs: from centre front over the body's left to the back.
+QUARTERS = ("front-left", "back-left", "back-right", "front-right")
+
+# Lengths [m] of the grid's strips on a middle size; only they and the resolution decide the counts.
+_COLUMN_LENGTHS = (0.045, 0.045, 0.065, 0.065)
+_RING_GAPS = (0.33, 0.25, 0.10, 0.10, 0.075, 0.10, 0.07)
+_CHEST_GAP, _YOKE_GAP, _SHOULDER_GAP, _COLLAR_GAP = 0.055, 0.100, 0.045, 0.045
+_ARM_GAPS = (0.10, 0.16, 0.25)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layout:
+    """Vertex indices of every strip of the grid. Rows run upward (outward on arms), columns from the front leftward.
+
+    Attributes:
+        resolution: wished quad edge [m].
+        columns: cells per quarter from the centre to the neck column, the princess line, the arm column, the side.
+        rings: #rows by #columns, closed rows from the ankle to the across-chest row.
+        level_row: row in `rings` of every level, ``chest`` included.
+        front: #rows by #columns, from the across-chest row to the yoke row, right to left armhole.
+        back: the same on the back, left to right armhole.
+        yokes: for each quarter #rows by #columns, from the yoke row to the shoulder seam.
+        neck: #rows by #columns, closed rows from the neck base upward.
+        arms: for ``left`` and ``right`` #rows by #columns, closed rows from armhole to wrist, columns from the underarm
+            forward.
+        arm_row: row in `arms` of every arm level.
+        bricks: grid of vertex indices of every brick by name.
+        lines: feature profiles and lines by name; a closed one repeats its first vertex.
+        vertex_count: number of vertices.
+        faces: #F by 4, outward.
+        face_brick: #F, index of the brick in `bricks`' order.
+    """
+
+    resolution: float
+    columns: tuple[int, int, int, int]
+    rings: Ids
+    level_row: Mapping[str, int]
+    front: Ids
+    back: Ids
+    yokes: Mapping[str, Ids]
+    neck: Ids
+    arms: Mapping[str, Ids]
+    arm_row: Mapping[str, int]
+    bricks: Mapping[str, Ids]
+    lines: Mapping[str, Ids]
+    vertex_count: int
+    faces: Ids
+    face_brick: Ids
+
+    @property
+    def mirror(self) -> Ids:
+        """For every vertex the one in its mirror image at the midplane."""
+        out = np.full(self.vertex_count, -1, np.int32)
+        n = self.rings.shape[1]
+        out[self.rings] = self.rings[:, -np.arange(n) % n]
+        for patch in (self.front, self.back):
+            out[patch] = patch[:, ::-1]
+        for face in ("front", "back"):
+            left, right = self.yokes[f"{face}-left"], self.yokes[f"{face}-right"]
+            out[left], out[right] = right[:, ::-1], left[:, ::-1]
+        m = self.neck.shape[1]
+        out[self.neck] = self.neck[:, -np.arange(m) % m]
+        out[self.arms["left"]], out[self.arms["right"]] = self.arms["right"], self.arms["left"]
+        return out
+
+    @property
+    def quarter(self) -> int:
+        """Columns from the centre line to the side line."""
+        return sum(self.columns)
+
+    @property
+    def to_arm(self) -> int:
+        """Columns from the centre line to the arm column."""
+        return sum(self.columns[:3])
+
+    @property
+    def to_princess(self) -> int:
+        """Columns from the centre line to the princess line."""
+        return sum(self.columns[:2])
+
+
+def make_layout(resolution_mm: float = 10.0) -> Layout:
+    """The grid at a resolution; the same for every body.
+
+    Args:
+        resolution_mm: wished quad edge [mm], 2 to 40.
+
+    Raises:
+        InputError: if the resolution is out of range.
+    """
+    if not 2.0 <= resolution_mm <= 40.0:
+        raise InputError(f"mannequin resolution {resolution_mm:g} mm: valid range 2 to 40 mm")
+    h = resolution_mm / 1000.0
+
+    def cells(length: float, least: int = 2) -> int:
+        return max(least, round(length / h))
+
+    n0, n1, n2, n3 = (cells(s) for s in _COLUMN_LENGTHS)
+    k, q, n = n0 + n1 + n2, n0 + n1 + n2 + n3, 4 * (n0 + n1 + n2 + n3)
+    counter = itertools.count()
+
+    def fresh(*shape: int) -> Ids:
+        size = int(np.prod(shape))
+        return np.fromiter(itertools.islice(counter, size), np.int32, size).reshape(shape)
+
+    steps = [cells(g) for g in _RING_GAPS]
+    level_row = dict(zip(RING_LEVELS, [0, *np.cumsum(steps).tolist()], strict=True))
+    level_row["chest"] = level_row["bust"] + cells(_CHEST_GAP)
+    rings = fresh(level_row["chest"] + 1, n)
+    m2, m3 = cells(_YOKE_GAP), cells(_SHOULDER_GAP)
+    front = np.vstack([rings[-1][np.arange(-k, k + 1) % n], fresh(m2, 2 * k + 1)])
+    back = np.vstack([rings[-1][np.arange(2 * q - k, 2 * q + k + 1)], fresh(m2, 2 * k + 1)])
+    yokes = _yokes(front[-1], back[-1], n0, k, m3, fresh)
+
+    fl, bl, br, fr = (yokes[name] for name in QUARTERS)
+    neck_loop = np.concatenate([
+        front[-1, k : k + n0 + 1], fl[1:, 0], bl[-2::-1, -1], back[-1, k - n0 + 1 : k + n0 + 1],
+        br[1:, 0], fr[-2::-1, -1], front[-1, k - n0 + 1 : k],
+    ])  # fmt: skip
+    neck = np.vstack([neck_loop, fresh(cells(_COLLAR_GAP), len(neck_loop))])
+    top = rings[-1]
+    armholes = {
+        "left": np.concatenate([
+            top[q : k - 1 : -1], front[1:, -1], fl[1:, -1], bl[-2::-1, 0], back[-2::-1, 0], top[2 * q - k - 1 : q : -1],
+        ]),
+        "right": np.concatenate([
+            top[3 * q : 4 * q - k + 1], front[1:, 0], fr[1:, 0], br[-2::-1, -1], back[-2::-1, -1],
+            top[2 * q + k + 1 : 3 * q],
+        ]),
+    }  # fmt: skip
+    arm_steps = [cells(g) for g in _ARM_GAPS]
+    arm_row = dict(zip(ARM_LEVELS, [0, *np.cumsum(arm_steps).tolist()], strict=True))
+    arms = {side: np.vstack([loop, fresh(arm_row["wrist"], len(loop))]) for side, loop in armholes.items()}
+
+    columns = (n0, n1, n2, n3)
+    bricks = _bricks(columns, rings, level_row, front, back, yokes, neck, arms, arm_row)
+    lines = _lines(columns, rings, level_row, front, back, yokes, neck, arms, arm_row)
+    faces = np.concatenate([_grid_faces(grid) for grid in bricks.values()])
+    face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
+    return Layout(
+        resolution=h, columns=columns, rings=rings, level_row=level_row, front=front, back=back, yokes=yokes, neck=neck,
+        arms=arms, arm_row=arm_row, bricks=bricks, lines=lines, vertex_count=next(counter),
+        faces=faces.astype(np.int32), face_brick=face_brick.astype(np.int32),
+    )  # fmt: skip
+
+
+def _yokes(front_top: Ids, back_top: Ids, n0: int, k: int, rows: int, fresh: object) -> dict[str, Ids]:
+    """The four patches under the shoulder seams; front and back share the seam's vertices."""
+    assert callable(fresh)
+    width = k - n0 + 1
+    starts = {
+        "front-left": front_top[k + n0 :],
+        "back-left": back_top[:width],
+        "back-right": back_top[k + n0 :],
+        "front-right": front_top[:width],
+    }
+    grids = {name: np.vstack([row, fresh(rows - 1, width)]) for name, row in starts.items()}
+    for side in ("left", "right"):
+        seam = fresh(1, width)
+        grids[f"front-{side}"] = np.vstack([grids[f"front-{side}"], seam])
+        grids[f"back-{side}"] = np.vstack([grids[f"back-{side}"], seam[:, ::-1]])
+    return grids
+
+
+def _grid_faces(grid: Ids) -> Ids:
+    return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
+
+
+def _bricks(
+    columns: tuple[int, int, int, int], rings: Ids, level_row: Mapping[str, int], front: Ids, back: Ids,
+    yokes: Mapping[str, Ids], neck: Ids, arms: Mapping[str, Ids], arm_row: Mapping[str, int],
+) -> dict[str, Ids]:  # fmt: skip
+    """Every brick's grid by name, ``upper-lower/column``, from the neck down, then the arms."""
+    n0, n1, n2, n3 = columns
+    p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
+    bricks: dict[str, Ids] = {}
+    m3 = len(yokes["front-left"]) - 1
+    quarter_neck = n0 + m3
+    closed_neck = np.hstack([neck, neck[:, :1]])
+    for i, name in enumerate(QUARTERS):
+        bricks[f"collar-neck/{name}"] = closed_neck[:, i * quarter_neck : (i + 1) * quarter_neck + 1]
+    for name in QUARTERS:
+        grid = yokes[name]
+        split = n1 if name in ("front-left", "back-right") else n2
+        near, far = grid[:, : split + 1], grid[:, split:]
+        centre, side = (near, far) if name in ("front-left", "back-right") else (far, near)
+        bricks[f"shoulder-yoke/{name}-centre"] = centre
+        bricks[f"shoulder-yoke/{name}-side"] = side
+    bricks |= {
+        "yoke-chest/front-left-centre": front[:, k : k + p + 1],
+        "yoke-chest/front-left-side": front[:, k + p :],
+        "yoke-chest/back-left-side": back[:, : k - p + 1],
+        "yoke-chest/back-left-centre": back[:, k - p : k + 1],
+        "yoke-chest/back-right-centre": back[:, k : k + p + 1],
+        "yoke-chest/back-right-side": back[:, k + p :],
+        "yoke-chest/front-right-side": front[:, : k - p + 1],
+        "yoke-chest/front-right-centre": front[:, k - p : k + 1],
+    }
+    closed = np.hstack([rings, rings[:, :1]])
+    cuts = (0, p, q, 2 * q - p, 2 * q, 2 * q + p, 3 * q, 4 * q - p, 4 * q)
+    orders = (("centre", "side"), ("side", "centre")) * 2
+    names = [f"{quarter}-{part}" for quarter, order in zip(QUARTERS, orders, strict=True) for part in order]
+    levels = [*RING_LEVELS, "chest"]
+    for low, high in reversed(list(itertools.pairwise(levels))):
+        rows = closed[level_row[low] : level_row[high] + 1]
+        for name, a, b in zip(names, cuts[:-1], cuts[1:], strict=True):
+            bricks[f"{high}-{low}/{name}"] = rows[:, a : b + 1]
+    for arm, grid in arms.items():
+        loop = np.hstack([grid, grid[:, :1]])
+        half = grid.shape[1] // 2
+        for high, low in itertools.pairwise(ARM_LEVELS):
+            rows = loop[arm_row[high] : arm_row[low] + 1]
+            for name, part in (("front", rows[:, : half + 1]), ("back", rows[:, half:])):
+                # Columns run upward in front on both arms; the left one's rows are turned, so that it faces outward too.
+                bricks[f"{high}-{low}/arm-{arm}-{name}"] = part[::-1] if arm == "left" else part
+    return bricks
+
+
+def _lines(
+    columns: tuple[int, int, int, int], rings: Ids, level_row: Mapping[str, int], front: Ids, back: Ids,
+    yokes: Mapping[str, Ids], neck: Ids, arms: Mapping[str, Ids], arm_row: Mapping[str, int],
+) -> dict[str, Ids]:  # fmt: skip
+    """Feature profiles (closed around the body or an arm) and feature lines, bottom up."""
+    n0, n1, n2, n3 = columns
+    p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
+
+    def loop(ids: Ids) -> Ids:
+        return np.append(ids, ids[:1])
+
+    lines = {level: loop(rings[level_row[level]]) for level in RING_LEVELS}
+    lines |= {"chest front": front[0], "chest back": back[0]}
+    lines |= {"yoke front left": front[-1, k + n0 :], "yoke front right": front[-1, : k - n0 + 1]}
+    lines |= {"yoke back left": back[-1, : k - n0 + 1], "yoke back right": back[-1, k + n0 :]}
+    lines |= {"neck": loop(neck[0]), "collar": loop(neck[-1])}
+    lines |= {"shoulder left": yokes["front-left"][-1], "shoulder right": yokes["front-right"][-1][::-1]}
+    lines["centre front"] = np.concatenate([rings[:, 0], front[1:, k]])
+    lines["centre back"] = np.concatenate([rings[:, 2 * q], back[1:, k]])
+    lines["side left"], lines["side right"] = rings[:, q], rings[:, 3 * q]
+    for name, column, patch, at, up in (
+        ("princess front left", p, front, k + p, yokes["front-left"][:, n1]),
+        ("princess front right", 4 * q - p, front, k - p, yokes["front-right"][:, n2]),
+        ("princess back left", 2 * q - p, back, k - p, yokes["back-left"][:, n2]),
+        ("princess back right", 2 * q + p, back, k + p, yokes["back-right"][:, n1]),
+    ):
+        lines[name] = np.concatenate([rings[:, column], patch[1:, at], up[1:]])
+    for side, grid in arms.items():
+        for level in ARM_LEVELS:
+            lines[f"{level} {side}"] = loop(grid[arm_row[level]])
+        lines[f"underarm {side}"] = grid[:, 0]
+        lines[f"overarm {side}"] = grid[:, grid.shape[1] // 2]
+    return {name: np.ascontiguousarray(ids, np.int32) for name, ids in lines.items()}

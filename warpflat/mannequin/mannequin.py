@@ -1,0 +1,205 @@
+"""The mannequin: feature profiles and lines around a body, and the bricks between them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.errors import InputError, nearest
+from warpflat.mannequin.bricks import Brick, brick, select_bricks
+from warpflat.mannequin.builder import build_vertices
+from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
+from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
+from warpflat.mannequin.profiles import Floats, arc_lengths, convex_girth
+from warpflat.mannequin.table_body import blueprint_from_measurements
+from warpflat.surface.mesh import Surface
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.forms import Form, FormResult
+    from warpflat.mannequin.scan import ScanOptions
+
+__all__ = ["Level", "Mannequin"]
+
+_ROUNDS = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Level:
+    """One feature profile.
+
+    Attributes:
+        height: of its middle above the floor [m].
+        girth: as a tape measures it [m]: convex for level profiles, along the curve for neck and armholes.
+        section: for a scan, the length of the body's own section at that height, hollows followed [m]; else None.
+    """
+
+    height: float
+    girth: float
+    section: float | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Mannequin:
+    """A body covered by bricks. Metres, Y up, facing +Z; the body's left is +X.
+
+    Attributes:
+        layout: the grid, the same for every body of one resolution.
+        vertices: layout.vertex_count by 3, positions [m].
+        source: where the body comes from: a size, measurements, or a scan.
+        notes: what was completed or mended, one sentence each.
+        sections: for a scan, the length [m] of the body's own section at each level.
+    """
+
+    layout: Layout
+    vertices: Floats
+    source: str
+    notes: tuple[str, ...] = ()
+    sections: Mapping[str, float] = field(default_factory=dict)
+
+    @classmethod
+    def from_size(cls, size: str, *, resolution_mm: float = 10.0) -> Mannequin:
+        """A mannequin of a size of the tables: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``, ``men 50/182``.
+
+        Raises:
+            InputError: if no table has the size.
+        """
+        return cls._from(measurements_from_size(size), resolution_mm)
+
+    @classmethod
+    def from_measurements(cls, *, table: str = "women", resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
+        """A mannequin to given measurements [m]; the missing ones are completed by `table`'s proportions (see `notes`).
+
+        Raises:
+            InputError: for an unknown measurement, one outside its valid range, or two that no body has together.
+        """
+        return cls._from(measurements_from_values(table=table, **lengths), resolution_mm)
+
+    @classmethod
+    def from_scan(
+        cls, vertices: Floats, faces: Any, *, options: ScanOptions | None = None, resolution_mm: float = 10.0
+    ) -> Mannequin:
+        """A mannequin on a body scan: levels found from the body's shape, hollows bridged as a tape does.
+
+        Args:
+            vertices: #V by 3, in any unit and pose that can be told from the shape (see :class:`ScanOptions`).
+            faces: #F by 3 or 4 (-1 in the last column for a triangle).
+            options: unit, facing, landmarks, mirroring.
+            resolution_mm: wished quad edge [mm].
+
+        Raises:
+            InputError: if the mesh is not a standing body with arms and legs that can be told apart.
+        """
+        from warpflat.mannequin.scan import ScanOptions, blueprint_from_scan
+
+        layout = make_layout(resolution_mm)
+        found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
+        return cls(
+            layout=layout, vertices=build_vertices(layout, found.blueprint), source=found.source, notes=found.notes,
+            sections=found.sections,
+        )  # fmt: skip
+
+    @classmethod
+    def _from(cls, measurements: Measurements, resolution_mm: float) -> Mannequin:
+        layout = make_layout(resolution_mm)
+        # The sheet rounds the across-chest rows between armholes that are set by their width: set, measure, set again.
+        wished = {"chest_width": "chest front", "back_width": "chest back"}
+        lengths = dict(measurements.lengths)
+        before: dict[str, tuple[float, float]] = {}
+        for _ in range(_ROUNDS):
+            vertices = build_vertices(layout, blueprint_from_measurements(replace(measurements, lengths=lengths)))
+            worst = 0.0
+            for name, line in wished.items():
+                found = float(arc_lengths(vertices[layout.lines[line]])[-1])
+                miss = found - measurements.lengths[name]
+                worst = max(worst, abs(miss))
+                slope = 1.0
+                if name in before and abs(lengths[name] - before[name][0]) > 1e-7:
+                    slope = (miss - before[name][1]) / (lengths[name] - before[name][0])
+                before[name] = (lengths[name], miss)
+                lengths[name] -= miss / min(max(slope, 0.3), 2.0)
+            if worst < 0.0002:
+                break
+        return cls(layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes)
+
+    @property
+    def brick_names(self) -> list[str]:
+        """Every brick's name, from the neck down, then the arms."""
+        return list(self.layout.bricks)
+
+    def brick(self, name: str) -> Brick:
+        """A brick with its vertices, faces and neighbours.
+
+        Raises:
+            InputError: if there is no such brick.
+        """
+        return brick(self.layout, name)
+
+    def select(self, *patterns: str) -> list[str]:
+        """Names of the bricks that patterns such as ``waist-hip/front-*`` cover."""
+        return select_bricks(self.layout, patterns)
+
+    def line(self, name: str) -> Floats:
+        """#P by 3, positions [m] along a feature profile or line; a closed one repeats its first point.
+
+        Raises:
+            InputError: if there is no such line.
+        """
+        if name not in self.layout.lines:
+            raise InputError(f"mannequin line {name!r} is unknown: {nearest(name, self.layout.lines)}")
+        return self.vertices[self.layout.lines[name]]
+
+    def lines(self) -> dict[str, Floats]:
+        """Every feature profile and line by name, #P by 3 [m]."""
+        return {name: self.vertices[ids] for name, ids in self.layout.lines.items()}
+
+    def levels(self) -> dict[str, Level]:
+        """Height and girth of every feature profile, from the neck down, then the arms."""
+        found: dict[str, Level] = {}
+        for name in ("neck", "shoulder left", "shoulder right", "chest front", "chest back"):
+            points = self.line(name)
+            found[name] = Level(height=float(points[:, 1].mean()), girth=float(arc_lengths(points)[-1]))
+        for name in reversed(RING_LEVELS):
+            points = self.line(name)[:-1]
+            found[name] = Level(
+                height=float(points[:, 1].mean()), girth=convex_girth(points), section=self.sections.get(name)
+            )
+        for side in ("left", "right"):
+            for level in ARM_LEVELS:
+                points = self.line(f"{level} {side}")
+                found[f"{level} {side}"] = Level(
+                    height=float(points[:, 1].mean()), girth=float(arc_lengths(points)[-1])
+                )
+        return found
+
+    def surface(self) -> Surface:
+        """All bricks as one surface with every feature line."""
+        return Surface(
+            vertices=self.vertices, faces=self.layout.faces, lines=dict(self.layout.lines), name="mannequin",
+            input_vertices=self.vertices, input_index=np.arange(len(self.vertices), dtype=np.int32), notes=self.notes,
+        )  # fmt: skip
+
+    def form(self, form: str | Form, *, half: bool = False) -> FormResult:
+        """The pieces of a form on this body, and their seams.
+
+        Args:
+            form: a shipped form's name (see :func:`warpflat.mannequin.forms.form_names`) or one of your own.
+            half: symmetric pieces as their left half, on the fold.
+
+        Raises:
+            InputError: for an unknown form, brick, line or profile in it.
+        """
+        from warpflat.mannequin.forms import realise, shipped_form
+
+        return realise(self, shipped_form(form) if isinstance(form, str) else form, half=half)
+
+    def metrics(self) -> dict[str, Any]:
+        """What ``metrics.json`` says about the mannequin: its source and each level's height and girth [m]."""
+        levels: dict[str, dict[str, float]] = {}
+        for name, level in self.levels().items():
+            levels[name] = {"height_m": level.height, "girth_m": level.girth}
+            if level.section is not None:
+                levels[name]["section_m"] = level.section
+        return {"source": self.source, "notes": list(self.notes), "levels": levels}

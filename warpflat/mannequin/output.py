@@ -1,0 +1,64 @@
+"""What a mannequin leaves behind: ``mannequin.usdc``, ``mannequin.obj``, ``metrics.json`` and ``picture.png``."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from warpflat._version import __version__
+from warpflat.export.atomic import atomic_path, prepare_folder
+from warpflat.export.metrics import write_json
+from warpflat.mannequin.picture import write_mannequin_picture
+from warpflat.mannequin.usd import write_mannequin_usd
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.mannequin import Mannequin
+
+__all__ = ["write_mannequin", "write_mannequin_obj"]
+
+
+def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dict[str, Path]:
+    """Write a mannequin's files into a folder, each of them whole or not at all.
+
+    Args:
+        mannequin: the body.
+        folder: made if missing.
+
+    Returns:
+        the files by kind: ``usd``, ``obj``, ``picture``, ``metrics``; metrics come last, so where they are the rest is.
+
+    Raises:
+        InputError: if a file cannot be written.
+    """
+    place = prepare_folder(folder)
+    files = {
+        "usd": place / "mannequin.usdc", "obj": place / "mannequin.obj", "picture": place / "picture.png",
+        "metrics": place / "metrics.json",
+    }  # fmt: skip
+    write_mannequin_usd(mannequin, files["usd"])
+    write_mannequin_obj(mannequin, files["obj"])
+    write_mannequin_picture(mannequin, files["picture"])
+    write_json(files["metrics"], {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
+    return files
+
+
+def write_mannequin_obj(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
+    """Write the bricks as groups (``g``) of quads and the lines as line elements (``l``), metres, Y up.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    layout = mannequin.layout
+    rows: list[str] = [f"# warpflat mannequin, {mannequin.source}", "o mannequin"]
+    rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in mannequin.vertices.tolist()]
+    start = 0
+    for name, grid in layout.bricks.items():
+        count = (grid.shape[0] - 1) * (grid.shape[1] - 1)
+        rows.append(f"g {name}")
+        rows += [f"f {a + 1} {b + 1} {c + 1} {d + 1}" for a, b, c, d in layout.faces[start : start + count].tolist()]
+        start += count
+    for name, ids in layout.lines.items():
+        rows += [f"g line:{name.replace(' ', '_')}", "l " + " ".join(str(i + 1) for i in ids.tolist())]
+    with atomic_path(path) as temporary:
+        temporary.write_text("\n".join(rows) + "\n", encoding="utf-8", newline="\n")

@@ -1,0 +1,165 @@
+"""A picture of the mannequin from four sides, its profiles and lines labelled."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.export.atomic import atomic_path
+from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.normals import face_normals, vertex_normals
+from warpflat.mannequin.profiles import Floats
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.mannequin import Mannequin
+
+__all__ = ["write_mannequin_picture"]
+
+_VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
+_LIGHT = np.array([-0.35, 0.45, 0.82]) / np.linalg.norm([-0.35, 0.45, 0.82])
+_HEIGHT = 8.0
+_LINE, _INK = "#9c1f30", "#333333"
+
+
+def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
+    """Draw the mannequin from front, three-quarter, side and back, with profiles and lines by name and girth in cm.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    low, high = float(mannequin.vertices[:, 1].min()), float(mannequin.vertices[:, 1].max())
+    span = high - low
+    views = [(title, _turned(mannequin.vertices, angle)) for title, angle in _VIEWS]
+    # The side view keeps room for the profiles' names behind it.
+    widths = [0.62 * span if title == "left side" else 2.06 * float(np.abs(v[:, 0]).max()) for title, v in views]
+    inches = _HEIGHT * 0.92 / (1.06 * span)
+    page = sum(widths) * inches
+    figure = Figure(figsize=(page, _HEIGHT), dpi=120, facecolor="white")
+    FigureCanvasAgg(figure)
+    left = 0.0
+    for (title, turned), width in zip(views, widths, strict=True):
+        axes = figure.add_axes((left, 0.01, width * inches / page, 0.92))
+        left += width * inches / page
+        axes.set_axis_off()
+        _draw_body(axes, turned, mannequin)
+        _draw_lines(axes, turned, mannequin)
+        if title == "left side":
+            _label_levels(axes, turned, mannequin)
+        else:
+            _label_lines(axes, turned, mannequin, title)
+        middle = 0.11 * span if title == "left side" else 0.0
+        axes.set_xlim(middle - 0.5 * width, middle + 0.5 * width)
+        axes.set_ylim(low - 0.02 * span, high + 0.04 * span)
+        axes.set_aspect("equal")
+        axes.text(0.0, high + 0.02 * span, title, ha="center", va="bottom", fontsize=11, color=_INK)
+    figure.text(0.5, 0.985, f"Mannequin: {mannequin.source}", ha="center", va="top", fontsize=12, color=_INK)
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": None})
+
+
+def _turned(vertices: Floats, degrees: float) -> Floats:
+    """Vertices seen by somebody who walked `degrees` around the body to its left; x right, y up, z to the eye."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    x, y, z = vertices.T
+    turned = np.column_stack([c * x - s * z, y, s * x + c * z])
+    turned[:, 0] -= 0.5 * (turned[:, 0].min() + turned[:, 0].max())
+    return turned
+
+
+def _draw_body(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+    from matplotlib.collections import PolyCollection
+
+    faces = mannequin.layout.faces
+    normals = face_normals(turned, faces)
+    light = 0.36 + 0.60 * np.clip(normals @ _LIGHT, 0.0, 1.0)
+    colour = np.clip(np.outer(light, [1.0, 0.965, 0.90]), 0.0, 1.0)
+    # Inside of neck and sleeves: darker, so that openings read as openings.
+    inside = normals[:, 2] < 0.0
+    colour[inside] = [0.42, 0.38, 0.36]
+    order = np.argsort(turned[faces][:, :, 2].mean(axis=1))
+    axes.add_collection(
+        PolyCollection(
+            list(turned[faces[order]][:, :, :2]), facecolors=colour[order], edgecolors=colour[order], linewidths=0.4
+        )
+    )
+
+
+def _visible(turned: Floats, mannequin: Mannequin, ids: Any) -> Any:
+    """Which vertices of a line face the viewer and are not behind an arm."""
+    from scipy.spatial import cKDTree
+
+    normals = vertex_normals(turned, mannequin.layout.faces)
+    seen = normals[ids, 2] > 0.02
+    arms = np.concatenate([turned[grid.ravel()] for grid in mannequin.layout.arms.values()])
+    tree = cKDTree(arms[:, :2])
+    reach = 1.1 * mannequin.layout.resolution
+    for k, near in enumerate(tree.query_ball_point(turned[ids][:, :2], reach)):
+        if near and arms[near, 2].max() > turned[ids[k], 2] + 0.03:
+            seen[k] = False
+    return seen
+
+
+def _draw_lines(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+    from matplotlib.collections import LineCollection
+
+    segments = []
+    for ids in mannequin.layout.lines.values():
+        seen = _visible(turned, mannequin, ids)
+        both = seen[:-1] & seen[1:]
+        segments.append(np.stack([turned[ids[:-1]], turned[ids[1:]]], 1)[both][:, :, :2])
+    axes.add_collection(LineCollection(list(np.concatenate(segments)), colors=_LINE, linewidths=0.9))
+
+
+def _label_levels(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+    """Names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
+    levels = mannequin.levels()
+    names = ["neck", "chest back", *reversed(RING_LEVELS)]
+    span = float(np.ptp(turned[:, 1]))
+    anchors = [turned[ids][int(np.argmax(turned[ids][:, 0]))] for ids in (mannequin.layout.lines[n] for n in names)]
+    places = _spread(np.array([a[1] for a in anchors]), 0.028 * span)
+    x = 0.17 * span
+    for name, anchor, y in zip(names, anchors, places, strict=True):
+        words = {"neck": "neck base", "chest back": "across back"}.get(name, name)
+        axes.plot([anchor[0] + 0.006, x - 0.008 * span], [anchor[1], y], color=_INK, linewidth=0.5, alpha=0.6)
+        axes.text(x, y, f"{words} {levels[name].girth * 100:.1f} cm", fontsize=8, va="center", ha="left", color=_INK)
+
+
+def _spread(wished: Floats, gap: float) -> Floats:
+    """Heights near the wished ones (high to low), at least `gap` apart."""
+    places = wished.copy()
+    for i in range(1, len(places)):
+        places[i] = min(places[i], places[i - 1] - gap)
+    return places
+
+
+def _label_lines(axes: Any, turned: Floats, mannequin: Mannequin, view: str) -> None:
+    """Names of the vertical lines, written along them where they are seen best, and of shoulder and armhole."""
+    rows = mannequin.layout.level_row
+    places = {
+        "front": {"centre front": 0.15, "princess front right": 0.35, "princess front left": 0.35},
+        "three-quarter": {"side left": 0.40},
+        "back": {"centre back": 0.15, "princess back left": 0.35, "princess back right": 0.35},
+    }[view]
+    for name, share in places.items():
+        ids = mannequin.layout.lines[name]
+        row = int(rows["ankle"] + share * (rows["thigh"] - rows["ankle"]))
+        point, above = turned[ids[row]], turned[ids[row + 2]]
+        tilt = np.degrees(np.arctan2(above[1] - point[1], above[0] - point[0]))
+        axes.text(
+            point[0] - 0.006, point[1], name, fontsize=8, color=_LINE, rotation=tilt, rotation_mode="anchor", ha="left",
+            va="bottom",
+        )  # fmt: skip
+    if view != "three-quarter":
+        return
+    span = float(np.ptp(turned[:, 1]))
+    for name, words, share in (("shoulder left", "shoulder", 0.6), ("armhole left", "armhole", 0.28)):
+        ids = mannequin.layout.lines[name]
+        point = turned[ids[int(share * (len(ids) - 1))]]
+        at = (point[0] + 0.10 * span, point[1] + 0.06 * span if words == "shoulder" else point[1] + 0.075 * span)
+        axes.plot([point[0], at[0] - 0.004 * span], [point[1], at[1]], color=_INK, linewidth=0.5, alpha=0.7)
+        axes.text(at[0], at[1], words, fontsize=8, color=_INK, va="center", ha="left")

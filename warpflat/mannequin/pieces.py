@@ -1,0 +1,288 @@
+"""Pieces of a form: bricks joined into one disk each, with named edges, and the seams between them."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError, nearest
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.layout import Ids, Layout
+from warpflat.mannequin.profiles import Floats
+from warpflat.surface.mesh import Surface
+
+__all__ = ["FormPiece", "FormSeam", "cut_pieces"]
+
+#: For each piece its brick patterns, its datum line, and the lines along which it is cut open.
+Recipes = Mapping[str, tuple[Sequence[str], str, Sequence[str]]]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FormPiece:
+    """One piece of cloth on the body.
+
+    Attributes:
+        surface: the piece; its `lines` hold every feature line that runs through it and every edge.
+        edges: the border, counter-clockwise from outside, cut where one feature line ends and the next begins: vertex
+            indices of the piece along each edge, both ends included.
+        datum: the feature line to develop from; a name in `surface.lines`.
+        fold: the edge that lies on the fold if this is a half piece, else None.
+        grid_vertices: #V, for each vertex of the piece its vertex on the mannequin.
+        face_brick: #F, for each face its brick's name.
+    """
+
+    surface: Surface
+    edges: Mapping[str, Ids]
+    datum: str
+    fold: str | None
+    grid_vertices: Ids
+    face_brick: tuple[str, ...]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FormSeam:
+    """Two edges (or parts of edges) that are sewn together: the same curve in space.
+
+    Attributes:
+        name: after the feature line.
+        pieces: names of the two pieces; the same twice where one piece is sewn to itself.
+        edges: names of the two edges.
+        vertices: vertex indices of the two pieces along the seam, in corresponding order.
+    """
+
+    name: str
+    pieces: tuple[str, str]
+    edges: tuple[str, str]
+    vertices: tuple[Ids, Ids]
+
+
+def cut_pieces(
+    layout: Layout, vertices: Floats, recipes: Recipes, *, half: bool = False
+) -> tuple[dict[str, FormPiece], tuple[FormSeam, ...]]:
+    """Join bricks into pieces and find their seams.
+
+    Args:
+        layout: the grid.
+        vertices: layout.vertex_count by 3 [m].
+        recipes: see :data:`Recipes`.
+        half: the left half of the garment: pieces that lie on both sides of a centre line end there, on the fold, and
+            those of the right side are left out, being the left ones' mirror images.
+
+    Raises:
+        InputError: for an unknown brick or line, a brick in two pieces, or a piece that is not one disk.
+    """
+    owner: dict[str, str] = {}
+    pieces: dict[str, FormPiece] = {}
+    for name, (patterns, datum, opened) in recipes.items():
+        bricks = select_bricks(layout, patterns)
+        for b in bricks:
+            if b in owner:
+                raise InputError(f"form: brick {b} is in two pieces, {owner[b]} and {name}; leave it out of one")
+            owner[b] = name
+        for line in (*opened, *([datum] if datum else [])):
+            if line not in layout.lines:
+                raise InputError(f"form: piece {name}: line {line!r} is unknown: {nearest(line, layout.lines)}")
+        if half and all(_is_side(b, "right") for b in bricks):
+            continue
+        pieces[name] = _piece(layout, vertices, name, bricks, datum, opened, half)
+    return pieces, _seams(pieces)
+
+
+def _is_side(brick: str, side: str) -> bool:
+    return side in brick.partition("/")[2].split("-")
+
+
+def _piece(
+    layout: Layout, vertices: Floats, name: str, bricks: Sequence[str], datum: str, opened: Sequence[str], half: bool
+) -> FormPiece:
+    both = {_is_side(b, "left") for b in bricks} == {True, False}
+    if half and both:
+        bricks = [b for b in bricks if _is_side(b, "left")]
+    index = {b: i for i, b in enumerate(layout.bricks)}
+    rows = np.flatnonzero(np.isin(layout.face_brick, [index[b] for b in bricks]))
+    corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened))
+    edges = _edges(layout, corners, grid_vertices, name)
+    lines = dict(edges) | {
+        line: ids for line, ids in _inner_lines(layout, corners, grid_vertices).items() if line not in edges
+    }
+    fold = next((e for e in edges if e.startswith("centre")), None) if half and both else None
+    surface = Surface(
+        vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
+        input_index=np.arange(len(grid_vertices), dtype=np.int32),
+    )  # fmt: skip
+    if datum and datum not in lines:
+        raise InputError(f"form: piece {name}: its datum {datum!r} does not run through it: {nearest(datum, lines)}")
+    names = list(layout.bricks)
+    return FormPiece(
+        surface=surface, edges=edges, datum=datum or next(iter(lines)), fold=fold, grid_vertices=grid_vertices,
+        face_brick=tuple(names[i] for i in layout.face_brick[rows]),
+    )  # fmt: skip
+
+
+def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:
+    edges: set[tuple[int, int]] = set()
+    for line in lines:
+        for a, b in itertools.pairwise(layout.lines[line].tolist()):
+            edges.add((min(a, b), max(a, b)))
+    return edges
+
+
+def _split(faces: Ids, cut: set[tuple[int, int]]) -> tuple[Ids, Ids]:
+    """Faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
+
+    Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    count = len(faces) * 4
+    owners: dict[tuple[int, int], list[tuple[int, int]]] = {}
+    for corner in range(count):
+        f, k = divmod(corner, 4)
+        a, b = int(faces[f, k]), int(faces[f, (k + 1) % 4])
+        owners.setdefault((min(a, b), max(a, b)), []).append((corner, 4 * f + (k + 1) % 4))
+    joined: list[tuple[int, int]] = []
+    flat = faces.reshape(-1)
+    for edge, sides in owners.items():
+        if len(sides) != 2 or edge in cut:
+            continue
+        (a0, b0), (a1, b1) = sides
+        joined += [(a0, b1), (b0, a1)] if flat[a0] == flat[b1] else [(a0, a1), (b0, b1)]
+    links = np.array(joined, int).reshape(-1, 2)
+    graph = coo_matrix((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count))
+    _, label = connected_components(graph, directed=False)
+    # Numbered in the mannequin's order, so that a piece is the same in every size.
+    order = np.lexsort((np.arange(count), flat))
+    _, first = np.unique(label[order], return_index=True)
+    rank = np.empty(label.max() + 1, int)
+    rank[label[order][np.sort(first)]] = np.arange(label.max() + 1)
+    corners = rank[label].astype(np.int32)
+    grid_vertices = np.empty(label.max() + 1, np.int32)
+    grid_vertices[corners] = flat
+    return corners.reshape(-1, 4), grid_vertices
+
+
+def _border(corners: Ids, name: str) -> NDArray[np.int64]:
+    """The one border loop of a disk, counter-clockwise from outside."""
+    ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
+    key = np.sort(ahead, axis=1)
+    edges, inverse, counts = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+    border = ahead[counts[np.ravel(inverse)] == 1]
+    follow = dict(border.tolist())
+    vertex_count = int(corners.max()) + 1
+    if len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1 or not follow:
+        raise InputError(
+            f"form: piece {name} is not one disk (its bricks touch at a point, fall apart, or close to a tube); "
+            "choose neighbouring bricks, or name a line to open it along"
+        )
+    start = min(follow)
+    loop = [start]
+    while (ahead_of := follow[loop[-1]]) != start:
+        loop.append(ahead_of)
+    if len(loop) != len(border):
+        raise InputError(f"form: piece {name} is not one disk: it falls into parts; choose neighbouring bricks")
+    return np.array(loop)
+
+
+def _line_of_edge(layout: Layout) -> dict[tuple[int, int], str]:
+    found: dict[tuple[int, int], str] = {}
+    for line, ids in layout.lines.items():
+        for a, b in itertools.pairwise(ids.tolist()):
+            found.setdefault((min(a, b), max(a, b)), line)
+    return found
+
+
+def _unique(name: str, taken: Mapping[str, object]) -> str:
+    if name not in taken:
+        return name
+    return next(f"{name} {i}" for i in itertools.count(2) if f"{name} {i}" not in taken)
+
+
+def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str) -> dict[str, Ids]:
+    loop = _border(corners, name)
+    line_of = _line_of_edge(layout)
+    on_grid = grid_vertices[loop]
+    labels = [
+        line_of.get((min(a, b), max(a, b)), "edge")
+        for a, b in zip(on_grid.tolist(), np.roll(on_grid, -1).tolist(), strict=True)
+    ]
+    # A doubled line turns back on itself at its end, which starts a new edge though the label stays.
+    turns = [labels[i] != labels[i - 1] or on_grid[i - 1] == on_grid[(i + 1) % len(loop)] for i in range(len(loop))]
+    starts = [i for i, t in enumerate(turns) if t] or [0]
+    edges: dict[str, Ids] = {}
+    for a, b in zip(starts, [*starts[1:], starts[0] + len(loop)], strict=True):
+        edges[_unique(labels[a], edges)] = loop[np.arange(a, b + 1) % len(loop)].astype(np.int32)
+    return edges
+
+
+def _inner_lines(layout: Layout, corners: Ids, grid_vertices: Ids) -> dict[str, Ids]:
+    """Feature lines inside the piece, as vertex indices of the piece; the longest run of each."""
+    once = {int(g): i for i, g in enumerate(grid_vertices)}
+    present = {
+        (min(a, b), max(a, b))
+        for k in range(4)
+        for a, b in zip(corners[:, k].tolist(), corners[:, (k + 1) % 4].tolist(), strict=True)
+    }
+    found: dict[str, Ids] = {}
+    for line, ids in layout.lines.items():
+        runs: list[list[int]] = [[]]
+        for a, b in itertools.pairwise(ids.tolist()):
+            u, v = once.get(a, -1), once.get(b, -1)
+            if u >= 0 and v >= 0 and (min(u, v), max(u, v)) in present:
+                runs[-1] = [*(runs[-1] or [u]), v]
+            elif runs[-1]:
+                runs.append([])
+        runs = [r for r in runs if r]
+        if len(runs) > 1 and ids[0] == ids[-1] and runs[0][0] == once.get(int(ids[0])) == runs[-1][-1]:
+            runs[0] = [*runs.pop(), *runs[0][1:]]
+        if runs:
+            found[line] = np.array(max(runs, key=len), np.int32)
+    return found
+
+
+def _seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
+    """Runs of border edges that two pieces (or two edges of one) share on the mannequin."""
+    places: dict[tuple[int, int], list[tuple[str, str, int]]] = {}
+    for name, piece in pieces.items():
+        for edge, ids in piece.edges.items():
+            for i, (a, b) in enumerate(itertools.pairwise(piece.grid_vertices[ids].tolist())):
+                places.setdefault((min(a, b), max(a, b)), []).append((name, edge, i))
+    seams: list[FormSeam] = []
+    taken: dict[str, None] = {}
+    for name, piece in pieces.items():
+        for edge, ids in piece.edges.items():
+            run: list[tuple[int, tuple[str, str, int]]] = []
+            for i, (a, b) in enumerate(itertools.pairwise(piece.grid_vertices[ids].tolist())):
+                here = (name, edge, i)
+                both = places[min(a, b), max(a, b)]
+                other = both[1] if len(both) == 2 and both[0] == here else None
+                if run and (other is None or other[:2] != run[-1][1][:2] or abs(other[2] - run[-1][1][2]) != 1):
+                    seams.append(_seam(pieces, name, edge, run, taken))
+                    run = []
+                if other is not None:
+                    run.append((i, other))
+            if run:
+                seams.append(_seam(pieces, name, edge, run, taken))
+    return tuple(seams)
+
+
+def _seam(
+    pieces: Mapping[str, FormPiece],
+    name: str,
+    edge: str,
+    run: list[tuple[int, tuple[str, str, int]]],
+    taken: dict[str, None],
+) -> FormSeam:  # fmt: skip
+    first = pieces[name].edges[edge][run[0][0] : run[-1][0] + 2]
+    other_name, other_edge = run[0][1][:2]
+    at = [o[2] for _, o in run]
+    second = pieces[other_name].edges[other_edge][min(at) : max(at) + 2]
+    if pieces[name].grid_vertices[first[0]] != pieces[other_name].grid_vertices[second[0]]:
+        second = second[::-1]
+    label = _unique(edge, taken)
+    taken[label] = None
+    return FormSeam(name=label, pieces=(name, other_name), edges=(edge, other_edge), vertices=(first, second))

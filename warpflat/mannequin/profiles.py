@@ -1,0 +1,145 @@
+"""Feature profiles: smooth closed curves around a body, and the tape that measures them."""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+
+__all__ = [
+    "Floats", "Section", "arc_lengths", "convex_girth", "resample", "scale_to_girth", "section_curve",
+    "superellipse_exponent",
+]  # fmt: skip
+
+Floats = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Section:
+    """The shape of one horizontal cross-section.
+
+    Attributes:
+        width: left to right [m].
+        depth: back to front [m].
+        area: area over width times depth; pi / 4 is an ellipse, 1 a rectangle.
+        front: share of the depth ahead of the widest points.
+        shift: where the widest points stand, forward positive [m].
+        front_bump: how far the two bust points stand out of the smooth front [m].
+        back_bump: how far blades or seat stand out of the smooth back [m].
+        bump_x: distance of the bumps from the centre line [m].
+        bump_width: standard deviation of the bumps across the body [m].
+    """
+
+    width: float
+    depth: float
+    area: float
+    front: float
+    shift: float
+    front_bump: float = 0.0
+    back_bump: float = 0.0
+    bump_x: float = 0.09
+    bump_width: float = 0.05
+
+
+def section_curve(section: Section, samples: int = 720) -> Floats:
+    """The closed curve of a section.
+
+    Returns:
+        #samples by 2, (x, z) [m], from centre front over the body's left to the back, not repeated at the end; evenly
+        spaced along the curve. `samples` is a multiple of four.
+    """
+    exponent = superellipse_exponent(section.area)
+    t = np.linspace(0.0, 2.0 * np.pi, 8 * samples, endpoint=False)
+    # Superellipse in polar form: even where powers of sine and cosine would crowd the points at the corners.
+    s, c = np.sin(t), np.cos(t)
+    radius = (np.abs(s) ** exponent + np.abs(c) ** exponent) ** (-1.0 / exponent)
+    ahead = section.front * section.depth
+    behind = (1.0 - section.front) * section.depth
+    x = 0.5 * section.width * radius * s
+    z = radius * c * np.where(c > 0.0, ahead, behind)
+    bump = sum(np.exp(-0.5 * ((x - at) / section.bump_width) ** 2) for at in (-section.bump_x, section.bump_x))
+    # The bumps fade where the curve turns to the side, so that the side stays smooth and the width is kept.
+    facing = np.clip(np.abs(radius * c), 0.0, 1.0)
+    fade = facing * facing * (3.0 - 2.0 * facing)
+    z = z + bump * fade * np.where(c > 0.0, section.front_bump, -section.back_bump) + section.shift
+    return resample(np.column_stack([x, z]), np.arange(samples) / samples, closed=True)
+
+
+@functools.lru_cache(maxsize=4096)
+def superellipse_exponent(area: float) -> float:
+    """The exponent whose superellipse fills the share `area` of its bounding box.
+
+    Raises:
+        InputError: if `area` is not between 0.6 and 0.97.
+    """
+    from scipy.optimize import brentq
+    from scipy.special import gammaln
+
+    if not 0.6 <= area <= 0.97:
+        raise InputError(f"cross-section area share {area:g}: valid range 0.6 to 0.97")
+
+    def miss(n: float) -> float:
+        return float(np.exp(2.0 * gammaln(1.0 + 1.0 / n) - gammaln(1.0 + 2.0 / n))) - area
+
+    return float(brentq(miss, 1.1, 12.0))
+
+
+def arc_lengths(points: Floats, *, closed: bool = False) -> Floats:
+    """Arc length [m] at every point of a polyline, and the whole length at the end if it is closed.
+
+    Args:
+        points: #P by 2 or 3.
+        closed: whether the last point runs on to the first.
+    """
+    around = np.vstack([points, points[:1]]) if closed else points
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
+
+
+def resample(points: Floats, fractions: Floats, *, closed: bool = False) -> Floats:
+    """Points of a polyline at fractions of its length.
+
+    Args:
+        points: #P by 2 or 3.
+        fractions: #F, 0 is the first point and 1 the last (the first again if closed).
+        closed: whether the last point runs on to the first.
+    """
+    s = arc_lengths(points, closed=closed)
+    around = np.vstack([points, points[:1]]) if closed else points
+    if s[-1] <= 0.0:
+        return np.repeat(points[:1], len(fractions), axis=0)
+    at = (fractions % 1.0 if closed else np.clip(fractions, 0.0, 1.0)) * s[-1]
+    return np.column_stack([np.interp(at, s, around[:, i]) for i in range(points.shape[1])])
+
+
+def convex_girth(points: Floats) -> float:
+    """Length [m] of a tape around points: the perimeter of their convex hull.
+
+    Args:
+        points: #P by 2, or #P by 3 in a level plane, of which x and z count.
+
+    Raises:
+        InputError: if the points span no area.
+    """
+    from scipy.spatial import ConvexHull, QhullError
+
+    flat = points[:, [0, 2]] if points.shape[1] == 3 else points
+    try:
+        return float(ConvexHull(flat).area)
+    except QhullError as error:
+        raise InputError("profile: its points lie on one line, a girth needs a closed curve") from error
+
+
+def scale_to_girth(points: Floats, girth: float) -> Floats:
+    """Points of a level profile blown up or shrunk about their middle until a tape around them reads `girth` [m].
+
+    Args:
+        points: #P by 3, one height.
+        girth: wished convex girth [m].
+    """
+    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
+    factor = girth / convex_girth(points)
+    return middle + (points - middle) * np.array([factor, 1.0, factor])

@@ -1,0 +1,214 @@
+"""The blueprint of a scanned body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.mannequin.blueprint import Blueprint, Profile
+from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.profiles import Floats, arc_lengths
+from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
+from warpflat.mannequin.scan_limbs import neck_and_arms
+from warpflat.mannequin.scan_pose import ScanOptions, Slicer, upright
+from warpflat.mannequin.table_body import PRINCESS
+
+__all__ = ["ScanFound", "ScanOptions", "blueprint_from_scan"]
+
+# Smoothing of the sampled hulls: up the body [rows] and around it [harmonics kept].
+_UP_SIGMA = 1.5
+_HARMONICS = 28
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class ScanFound:
+    """What was found in a scan.
+
+    Attributes:
+        blueprint: ready for the grid.
+        source: one line for metrics.
+        notes: what was told from the shape, one sentence each.
+        sections: length [m] of the body's own section, hollows followed, at every closed level.
+    """
+
+    blueprint: Blueprint
+    source: str
+    notes: tuple[str, ...]
+    sections: Mapping[str, float]
+
+
+def blueprint_from_scan(vertices: Floats, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
+    """Slice a body scan into the curves that the grid is laid on.
+
+    Args:
+        vertices: #V by 3, any unit.
+        faces: #F by 3 or 4 (-1 in the last column for a triangle).
+        options: what is known about the scan.
+
+    Raises:
+        InputError: if the mesh is not a body that stands on two legs with its arms off the trunk.
+    """
+    points, triangles, notes = upright(vertices, faces, options)
+    slicer = Slicer(points, triangles)
+    trunk = trunk_sections(slicer)
+    levels, more = find_levels(trunk, options.landmarks)
+    profile = _profiles(trunk, levels)
+    quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile)
+    blueprint = Blueprint(
+        profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
+        neck=neck, collar=collar, attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
+    )  # fmt: skip
+    sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
+    return ScanFound(
+        blueprint=blueprint,
+        source=f"scan of a body {trunk.stature:.3f} m tall",
+        notes=(*notes, *more),
+        sections=sections,
+    )
+
+
+def _ray_radii(hull: Floats, middle: Floats, count: int) -> Floats:
+    """Distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x."""
+    corners = hull - middle
+    angle = np.arctan2(corners[:, 0], corners[:, 1]) % (2.0 * np.pi)
+    order = np.argsort(angle)
+    corners, angle = corners[order], angle[order]
+    rays = np.arange(count) * 2.0 * np.pi / count
+    after = np.searchsorted(angle, rays, side="right") % len(corners)
+    a, b = corners[after - 1], corners[after]
+    d = np.column_stack([np.sin(rays), np.cos(rays)])
+    along = b - a
+    bottom = d[:, 0] * along[:, 1] - d[:, 1] * along[:, 0]
+    top = a[:, 0] * along[:, 1] - a[:, 1] * along[:, 0]
+    safe = np.abs(bottom) > 1e-12
+    return np.where(safe, top / np.where(safe, bottom, 1.0), np.linalg.norm(a, axis=1))
+
+
+def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float], Profile]:
+    from scipy.ndimage import gaussian_filter1d
+
+    rows = np.flatnonzero(t.y < levels["armpit"] - 0.002)
+    count = 720
+    middle_z = 0.5 * (t.front + t.back)[rows]
+    # A row's rays start from a point that climbs smoothly, or the rows would be twisted against each other.
+    start = gaussian_filter1d(middle_z, 3.0, mode="nearest")
+    radii = np.stack([_ray_radii(t.hulls[i], np.array([0.0, z]), count) for i, z in zip(rows, start, strict=True)])
+    radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
+    spectrum = np.fft.rfft(radii, axis=1)
+    spectrum[:, _HARMONICS:] = 0.0
+    radii = np.fft.irfft(spectrum, count, axis=1)
+    y, girth = t.y[rows], t.girth[rows]
+    # A side seam hangs nearly plumb: midway between front and back, whose waves it does not follow.
+    side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
+    under = 0.5 * (t.armpits["left"][2] + t.armpits["right"][2])
+    near = np.clip((y - levels["waist"]) / (levels["armpit"] - levels["waist"]), 0.0, 1.0) ** 2
+    side_z = (1.0 - near) * side_z + near * under
+    rays = np.arange(count) * 2.0 * np.pi / count
+    outward = np.column_stack([np.sin(rays), np.cos(rays)])
+    bust_girth = float(np.interp(levels["bust"], y, girth))
+    apex = float(np.clip(np.interp(levels["bust"], t.y, t.apex), 0.085 * bust_girth, 0.125 * bust_girth))
+    known = [levels[level] for level in RING_LEVELS]
+    widths = np.array([PRINCESS[level] for level in RING_LEVELS]) * apex
+
+    def profile(height: float) -> Profile:
+        at = float(np.clip(np.interp(height, y, np.arange(len(y))), 0.0, len(y) - 1.001))
+        i, f = int(at), at - int(at)
+
+        def mix(values: Floats) -> Floats:
+            return np.asarray((1.0 - f) * values[i] + f * values[i + 1])
+
+        curve = mix(radii)[:, None] * outward + np.array([0.0, float(mix(start))])
+        s = arc_lengths(curve, closed=True)
+        half = count // 2
+        z = float(mix(side_z))
+        left = int(np.argmin(np.abs(curve[60 : half - 60, 1] - z))) + 60
+        right = int(np.argmin(np.abs(curve[half + 60 : count - 60, 1] - z))) + half + 60
+        around = np.vstack([curve, curve[:1]])
+        front_x, back_x = (float(np.interp(height, known, widths[:, k])) for k in (0, 1))
+        return Profile(
+            curve=curve, centre_front=0.0, side_left=_where(curve[:, 1], s, left, z), centre_back=float(s[half]),
+            side_right=_where(curve[:, 1], s, right, z), girth=float(mix(girth)),
+            princess={
+                "front-left": _share(curve[: left + 1], front_x),
+                "back-left": _share(curve[half : left - 1 : -1], back_x),
+                "back-right": _share(curve[half : right + 1], back_x),
+                "front-right": _share(around[: right - 1 : -1], front_x),
+            },
+        )  # fmt: skip
+
+    return profile
+
+
+def _where(values: Floats, s: Floats, i: int, wished: float) -> float:
+    """Arc length near sample `i` at which `values` pass `wished`."""
+    a, b = values[i - 1], values[i + 1]
+    if abs(b - a) < 1e-9:
+        return float(s[i])
+    f = float(np.clip((wished - a) / (b - a), 0.0, 1.0))
+    return float((1.0 - f) * s[i - 1] + f * s[i + 1])
+
+
+def _share(quarter: Floats, wished: float) -> float:
+    """Share of a quarter's length, from its centre line to its side, at which it is `wished` [m] off the midplane."""
+    s = arc_lengths(quarter)
+    rising = np.maximum.accumulate(np.abs(quarter[:, 0]))
+    return float(np.clip(np.interp(wished, rising, s) / s[-1], 0.2, 0.7))
+
+
+def _attractor(
+    slicer: Slicer, levels: Mapping[str, float], armpits: Mapping[str, tuple[float, float, float]]
+) -> Callable[[Floats], Floats]:
+    """The nearest place on the scan for every point, hollows between bust points and along the spine bridged.
+
+    As tape and cloth bridge them: all the way at the bust, less and less up to the pit of the neck.
+    """
+    from scipy.interpolate import RegularGridInterpolator
+
+    points, triangles = slicer.vertices, slicer.triangles
+    upper = points[triangles][:, :, 1].mean(axis=1) > 0.6 * points[:, 1].max()
+    closest = Closest(points, triangles[upper])
+    reach = 0.95 * min(abs(a[1]) for a in armpits.values())
+    x = np.linspace(-reach, reach, 61)
+    y = np.linspace(levels["bust"] - 0.02, levels["front_neck"], 24)
+    fronts, backs = np.zeros((len(y), len(x))), np.zeros((len(y), len(x)))
+    for i, height in enumerate(y):
+        flat = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(height))])[:, [0, 2]]
+        flat = flat[np.abs(flat[:, 0]) <= 1.02 * reach]
+        middle = 0.5 * (flat[:, 1].min() + flat[:, 1].max())
+        fronts[i] = _upper_hull(flat[flat[:, 1] > middle], x)
+        backs[i] = -_upper_hull(flat[flat[:, 1] <= middle] * np.array([1.0, -1.0]), x)
+    front = RegularGridInterpolator((y, x), fronts, bounds_error=False, fill_value=None)
+    back = RegularGridInterpolator((y, x), backs, bounds_error=False, fill_value=None)
+
+    def attract(where: Floats) -> Floats:
+        triangle, weights, _ = closest(where)
+        place = np.asarray(np.einsum("nk,nkd->nd", weights, closest.corners[triangle]))
+        at = place[:, [1, 0]]
+        share = np.clip((levels["front_neck"] - place[:, 1]) / (levels["front_neck"] - levels["bust"]), 0.0, 1.0)
+        share = share * share * (3.0 - 2.0 * share) * (np.abs(place[:, 0]) < reach)
+        ahead, behind = front(at), back(at)
+        is_front = place[:, 2] > 0.5 * (ahead + behind)
+        bridge = np.where(is_front, np.maximum(ahead - place[:, 2], 0.0), np.minimum(behind - place[:, 2], 0.0))
+        # What lies deeper than any hollow of chest or back is a shoulder or an arm, not a hollow.
+        place[:, 2] += np.where(np.abs(bridge) < 0.04, share * bridge, 0.0)
+        return place
+
+    return attract
+
+
+def _upper_hull(points: Floats, x: Floats) -> Floats:
+    """The upper side of the convex hull of points (x, z), at `x`."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = points[ConvexHull(points).vertices]
+    except (QhullError, ValueError):
+        return np.full(len(x), -np.inf if not len(points) else points[:, 1].max())
+    left, right = int(np.argmin(hull[:, 0])), int(np.argmax(hull[:, 0]))
+    chain = np.roll(hull, -right, axis=0)
+    upper = chain[: (left - right) % len(hull) + 1][::-1]
+    return np.asarray(np.interp(x, upper[:, 0], upper[:, 1]))

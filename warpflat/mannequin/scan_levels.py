@@ -1,0 +1,251 @@
+"""The levels of a scanned body, found from its shape: trunk sections, armpits, neck, bust, waist, hip."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.errors import InputError
+from warpflat.mannequin.profiles import Floats
+from warpflat.mannequin.scan_pose import Slicer
+
+__all__ = ["TrunkSections", "find_levels", "trunk_sections"]
+
+_UP = np.array([0.0, 1.0, 0.0])
+#: Directions in which every section's hull is sampled.
+_RAYS = 360
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TrunkSections:
+    """Horizontal sections of the trunk (of both legs together below the crotch), arms left out, from low to high.
+
+    Attributes:
+        stature: height of the scan [m].
+        y: #S, heights [m].
+        girth: #S, hull girth [m].
+        length: #S, length of the section itself [m], hollows followed; of both legs below the crotch.
+        area: #S, hull area [m2].
+        left, right: #S, extent towards +x and -x [m].
+        front, back: #S, extent forward and backward [m].
+        front_centre, back_centre: #S, z of the surface near the midplane [m].
+        apex: #S, distance of the foremost points from the midplane [m].
+        hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
+        crotch: height below which the legs are apart [m].
+        armpits: height at which the left and the right arm join the trunk [m], and the trunk's (x, z) there.
+    """
+
+    stature: float
+    y: Floats
+    girth: Floats
+    length: Floats
+    area: Floats
+    left: Floats
+    right: Floats
+    front: Floats
+    back: Floats
+    front_centre: Floats
+    back_centre: Floats
+    apex: Floats
+    hulls: tuple[Floats, ...]
+    crotch: float
+    armpits: Mapping[str, tuple[float, float, float]]
+
+
+def trunk_sections(slicer: Slicer) -> TrunkSections:
+    """Slice a scan that stands upright.
+
+    Raises:
+        InputError: if there is no trunk at some height.
+    """
+    from scipy.spatial import ConvexHull
+
+    stature = float(slicer.vertices[:, 1].max())
+    heights = np.arange(0.04, 0.93, 0.0025) * stature
+    rows: list[list[float]] = []
+    hulls: list[Floats] = []
+    crotch = 0.0
+    reach = 0.13 * stature
+    for y in heights:
+        parts = slicer.cut(_UP, float(y))
+        central = [p for p in parts if p.points[:, 0].min() < 0.0 < p.points[:, 0].max() and len(p.points) > 8]
+        if y > 0.38 * stature and central:
+            chosen = [max(central, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))]
+        else:
+            near = [p for p in parts if abs(p.points[:, 0].mean()) < reach + 0.06 * stature and len(p.points) > 8]
+            chosen = sorted(near, key=lambda p: -p.length)[:2]
+            crotch = float(y)
+        if not chosen:
+            raise InputError(f"scan: nothing of the body at {y:.2f} m above the floor; its mesh is broken there")
+        flat = np.concatenate([p.points for p in chosen])[:, [0, 2]]
+        hull = ConvexHull(flat)
+        centre = np.abs(flat[:, 0]) < 0.02 * stature
+        z_front, z_back = float(flat[:, 1].max()), float(flat[:, 1].min())
+        rows.append([
+            hull.area, sum(p.length for p in chosen), hull.volume, flat[:, 0].max(), -flat[:, 0].min(), z_front, z_back,
+            float(flat[centre, 1].max()) if centre.any() else z_front,
+            float(flat[centre, 1].min()) if centre.any() else z_back,
+            float(np.abs(flat[flat[:, 1] > z_front - 0.004 * stature][:, 0]).mean()),
+        ])  # fmt: skip
+        hulls.append(flat[hull.vertices])
+    table = np.array(rows).T
+    armpits = {
+        "left": _armpit(slicer, heights, table[3], 1.0, stature),
+        "right": _armpit(slicer, heights, table[4], -1.0, stature),
+    }
+    return TrunkSections(
+        stature=stature, y=heights, girth=table[0], length=table[1], area=table[2], left=table[3], right=table[4],
+        front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], hulls=tuple(hulls),
+        crotch=crotch, armpits=armpits,
+    )  # fmt: skip
+
+
+def _armpit(slicer: Slicer, y: Floats, reach: Floats, side: float, stature: float) -> tuple[float, float, float]:
+    """Where an arm joins the trunk: (height, x, z) just below the join."""
+    window = np.flatnonzero((y > 0.66 * stature) & (y < 0.84 * stature))
+    jump = next((i for i in window if reach[i + 1] > 1.22 * reach[i]), None)
+    where = "left" if side > 0 else "right"
+    if jump is None:
+        raise InputError(f"scan: no {where} armpit between 0.66 and 0.84 of the height; arms must stand off the body")
+    low, high = float(y[jump]), float(y[jump + 1])
+    point = np.zeros(3)
+    for _ in range(8):
+        middle = 0.5 * (low + high)
+        parts = [p for p in slicer.cut(_UP, middle) if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]
+        trunk = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2]))).points
+        if float((side * trunk[:, 0]).max()) > 1.22 * reach[jump]:
+            high = middle
+        else:
+            low = middle
+            point = trunk[int(np.argmax(side * trunk[:, 0]))]
+    if not point.any():
+        parts = [p for p in slicer.cut(_UP, low) if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]
+        trunk = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2]))).points
+        point = trunk[int(np.argmax(side * trunk[:, 0]))]
+    return low, float(point[0]), float(point[2])
+
+
+def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
+    """Heights [m] of the closed levels and of ``armpit``, ``front_neck``, ``side_neck``.
+
+    Waist: the smallest section between rib and hip bone; where a belly leaves none, the deepest hollow of the back.
+    Bust: the largest section between the waist and an inch below the armpits. Hip: where the seat, coming down from the
+    small of the back, first reaches seven eighths of its full prominence; further down a scan's girth only tells how
+    far apart the feet stand.
+
+    Args:
+        t: the sections.
+        given: landmarks that are taken as they are.
+
+    Raises:
+        InputError: if the levels do not come in a body's order.
+    """
+    h = t.stature
+    notes: list[str] = []
+    levels: dict[str, float] = {}
+    levels["armpit"] = min(t.armpits["left"][0], t.armpits["right"][0])
+    levels["waist"] = given.get("waist") or _waist(t, levels["armpit"], notes)
+    levels["bust"] = given.get("bust") or _bust(t, levels["waist"], levels["armpit"])
+    levels["hip"] = given.get("hip") or _hip(t, levels["waist"])
+    front = (t.y < levels["waist"] - 0.25 * (levels["waist"] - levels["hip"])) & (
+        t.y > levels["waist"] - 0.75 * (levels["waist"] - levels["hip"])
+    )
+    belly = float(t.y[front][np.argmax(_smooth(t.front, 3)[front])])
+    levels["abdomen"] = float(np.clip(belly, levels["waist"] - 0.62 * (levels["waist"] - levels["hip"]),
+                                      levels["waist"] - 0.38 * (levels["waist"] - levels["hip"])))  # fmt: skip
+    levels["underbust"] = levels["bust"] - 0.40 * (levels["bust"] - levels["waist"])
+    levels["thigh"] = min(0.44 * h, t.crotch - 0.01 * h, levels["hip"] - 0.05 * h)
+    levels["knee"], levels["ankle"] = 0.28 * h, 0.06 * h
+    levels["front_neck"], levels["side_neck"] = _neck(t, levels["armpit"])
+    for name, height in given.items():
+        levels[name] = height
+        notes.append(f"{name} was given: {height:.3f} m")
+    order = [
+        "ankle",
+        "knee",
+        "thigh",
+        "hip",
+        "abdomen",
+        "waist",
+        "underbust",
+        "bust",
+        "armpit",
+        "front_neck",
+        "side_neck",
+    ]
+    for low, high in itertools.pairwise(order):
+        if levels[high] - levels[low] < 0.004 * h:
+            raise InputError(
+                f"scan: {high} ({levels[high]:.3f} m) does not lie above {low} ({levels[low]:.3f} m); give landmarks"
+            )
+    return levels, notes
+
+
+def _smooth(values: Floats, sigma: float) -> Floats:
+    from scipy.ndimage import gaussian_filter1d
+
+    return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
+
+
+def _waist(t: TrunkSections, armpit: float, notes: list[str]) -> float:
+    window = np.flatnonzero((t.y > 0.565 * t.stature) & (t.y < min(0.69 * t.stature, armpit - 0.06 * t.stature)))
+    area = _smooth(t.area, 2.0)[window]
+    low = int(np.argmin(area))
+    if 0 < low < len(window) - 1:
+        return float(t.y[window][low])
+    back = _smooth(t.back_centre, 2.0)[window]
+    hollow = int(np.argmax(back))
+    if 0 < hollow < len(window) - 1:
+        notes.append("the trunk has no narrowest section; the waist is where the back is hollow")
+        return float(t.y[window][hollow])
+    notes.append("neither girth nor back shows a waist; it is put at 0.62 of the stature")
+    return 0.62 * t.stature
+
+
+def _bust(t: TrunkSections, waist: float, armpit: float) -> float:
+    limit = armpit - 0.014 * t.stature
+    y = np.arange(waist + 0.45 * (armpit - waist), limit, 0.0005)
+    if not len(y):
+        raise InputError(f"scan: no room for a bust between waist ({waist:.3f} m) and armpits ({armpit:.3f} m)")
+    area = np.interp(y, t.y, t.area)
+    # The fullest level is flat: its middle is steadier than its crest.
+    return float(y[area >= 0.997 * area.max()].mean())
+
+
+def _hip(t: TrunkSections, waist: float) -> float:
+    y = np.arange(max(0.44 * t.stature, t.crotch), waist, 0.0005)
+    if len(y) < 50:
+        raise InputError(
+            f"scan: waist ({waist:.3f} m) does not lie above the crotch ({t.crotch:.3f} m); give landmarks"
+        )
+    back = np.interp(y, t.y, t.back)
+    small = float(back[y > waist - 0.05 * t.stature].max())
+    seat = float(back.min())
+    if small - seat < 0.01 * t.stature:
+        return max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
+    return float(y[(small - back) >= 0.875 * (small - seat)].max())
+
+
+def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:
+    """Heights of the front neck point (the pit over the breastbone) and the side neck point.
+
+    Both are where an outline turns from the chest or the shoulder into the neck: the point furthest inside the chord.
+    """
+    window = (t.y > 0.80 * t.stature) & (t.y < 0.91 * t.stature)
+    narrow = float(t.y[window][np.argmin(_smooth(t.area, 1.0)[window])])
+
+    def corner(values: Floats, low: float, high: float) -> float:
+        rows = (t.y >= low) & (t.y <= high)
+        y, v = t.y[rows], _smooth(values, 1.0)[rows]
+        chord = v[0] + (v[-1] - v[0]) * (y - y[0]) / (y[-1] - y[0])
+        return float(y[int(np.argmax(chord - v))])
+
+    shoulder = armpit + 0.55 * (narrow - armpit)
+    front = corner(t.front_centre, armpit + 0.25 * (narrow - armpit), narrow)
+    half = 0.5 * (t.left + t.right)
+    side = corner(half, shoulder, narrow)
+    front = min(front, narrow - 0.012 * t.stature)
+    return front, float(np.clip(side, front + 0.008 * t.stature, front + 0.035 * t.stature))

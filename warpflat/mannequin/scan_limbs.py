@@ -1,0 +1,254 @@
+"""Neck, shoulders, armholes and arms of a scanned body."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
+from warpflat.mannequin.layout import QUARTERS
+from warpflat.mannequin.profiles import Floats, arc_lengths, resample
+from warpflat.mannequin.scan_levels import TrunkSections
+from warpflat.mannequin.scan_pose import Slicer
+
+__all__ = ["neck_and_arms"]
+
+#: How far the armhole's plane leans outward from the armpit up.
+_LEAN = np.radians(9.0)
+_HARMONICS = 5
+_NOTCH = 0.22
+
+
+def neck_and_arms(
+    slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], profile: Callable[[float], Profile]
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, Floats]:
+    """The curves above the bust.
+
+    Args:
+        slicer: the upright scan.
+        trunk: its horizontal sections.
+        levels: heights [m] of the levels and landmarks.
+        profile: the trunk's profile at a height [m].
+
+    Returns:
+        the quarters' curves, the arms' curves, the neck base's length [m], and the collar's curve (#P by 3 [m]).
+
+    Raises:
+        InputError: if the neck or an arm cannot be sliced.
+    """
+    neckline, collar = _neck(slicer, trunk, levels)
+    start = int(np.argmax(neckline[:, 2]))
+    neckline = np.roll(neckline, -start, axis=0)
+    collar = np.roll(collar, -int(np.argmax(collar[:, 2])), axis=0)
+    back = int(np.argmin(np.abs(neckline[:, 0]) + 10.0 * (neckline[:, 2] > neckline[:, 2].mean())))
+    quarters: dict[str, QuarterCurves] = {}
+    arms: dict[str, ArmCurves] = {}
+    for side, sign in (("left", 1.0), ("right", -1.0)):
+        around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
+        end = back if sign > 0 else len(neckline) - back
+        corner = int(np.argmax(sign * around[: end + 1, 0]))
+        hole = _armhole(slicer, trunk, side, sign)
+        tip = int(np.argmax(hole[:, 1]))
+        arms[side] = _arm(slicer, hole, sign, side)
+        # The loop runs from the underarm forward: its first half is the front.
+        halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
+        seam = _shoulder(slicer, around[corner], hole[tip])
+        for face, line in (("front", around[: corner + 1]), ("back", around[corner : end + 1][::-1])):
+            curve = halves[face]
+            rise = (curve[:, 1] - curve[-1, 1]) / max(curve[0, 1] - curve[-1, 1], 1e-9)
+            s = arc_lengths(curve)
+            notch = int(np.argmin(np.abs(rise - _NOTCH)))
+            row = _row(slicer, curve[notch], face)
+            bust = profile(levels["bust"])
+            first = bust.curve[0 if face == "front" else len(bust.curve) // 2]
+            bottom = np.array([0.0, levels["bust"], first[1]])
+            quarters[f"{face}-{side}"] = QuarterCurves(
+                neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
+                centre=_centre(slicer, bottom, row[0], line[0], face),
+            )  # fmt: skip
+    length = float(arc_lengths(neckline, closed=True)[-1])
+    return {name: quarters[name] for name in QUARTERS}, arms, length, collar
+
+
+def _loop(points: Floats, origin: Floats, first: Floats, second: Floats, harmonics: int, count: int = 360) -> Floats:
+    """A smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3."""
+    from scipy.spatial import ConvexHull
+
+    flat = np.column_stack([(points - origin) @ first, (points - origin) @ second])
+    hull = flat[ConvexHull(flat).vertices]
+    middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    corners = hull - middle
+    angle = np.arctan2(corners[:, 1], corners[:, 0]) % (2.0 * np.pi)
+    order = np.argsort(angle)
+    even = resample(corners[order], np.arange(720) / 720, closed=True)
+    even_angle = np.unwrap(np.arctan2(even[:, 1], even[:, 0]))
+    radius = np.linalg.norm(even, axis=1)
+    rays = np.arange(count) * 2.0 * np.pi / count
+    r = np.interp(rays, even_angle % (2.0 * np.pi), radius, period=2.0 * np.pi)
+    spectrum = np.fft.rfft(r)
+    spectrum[harmonics + 1 :] = 0.0
+    r = np.fft.irfft(spectrum, count)
+    plane = middle + np.column_stack([r * np.cos(rays), r * np.sin(rays)])
+    return np.asarray(origin + np.outer(plane[:, 0], first) + np.outer(plane[:, 1], second))
+
+
+def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tuple[Floats, Floats]:
+    """Neck base and collar, from the front over the left."""
+    front = np.array([0.0, levels["front_neck"], float(np.interp(levels["front_neck"], t.y, t.front_centre))])
+    side_z = 0.5 * float(
+        np.interp(levels["side_neck"], t.y, t.front_centre) + np.interp(levels["side_neck"], t.y, t.back_centre)
+    )
+    slope = (levels["side_neck"] - front[1]) / max(front[2] - side_z, 0.02)
+    slope = float(np.clip(slope, 0.15, 0.65))
+    normal = np.array([0.0, 1.0, slope]) / np.hypot(1.0, slope)
+    ahead = np.array([0.0, -slope, 1.0]) / np.hypot(1.0, slope)
+    left = np.array([1.0, 0.0, 0.0])
+
+    def ring(lift: float) -> Floats:
+        parts = [p for p in slicer.cut(normal, float(front @ normal) + lift)
+                 if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]  # fmt: skip
+        if not parts:
+            raise InputError(
+                f"scan: no neck at {front[1]:.2f} m above the floor; give front_neck and side_neck as landmarks"
+            )
+        part = max(parts, key=lambda p: p.length)
+        return _loop(part.points, part.points.mean(axis=0), ahead, left, _HARMONICS)
+
+    base = ring(0.004)
+    top = ring(0.035)
+    # A collar plane that meets the chin bulges: keep to a cylinder's growth.
+    wide = arc_lengths(top, closed=True)[-1] / arc_lengths(base, closed=True)[-1]
+    if wide > 1.02:
+        top = top.mean(axis=0) + (top - top.mean(axis=0)) * (0.95 / wide)
+    return base, top
+
+
+def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> Floats:
+    """The closed armhole in the leaning plane through the armpit, from the underarm forward."""
+    y, x, z = t.armpits[side]
+    normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
+    up = np.array([sign * np.sin(_LEAN), np.cos(_LEAN), 0.0])
+    ahead = np.array([0.0, 0.0, 1.0])
+    under = np.array([x, y, z])
+    parts = slicer.cut(normal, float(under @ normal) + 0.004)
+    near = [p.points[p.points[:, 1] > y - 0.002] for p in parts]
+    near = [p for p in near if len(p) > 8 and p[:, 1].max() > y + 0.03 * t.stature and p[:, 1].max() < 0.95 * t.stature]
+    if not near:
+        raise InputError(f"scan: no {side} armhole above the armpit at {y:.2f} m; arms must stand off the body")
+    points = max(near, key=len)
+    points = np.vstack([points, under + 0.004 * normal])
+    return _loop(points, points.mean(axis=0), -up, ahead, _HARMONICS)
+
+
+def _shoulder(slicer: Slicer, neck: Floats, tip: Floats) -> Floats:
+    """The seam from the side neck point to the shoulder point, on the scan's upper side."""
+    flat = tip - neck
+    normal = np.cross(flat, np.array([0.0, 1.0, 0.0]))
+    normal /= np.linalg.norm(normal)
+    t = np.linspace(0.0, 1.0, 40)
+    straight = neck + t[:, None] * flat
+    along = flat * np.array([1.0, 0.0, 1.0])
+    reach = float(np.linalg.norm(along))
+    along /= reach
+    points = np.concatenate([p.points for p in slicer.cut(normal, float(neck @ normal))] or [straight])
+    share = (points - neck) @ along / reach
+    line_y = neck[1] + share * flat[1]
+    keep = (share > 0.02) & (share < 0.98) & (np.abs(points[:, 1] - line_y) < 0.03)
+    if keep.sum() < 4:
+        return straight
+    order = np.argsort(share[keep])
+    lift = np.interp(t, share[keep][order], (points[:, 1] - line_y)[keep][order], left=0.0, right=0.0)
+    # A smooth arch through the scan's outline that keeps both ends.
+    fit = np.linalg.lstsq(np.column_stack([np.sin(np.pi * t), np.sin(2 * np.pi * t)]), lift, rcond=None)[0]
+    straight[:, 1] += fit[0] * np.sin(np.pi * t) + fit[1] * np.sin(2 * np.pi * t)
+    return straight
+
+
+def _row(slicer: Slicer, notch: Floats, face: str) -> Floats:
+    """The across-chest row on the scan, from the midplane to the armhole's notch."""
+    sign = 1.0 if face == "front" else -1.0
+    points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
+    side = np.sign(notch[0])
+    x = np.linspace(0.0, abs(notch[0]), 30)
+    width = x[1]
+    z = np.empty_like(x)
+    for i, at in enumerate(x):
+        near = points[np.abs(side * points[:, 0] - at) < width]
+        z[i] = sign * (sign * near[:, 2]).max() if len(near) else notch[2]
+    fit = np.polynomial.Polynomial.fit(x / x[-1], z - notch[2], 5)(x / x[-1])
+    z = notch[2] + fit - fit[-1] * (x / x[-1]) ** 3
+    return np.column_stack([side * x, np.full_like(x, notch[1]), z])
+
+
+def _centre(slicer: Slicer, bottom: Floats, chest: Floats, top: Floats, face: str) -> Floats:
+    """The centre line from the bust to the neckline on the scan."""
+    sign = 1.0 if face == "front" else -1.0
+    y = np.linspace(bottom[1], top[1], 24)
+    points = np.concatenate([p.points for p in slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-4)])
+    z = np.interp(y, [bottom[1], chest[1], top[1]], [bottom[2], chest[2], top[2]])
+    for i in range(2, len(y) - 1):
+        near = points[np.abs(points[:, 1] - y[i]) < 0.006]
+        near = near[np.abs(near[:, 2] - z[i]) < 0.05]
+        if len(near):
+            z[i] = sign * (sign * near[:, 2]).max()
+    z[1:-1] = np.convolve(z, [0.25, 0.5, 0.25], mode="same")[1:-1]
+    return np.column_stack([np.zeros_like(y), y, z])
+
+
+def _arm(slicer: Slicer, hole: Floats, sign: float, side: str) -> ArmCurves:
+    """Biceps, elbow and wrist from planes across the arm."""
+    points, triangles = slicer.vertices, slicer.triangles
+    middle = hole.mean(axis=0)
+    normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
+    limb = _beyond(points, triangles, normal, float(middle @ normal) + 0.004, middle)
+    reach = np.linalg.norm(limb - middle, axis=1)
+    hand = limb[int(np.argmax(reach))]
+    axis = (hand - middle) / reach.max()
+    if reach.max() < 0.2 * points[:, 1].max():
+        raise InputError(f"scan: the {side} arm is only {reach.max():.2f} m long; its mesh is broken")
+    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
+    up /= np.linalg.norm(up)
+    ahead = np.cross(axis, up)
+    ahead *= np.sign(ahead[2])
+
+    def ring(share: float) -> Floats:
+        parts = [p for p in slicer.cut(axis, float(middle @ axis) + share * reach.max()) if len(p.points) > 6]
+        # The arm may be bent, so its section lies anywhere near the axis; the trunk's and the legs' lie further off.
+        centre = middle + share * reach.max() * axis
+        near = [p for p in parts if np.linalg.norm(p.points.mean(axis=0) - centre) < 0.30 * reach.max()
+                and sign * p.points[:, 0].mean() > sign * middle[0]]  # fmt: skip
+        if not near:
+            raise InputError(f"scan: the {side} arm has no section {share:.0%} along it; its mesh is broken there")
+        part = max(near, key=lambda p: p.length)
+        return _loop(part.points, part.points.mean(axis=0), -up, ahead, 4, 240)
+
+    shares = np.linspace(0.60, 0.84, 25)
+    girths = np.array([arc_lengths(ring(float(s)), closed=True)[-1] for s in shares])
+    # Where the scan's hand is missing, the arm's torn end gives sections of half its girth and less.
+    whole = np.flatnonzero(girths > 0.6 * np.median(girths[:9]))
+    wrist = float(shares[whole[int(np.argmin(girths[whole]))]])
+    under = float((hole[0] - middle) @ axis) / reach.max()
+    tip = float((hole[int(np.argmax(hole[:, 1]))] - middle) @ axis) / reach.max()
+    clear = 0.032 / float(reach.max())
+    biceps = float(np.clip(max(under, tip) + clear, 0.10, 0.40 * wrist + 0.05))
+    return ArmCurves(biceps=ring(biceps), elbow=ring(biceps + 0.44 * (wrist - biceps)), wrist=ring(wrist))
+
+
+def _beyond(points: Floats, triangles: NDArray[np.int64], normal: Floats, offset: float, near: Floats) -> Floats:
+    """The vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    outside = points @ normal > offset
+    kept = triangles[outside[triangles].all(axis=1)]
+    ends = np.concatenate([kept[:, :2], kept[:, 1:]])
+    n = len(points)
+    _, label = connected_components(coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (n, n)), directed=False)
+    used = np.unique(kept)
+    if not len(used):
+        raise InputError("scan: nothing lies beyond the armhole; arms are missing")
+    close = used[int(np.argmin(np.linalg.norm(points[used] - near, axis=1)))]
+    return points[used[label[used] == label[close]]]

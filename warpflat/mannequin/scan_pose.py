@@ -1,0 +1,323 @@
+"""A scan brought upright: unit, up axis and facing told from the body's shape, or a clear refusal."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError, nearest
+from warpflat.mannequin.profiles import Floats
+
+__all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
+
+_UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
+_AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
+_STATURE = (1.2, 2.3)
+_LANDMARKS = (
+    "ankle",
+    "knee",
+    "thigh",
+    "hip",
+    "abdomen",
+    "waist",
+    "underbust",
+    "bust",
+    "armpit",
+    "front_neck",
+    "side_neck",
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class ScanOptions:
+    """What is known about a scan; what is left at None is told from the body's shape.
+
+    Attributes:
+        unit: ``m``, ``dm``, ``cm``, ``mm`` or ``in``.
+        up: axis that points to the head, as ``+y``.
+        facing: axis towards which the body looks, as ``+z``.
+        landmarks: heights above the floor [m] that are known better than shape can tell: bust, waist, hip, armpit, ...
+        mirror: average the left and the right side.
+    """
+
+    unit: str | None = None
+    up: str | None = None
+    facing: str | None = None
+    landmarks: Mapping[str, float] = field(default_factory=dict)
+    mirror: bool = False
+
+    def check(self) -> None:
+        """Raises InputError for an unknown unit, axis or landmark."""
+        if self.unit is not None and self.unit not in _UNITS:
+            raise InputError(f"scan unit {self.unit!r} is unknown: {nearest(self.unit, _UNITS)}")
+        for name in ("up", "facing"):
+            axis = getattr(self, name)
+            if axis is not None and axis not in _AXES:
+                raise InputError(f"scan {name} {axis!r} is no axis: {nearest(axis, _AXES)}")
+        if self.up and self.facing and self.up[1] == self.facing[1]:
+            raise InputError(f"scan: up {self.up} and facing {self.facing} lie on one axis; give two different ones")
+        for name, height in self.landmarks.items():
+            if name not in _LANDMARKS:
+                raise InputError(f"scan landmark {name!r} is unknown: {nearest(name, _LANDMARKS)}")
+            if not 0.0 < height < _STATURE[1]:
+                raise InputError(f"scan landmark {name} = {height:g} m: a height above the floor, 0 to {_STATURE[1]} m")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Slice:
+    """One connected part of a plane section.
+
+    Attributes:
+        points: #P by 3, where the plane meets mesh edges [m], in no order.
+        length: summed length of the section's segments [m].
+    """
+
+    points: Floats
+    length: float
+
+
+class Slicer:
+    """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
+
+    def __init__(self, vertices: Floats, triangles: NDArray[np.int64]) -> None:
+        ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
+        ends = np.sort(ends, axis=1).astype(np.int64)
+        keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
+        self.edges = np.column_stack([keys // len(vertices), keys % len(vertices)])
+        self.face_edges = np.ravel(inverse).reshape(-1, 3)
+        self.vertices = vertices
+        self.triangles = triangles
+
+    def cut(self, normal: Floats, offset: float) -> list[Slice]:
+        """The parts of the section where normal . x = offset, largest first by length."""
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
+        d = self.vertices @ normal - offset
+        d = np.where(d == 0.0, 1e-12, d)
+        crossing = (d[self.edges[:, 0]] > 0) != (d[self.edges[:, 1]] > 0)
+        first, second, third = (crossing[self.face_edges[:, k]] for k in range(3))
+        faces = np.flatnonzero(first | second | third)
+        if not len(faces):
+            return []
+        # Two of a cut triangle's edges cross the plane: which two, by the one that does not.
+        edges = self.face_edges[faces]
+        pairs = np.where(
+            ~first[faces, None], edges[:, [1, 2]], np.where(~second[faces, None], edges[:, [0, 2]], edges[:, [0, 1]])
+        )
+        used, local = np.unique(pairs, return_inverse=True)
+        local = np.ravel(local).reshape(-1, 2)
+        a, b = self.edges[used].T
+        t = (d[a] / (d[a] - d[b]))[:, None]
+        points = (1 - t) * self.vertices[a] + t * self.vertices[b]
+        graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), (len(used), len(used)))
+        count, label = connected_components(graph, directed=False)
+        length = np.bincount(
+            label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1), minlength=count
+        )
+        parts = [Slice(points=points[label == i], length=float(length[i])) for i in np.argsort(-length)]
+        return [p for p in parts if len(p.points) > 3]
+
+
+def upright(
+    vertices: Floats, faces: NDArray[np.int64], options: ScanOptions
+) -> tuple[Floats, NDArray[np.int64], list[str]]:
+    """A scan in metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
+
+    Args:
+        vertices: #V by 3, any unit.
+        faces: #F by 3 or 4, -1 in the last column for a triangle.
+        options: what is known.
+
+    Returns:
+        vertices (#W by 3 [m], welded), triangles (#T by 3), and what was found out, one sentence each.
+
+    Raises:
+        InputError: if the mesh is no body that stands on two legs, or its facing cannot be told.
+    """
+    options.check()
+    points, triangles = _welded(vertices, faces)
+    notes: list[str] = []
+    candidates = [options.up] if options.up else list(_AXES)
+    slicer = Slicer(points, triangles)
+    rated = [(_legs(slicer, _AXES[a]), a) for a in candidates]
+    (score, sideways), up_name = max(rated, key=lambda r: r[0][0])
+    if score < 0.6 or sideways is None:
+        seen = "with the given up axis " if options.up else "in any direction "
+        raise InputError(
+            f"scan: {seen}no two separate legs under one trunk and head; a standing body with feet apart is needed"
+        )
+    up = _AXES[up_name]
+    height = float(np.ptp(points @ up))
+    unit = options.unit or _unit_of(height)
+    size = height * _UNITS[unit]
+    if not _STATURE[0] <= size <= _STATURE[1]:
+        raise InputError(
+            f"scan: {size:.3g} m tall if its unit is {unit}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
+        )
+    if options.unit is None and unit != "m":
+        notes.append(f"the scan's unit was told from its height of {height:.4g}: {unit}")
+    if up_name != "+y":
+        notes.append(f"the scan's head was found towards {up_name}")
+    left = sideways - up * (sideways @ up)
+    left /= np.linalg.norm(left)
+    ahead = np.cross(left, up)
+    if options.facing:
+        wished = _AXES[options.facing] - up * (_AXES[options.facing] @ up)
+        if abs(ahead @ wished) < 0.7:
+            raise InputError(f"scan: it does not face {options.facing}: its legs stand side by side along that axis")
+        turn = float(np.sign(ahead @ wished))
+    else:
+        turn = _facing(slicer, up, ahead)
+    frame = np.array([left * turn, up, ahead * turn])
+    if options.facing is None and frame[2, 2] < 0.9:
+        notes.append(f"the scan was found to face ({frame[2, 0]:+.2f}, {frame[2, 1]:+.2f}, {frame[2, 2]:+.2f})")
+    new = points @ frame.T * _UNITS[unit]
+    new[:, 1] -= new[:, 1].min()
+    trunk = Slicer(new, triangles).cut(np.array([0.0, 1.0, 0.0]), 0.55 * size)
+    new[:, 0] -= 0.5 * (trunk[0].points[:, 0].min() + trunk[0].points[:, 0].max())
+    return new, triangles, notes
+
+
+def _welded(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+    if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] not in (3, 4):
+        raise InputError(
+            f"scan: vertices {vertices.shape} and faces {faces.shape}; #V by 3 and #F by 3 or 4 are needed"
+        )
+    if len(faces) < 100:
+        raise InputError(f"scan: {len(faces)} faces; a body scan has thousands")
+    if faces.min(initial=0) < -1 or faces.max(initial=0) >= len(vertices):
+        raise InputError(f"scan: a face names vertex {int(faces.max())}, but there are {len(vertices)} vertices")
+    used = np.unique(faces[faces >= 0])
+    if not np.isfinite(vertices[used]).all():
+        raise InputError(f"scan: vertex {int(used[~np.isfinite(vertices[used]).all(axis=1)][0])} is not finite")
+    triangles = faces[:, :3]
+    if faces.shape[1] == 4:
+        triangles = np.concatenate([triangles, faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    span = float(np.ptp(vertices[used], axis=0).max())
+    if span <= 0.0:
+        raise InputError("scan: all its vertices lie at one point")
+    _, first, inverse = np.unique(
+        np.round(vertices / (1e-6 * span)).astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    triangles = np.ravel(inverse)[triangles]
+    solid = (
+        (triangles[:, 0] != triangles[:, 1])
+        & (triangles[:, 1] != triangles[:, 2])
+        & (triangles[:, 2] != triangles[:, 0])
+    )
+    triangles = triangles[solid]
+    used, local = np.unique(triangles, return_inverse=True)
+    return vertices[first[used]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
+
+
+def _unit_of(height: float) -> str:
+    for unit, factor in _UNITS.items():
+        if _STATURE[0] <= height * factor <= _STATURE[1]:
+            return unit
+    raise InputError(
+        f"scan: {height:.4g} tall in its own unit, which is a body's height in none of {', '.join(_UNITS)}; scale it"
+    )
+
+
+def _hull_area_and_middle(points: Floats) -> tuple[float, Floats]:
+    """Area and centroid of the convex hull of plane points; the same however the plane's axes lie."""
+    from scipy.spatial import ConvexHull, QhullError
+
+    try:
+        hull = ConvexHull(points)
+    except QhullError:
+        return 0.0, points.mean(axis=0)
+    ring = points[hull.vertices]
+    after = np.roll(ring, -1, axis=0)
+    wedge = ring[:, 0] * after[:, 1] - ring[:, 1] * after[:, 0]
+    if hull.volume <= 0.0:
+        return 0.0, points.mean(axis=0)
+    return float(hull.volume), np.asarray((ring + after).T @ wedge / (6.0 * hull.volume))
+
+
+def _plane_axes(up: Floats) -> Floats:
+    """Two axes across `up`, 2 by 3."""
+    first = np.eye(3)[int(np.argmin(np.abs(up)))]
+    first = first - up * (first @ up)
+    first /= np.linalg.norm(first)
+    return np.array([first, np.cross(up, first)])
+
+
+def _legs(slicer: Slicer, up: Floats) -> tuple[float, Floats | None]:
+    """How much like a standing body the mesh is if `up` is up (0 to 1), and the direction from leg to leg."""
+    points = slicer.vertices
+    low, high = float((points @ up).min()), float((points @ up).max())
+    across = _plane_axes(up)
+
+    def parts(share: float) -> list[tuple[float, Floats]]:
+        found = []
+        for part in slicer.cut(up, low + share * (high - low)):
+            found.append(_hull_area_and_middle(part.points @ across.T))
+        found.sort(key=lambda f: -f[0])
+        return [f for f in found if f[0] > 0.15 * found[0][0]] if found else []
+
+    levels = np.linspace(0.07, 0.40, 12)
+    good, apart, middles = 0, [], []
+    for share in levels:
+        legs = parts(float(share))
+        if len(legs) == 2 and legs[0][0] < 2.0 * legs[1][0]:
+            good += 1
+            apart.append(legs[0][1] - legs[1][1])
+            middles.append(0.5 * (legs[0][1] + legs[1][1]))
+    if not apart:
+        return 0.0, None
+    reference = apart[0]
+    direction = np.mean([a * np.sign(a @ reference) for a in apart], axis=0)
+    if np.linalg.norm(direction) == 0.0:
+        return 0.0, None
+    middle = np.mean(middles, axis=0)
+    reach = 0.12 * (high - low)
+    # One trunk over the legs, broader than either of them, and one head over it, narrower than the trunk.
+    trunk, head = parts(0.62), parts(0.93)
+    body = bool(trunk) and np.linalg.norm(trunk[0][1] - middle) < reach
+    top = len(head) == 1 and np.linalg.norm(head[0][1] - middle) < 1.5 * reach
+    narrow = body and top and head[0][0] < 0.9 * trunk[0][0]
+    square = body and trunk[0][0] < (0.42 * (high - low)) ** 2
+    score = good / len(levels) if narrow and square else 0.0
+    return score, direction @ across
+
+
+def _facing(slicer: Slicer, up: Floats, ahead: Floats) -> float:
+    """+1 if the body looks along `ahead`, -1 if the other way.
+
+    Feet reach forward from the ankles; the seat stands out behind the waist more than anything stands out in front.
+    """
+    points = slicer.vertices
+    low, high = float((points @ up).min()), float((points @ up).max())
+    size = high - low
+
+    def band(a: float, b: float) -> Floats:
+        share = (points @ up - low) / size
+        return points[(share >= a) & (share <= b)] @ ahead
+
+    votes = 0.0
+    feet, ankles = band(0.0, 0.035), band(0.05, 0.08)
+    if len(feet) > 20 and len(ankles) > 20:
+        middle = 0.5 * (ankles.min() + ankles.max())
+        votes += float(np.clip(((feet.max() - middle) - (middle - feet.min())) / (0.04 * size), -1.0, 1.0)) * 1.5
+
+    def spans(a: float, b: float) -> tuple[float, float]:
+        cuts = [slicer.cut(up, low + s * size) for s in np.linspace(a, b, 8)]
+        trunks = [
+            max(c, key=lambda p: _hull_area_and_middle(p.points @ _plane_axes(up).T)[0]).points @ ahead
+            for c in cuts
+            if c
+        ]
+        return float(min(t.min() for t in trunks)), float(max(t.max() for t in trunks))
+
+    waist_cuts = [slicer.cut(up, low + s * size) for s in np.linspace(0.60, 0.64, 5)]
+    waist = np.concatenate([c[0].points @ ahead for c in waist_cuts if c])
+    seat = spans(0.49, 0.55)
+    votes += float(np.clip(((waist.min() - seat[0]) - (seat[1] - waist.max())) / (0.02 * size), -1.0, 1.0))
+    if abs(votes) < 0.25:
+        raise InputError("scan: front and back cannot be told apart by feet or seat; give facing, as facing = '+z'")
+    return float(np.sign(votes))

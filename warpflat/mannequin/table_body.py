@@ -1,0 +1,245 @@
+"""The blueprint of a body that is known by its measurements only: a dress form."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
+from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
+from warpflat.mannequin.measurements import Measurements, size_tables
+from warpflat.mannequin.profiles import Floats, Section, arc_lengths, resample, section_curve
+
+__all__ = ["PRINCESS", "blueprint_from_measurements"]
+
+#: Where the princess lines run: distance from the centre as a share of the bust points', by level, front and back.
+PRINCESS = {
+    "ankle": (0.62, 0.62), "knee": (0.80, 0.80), "thigh": (1.05, 1.05), "hip": (1.05, 1.08), "abdomen": (0.95, 0.95),
+    "waist": (0.82, 0.80), "underbust": (0.94, 0.92), "bust": (1.00, 1.00),
+}  # fmt: skip
+_SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0)}
+_ARM_ANGLE = np.radians(40.0)
+# How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
+_NOTCH = 0.22
+
+
+def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
+    """A symmetric dress form to a set of measurements.
+
+    Source of the cross-sections: ``data/sizes.toml``, sections of average statistical bodies.
+    """
+    profile = _profiles(measurements)
+    quarters = _quarters(measurements, profile)
+    return Blueprint(
+        profile=profile,
+        heights={level: measurements.heights[level] for level in RING_LEVELS},
+        quarters=quarters,
+        arms=_arms(measurements, quarters),
+        neck=measurements.lengths["neck"],
+        collar=_collar(measurements),
+    )
+
+
+def _profiles(m: Measurements) -> Callable[[float], Profile]:
+    """The horizontal profile at any height up to the bust."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    sections = size_tables()["bodies"][m.body]["sections"]
+    h = [m.heights[level] for level in RING_LEVELS]
+    girth = [m.lengths[level] for level in RING_LEVELS]
+    # A row above the bust, so that every curve knows that the bust is its crest; it never becomes part of the body.
+    above = m.heights["bust"] + 0.6 * (m.heights["bust"] - m.heights["underbust"])
+    y = np.array([*h, above])
+    size = m.lengths["bust"]
+
+    def column(key: str, top: float, scale: float) -> Floats:
+        values = [sections[level][key] * scale for level in RING_LEVELS]
+        return np.array([*values, values[-1] * top])
+
+    # Lengths in proportion to the girth, so that width, depth and girth swell together.
+    smooth = CubicSpline(
+        y,
+        np.column_stack([
+            [*girth, girth[-1] * 0.985], column("width", 1.0, 1.0), column("depth", 0.96, 1.0),
+            column("area", 0.99, 1.0), column("front", 0.95, 1.0), column("shift", 0.0, size / 100.0),
+        ]),
+        bc_type="natural",
+    )  # fmt: skip
+    local = PchipInterpolator(
+        y, np.column_stack([column("front_bump", 0.55, size / 100.0), column("back_bump", 1.0, size / 100.0)])
+    )
+    points = 0.5 * m.lengths["bust_points"]
+    places = PchipInterpolator(h, np.array([PRINCESS[level] for level in RING_LEVELS]) * points)
+
+    def profile(height: float) -> Profile:
+        g, width, depth, area, front, shift = smooth(height)
+        front_bump, back_bump = local(height)
+        front_x, back_x = places(height)
+        section = Section(
+            width=width * g, depth=depth * g, area=float(round(area, 9)), front=front, shift=shift,
+            front_bump=front_bump, back_bump=back_bump, bump_x=1.08 * points, bump_width=0.043 * size,
+        )  # fmt: skip
+        curve = section_curve(section)
+        s = arc_lengths(curve, closed=True)
+        half = len(curve) // 2
+        near = slice(half // 4, half - half // 4)
+        # The widest points stand where front and back half meet; read between samples, or the line would jitter.
+        side = float(np.interp(-shift, -curve[near, 1], s[:-1][near]))
+        ahead = float(np.interp(front_x, curve[: half // 2, 0], s[: half // 2]) / side)
+        behind = float(
+            np.interp(back_x, curve[half : half // 2 : -1, 0], s[half] - s[half : half // 2 : -1]) / (s[half] - side)
+        )
+        return Profile(
+            curve=curve, centre_front=0.0, side_left=side, centre_back=float(s[half]), side_right=float(s[-1] - side),
+            girth=float(g),
+            princess={"front-left": ahead, "back-left": behind, "back-right": behind, "front-right": ahead},
+        )  # fmt: skip
+
+    return profile
+
+
+def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str, QuarterCurves]:
+    """Neckline, shoulder, armhole and across-chest row to the measured widths and lengths."""
+    from scipy.interpolate import CubicSpline
+
+    h, size = m.heights, m.lengths["bust"] / 0.88
+    neckline = _neckline(m)
+    half = len(neckline) // 2
+    quarter = half // 2
+    side_neck = neckline[quarter]
+    slope = _SHOULDER_SLOPE[m.body]
+    along = np.array([np.cos(slope), -np.sin(slope), -0.045])
+    tip = side_neck + m.lengths["shoulder"] * along / np.linalg.norm(along)
+    bust = profile(h["bust"])
+    bust_centre_front = np.array([0.0, h["bust"], bust.curve[0, 1]])
+    bust_centre_back = np.array([0.0, h["bust"], bust.curve[len(bust.curve) // 2, 1]])
+    side = resample(bust.curve, np.array([bust.side_left / arc_lengths(bust.curve, closed=True)[-1]]), closed=True)[0]
+    under = np.array([side[0] + 0.001, h["underarm"], side[1] - 0.002])
+    level = h["underarm"] + _NOTCH * (tip[1] - h["underarm"])
+    reach = {"front": 0.050 * size, "back": -0.053 * size}
+    rise = (level - h["bust"]) / (neckline[0, 1] - h["bust"])
+    start_front = np.array([0.0, level, (1 - rise) * bust_centre_front[2] + rise * neckline[0, 2] + 0.016 * size])
+    start_back = np.array([0.0, level, min(bust_centre_back[2], neckline[half, 2] - 0.030 * size) - 0.005 * size])
+    chest = {
+        "front": _chest_row(start_front, under[2] + reach["front"], 0.5 * m.lengths["chest_width"], 0.0),
+        "back": _chest_row(start_back, under[2] + reach["back"], 0.5 * m.lengths["back_width"], -0.010 * size),
+    }
+
+    def armhole(face: str) -> tuple[Floats, float]:
+        notch = chest[face][-1]
+        other = chest["back" if face == "front" else "front"][-1]
+
+        def scoop(point: Floats) -> Floats:
+            at = 0.62 * point + 0.38 * under
+            at[1] = under[1] + 0.24 * (point[1] - under[1])
+            return at
+
+        def brow(point: Floats) -> Floats:
+            at = 0.60 * point + 0.40 * tip
+            at[2] = under[2] + 1.06 * (point[2] - under[2])
+            return at
+
+        points = np.array([
+            tip, brow(notch), notch, scoop(notch), under, scoop(other), other, brow(other), tip,
+        ])  # fmt: skip
+        t = arc_lengths(points) ** 1.0
+        spline = CubicSpline(t, points, bc_type="periodic")
+        dense = spline(np.linspace(0.0, t[4], 400))
+        return dense, float(arc_lengths(spline(np.linspace(0.0, t[2], 400)))[-1] / arc_lengths(dense)[-1])
+
+    curves: dict[str, QuarterCurves] = {}
+    for face, line, centre in (
+        ("front", neckline[: quarter + 1], np.array([bust_centre_front, start_front, neckline[0]])),
+        ("back", neckline[quarter : half + 1][::-1], np.array([bust_centre_back, start_back, neckline[half]])),
+    ):
+        hole, notch = armhole(face)
+        spline = CubicSpline(arc_lengths(centre), centre)
+        left = QuarterCurves(
+            neckline=line, bend=0.52, shoulder=np.linspace(side_neck, tip, 50), armhole=hole, notch=notch,
+            chest=chest[face], centre=spline(np.linspace(0.0, arc_lengths(centre)[-1], 100)),
+        )  # fmt: skip
+        curves[f"{face}-left"] = left
+        curves[f"{face}-right"] = _mirrored(left)
+    return {name: curves[name] for name in QUARTERS}
+
+
+def _mirrored(curves: QuarterCurves) -> QuarterCurves:
+    flip = np.array([-1.0, 1.0, 1.0])
+    return QuarterCurves(
+        neckline=curves.neckline * flip, bend=curves.bend, shoulder=curves.shoulder * flip,
+        armhole=curves.armhole * flip, notch=curves.notch, chest=curves.chest * flip, centre=curves.centre * flip,
+    )  # fmt: skip
+
+
+def _chest_row(start: Floats, end_z: float, length: float, swell: float) -> Floats:
+    """The level row from the centre to the notch, exactly `length` long; `swell` [m] is added at the blade."""
+    from scipy.optimize import brentq
+
+    t = np.linspace(0.0, 1.0, 200)
+
+    def row(width: float) -> Floats:
+        z = start[2] + (end_z - start[2]) * t**2.6 + swell * np.sin(np.pi * np.clip(t / 0.9, 0.0, 1.0)) ** 2
+        return np.column_stack([width * t, np.full_like(t, start[1]), z])
+
+    width = brentq(lambda w: arc_lengths(row(w))[-1] - length, 0.3 * length, 1.2 * length)
+    return row(float(width))
+
+
+def _neckline(m: Measurements) -> Floats:
+    """The closed neck base, from centre front over the left; its length is the neck measurement."""
+    from scipy.optimize import brentq
+
+    h, neck = m.heights, m.lengths["neck"]
+    depth, middle = 0.255 * neck, -0.010 * neck / 0.37
+    t = np.linspace(0.0, 2.0 * np.pi, 400, endpoint=False)
+    front, side, back = h["front_neck"], h["side_neck"], h["nape"]
+    c1, c2 = 0.5 * (front - back), 0.5 * (0.5 * (front + back) - side)
+    y = side + c2 + c1 * np.cos(t) + c2 * np.cos(2.0 * t)
+
+    def loop(width: float) -> Floats:
+        return np.column_stack([0.5 * width * np.sin(t), y, middle + 0.5 * depth * np.cos(t)])
+
+    width = brentq(lambda w: arc_lengths(loop(w), closed=True)[-1] - neck, 0.15 * neck, 0.6 * neck)
+    return loop(float(width))
+
+
+def _collar(m: Measurements) -> Floats:
+    """The upper end of the neck: a slighter, flatter curve above the neck base."""
+    base = _neckline(m)
+    middle = base.mean(axis=0)
+    top = middle + (base - middle) * np.array([0.90, 0.55, 0.98])
+    return top + np.array([0.0, 0.115, 0.035]) * (m.lengths["neck"] / 0.37) * 0.62
+
+
+def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, ArmCurves]:
+    """Both arms, hanging a little away from the body."""
+    front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
+    middle = np.vstack([front, back]).mean(axis=0)
+    tip, under = front[0], front[-1]
+    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), 0.06])
+    axis /= np.linalg.norm(axis)
+    up = np.array([np.cos(_ARM_ANGLE), np.sin(_ARM_ANGLE), 0.0])
+    ahead = np.cross(axis, up)
+    ahead *= np.sign(ahead[2])
+    start = float((tip - middle) @ axis)
+    length = m.lengths["arm_length"]
+    t = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
+
+    def ring(at: float, girth: float, flat: float, forward: float) -> Floats:
+        # From the underarm (-up) forward; `flat` is the depth over the height of the section.
+        shape = np.outer(-np.cos(t), up) + flat * np.outer(np.sin(t), ahead)
+        scale = girth / arc_lengths(shape, closed=True)[-1]
+        return middle + at * axis + forward * ahead + scale * shape
+
+    biceps_at = float((under - middle) @ axis) + 0.030
+    left = ArmCurves(
+        biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
+        elbow=ring(start + 0.575 * length, m.lengths["elbow"], 1.0, 0.004),
+        wrist=ring(start + length, m.lengths["wrist"], 1.15, 0.030),
+    )
+    flip = np.array([-1.0, 1.0, 1.0])
+    return {
+        "left": left,
+        "right": ArmCurves(biceps=left.biceps * flip, elbow=left.elbow * flip, wrist=left.wrist * flip),
+    }

@@ -1,0 +1,93 @@
+"""The mannequin as USD: bricks as named subsets of one mesh, profiles and lines as curves."""
+
+from __future__ import annotations
+
+import os
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.export.atomic import atomic_path
+from warpflat.export.usd_prims import extent_of, valid_name
+from warpflat.mannequin.normals import vertex_normals
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.mannequin import Mannequin
+
+__all__ = ["write_mannequin_usd"]
+
+_WIDTH = 0.0015
+_CLOTH = (0.80, 0.76, 0.68)
+_LINE = (0.55, 0.05, 0.10)
+
+
+def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
+    """Write ``/World/mannequin``: ``body`` with a GeomSubset per brick, and ``lines`` with one BasisCurves each.
+
+    Metres, Y up. A brick's or line's name as it is typed is its display name.
+
+    Raises:
+        InputError: if the file cannot be written.
+    """
+    from pxr import Kind, Usd, UsdGeom
+
+    with atomic_path(path) as temporary:
+        stage = Usd.Stage.CreateInMemory()
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+        world = UsdGeom.Xform.Define(stage, "/World")
+        Usd.ModelAPI(world.GetPrim()).SetKind(Kind.Tokens.assembly)
+        stage.SetDefaultPrim(world.GetPrim())
+        group = UsdGeom.Xform.Define(stage, "/World/mannequin").GetPrim()
+        Usd.ModelAPI(group).SetKind(Kind.Tokens.component)
+        group.SetDocumentation(mannequin.source)
+        _body(stage, mannequin)
+        _lines(stage, mannequin)
+        stage.GetRootLayer().Export(str(temporary))
+
+
+def _body(stage: Any, mannequin: Mannequin) -> None:
+    from pxr import Gf, UsdGeom, Vt
+
+    layout = mannequin.layout
+    points = mannequin.vertices.astype(np.float32)
+    mesh = UsdGeom.Mesh.Define(stage, "/World/mannequin/body")
+    mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(layout.faces), 4, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(layout.faces.reshape(-1), np.int32)))
+    normals = vertex_normals(mannequin.vertices, layout.faces).astype(np.float32)
+    mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
+    mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent_of(points)))
+    mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
+    taken: set[str] = set()
+    for index, name in enumerate(layout.bricks):
+        faces = np.flatnonzero(layout.face_brick == index).astype(np.int32)
+        subset = UsdGeom.Subset.CreateGeomSubset(
+            mesh, valid_name(name, taken), UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(faces), "brick",
+            UsdGeom.Tokens.partition,
+        )  # fmt: skip
+        subset.GetPrim().SetDisplayName(name)
+
+
+def _lines(stage: Any, mannequin: Mannequin) -> None:
+    from pxr import Gf, UsdGeom, Vt
+
+    UsdGeom.Scope.Define(stage, "/World/mannequin/lines")
+    taken: set[str] = set()
+    for name, points in mannequin.lines().items():
+        closed = bool(np.array_equal(points[0], points[-1]))
+        curve = UsdGeom.BasisCurves.Define(stage, f"/World/mannequin/lines/{valid_name(name, taken)}")
+        curve.GetPrim().SetDisplayName(name)
+        places = (points[:-1] if closed else points).astype(np.float32)
+        curve.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(places))
+        curve.CreateCurveVertexCountsAttr(Vt.IntArray([len(places)]))
+        curve.CreateTypeAttr(UsdGeom.Tokens.linear)
+        curve.CreateWrapAttr(UsdGeom.Tokens.periodic if closed else UsdGeom.Tokens.nonperiodic)
+        curve.CreateWidthsAttr(Vt.FloatArray([_WIDTH]))
+        curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
+        curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent_of(places, 0.5 * _WIDTH)))
+        curve.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_LINE)]))
