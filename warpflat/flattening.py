@@ -289,10 +289,10 @@ def flatten(
 
     begun = time.perf_counter()
     development = develop(surface, line)
-    run = _Run(surface, cloth, grain_angle, where, options, callback)
+    run = _Run(surface, cloth, grain_angle, where, options, callback, line)
     state = run.state_at(development.positions)
     stages = [run.stage("develop", state, seconds=time.perf_counter() - begun)]
-    state, outcome = run.relax(state, development, line)
+    state, outcome = run.relax(state, development)
     stages.append(run.stage("relax", state, outcome=outcome, seconds=outcome.seconds))
     return Flattening(
         surface=surface,
@@ -319,6 +319,7 @@ class _Run:
     device: wp.Device
     options: RelaxOptions
     callback: Callable[[Progress], None] | None
+    datum: IntArray
 
     def __post_init__(self) -> None:
         self.history: list[tuple[float, float, float, float]] = []
@@ -329,12 +330,13 @@ class _Run:
         network = SpringNetwork.build(
             self.surface, self.fabric, positions, grain_angle=self.grain_angle, device=self.device
         )
-        state = Relaxation(network, self.options, start=positions)
+        ends = (int(self.datum[0]), int(self.datum[-1]))
+        state = Relaxation(network, self.options, start=positions, upright=ends)
         if after is not None:
             state.steps, state.restarts = after.steps, after.restarts
         return state
 
-    def relax(self, state: Relaxation, development: Development, datum: IntArray) -> tuple[Relaxation, Outcome]:
+    def relax(self, state: Relaxation, development: Development) -> tuple[Relaxation, Outcome]:
         """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
         self._tell("develop", state, state.energies(), float("nan"))
         begun = time.perf_counter()
@@ -352,7 +354,7 @@ class _Run:
                 residual_tolerance=_FIRST_ROUND * self.options.residual_tolerance,
             )
             self._relax(state)
-            state = self.state_at(_turned(state.positions(), datum), after=state)
+            state = self.state_at(state.positions(), after=state)
         state.options = self.options
         outcome = self._relax(state)
         return state, replace(outcome, steps=state.steps, seconds=time.perf_counter() - begun)
@@ -392,16 +394,6 @@ class _Run:
 def _is_isotropic(fabric: Fabric) -> bool:
     same = np.isclose(fabric.stiffness_warp, fabric.stiffness_weft, rtol=1e-9)
     return bool(same and np.isclose(fabric.shear_stiffness, fabric.stiffness_warp / 2 / (1 + fabric.poisson_ratio)))
-
-
-def _turned(positions: FloatArray, datum: IntArray) -> FloatArray:
-    """The layout turned about the datum's first point so that the datum's chord points up."""
-    chord = positions[datum[-1]] - positions[datum[0]]
-    length = float(np.hypot(*chord))
-    if length == 0.0:
-        return positions
-    c, s = chord[1] / length, chord[0] / length
-    return (positions - positions[datum[0]]) @ np.array([[c, s], [-s, c]])
 
 
 def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:

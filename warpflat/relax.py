@@ -111,12 +111,15 @@ class Relaxation:
         network: the model.
         options: of `relax`; the time step is fixed once made.
         start: #V by 2, the first layout [m].
+        upright: two vertices whose chord is kept along +y, the ends of the datum: it is the grain, and nothing else
+            says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to the plane.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. On the network's device.
     """
 
     network: SpringNetwork
     options: RelaxOptions
     start: InitVar[NDArray[np.float64]]
+    upright: tuple[int, int] | None = None
 
     def __post_init__(self, start: NDArray[np.float64]) -> None:
         n, c, device = self.network.vertex_count, self.network.cell_count, self.network.device
@@ -250,18 +253,50 @@ class Relaxation:
         )
         return Energies(spring, float(self._cell_energy.numpy().sum()), kinetic)
 
+    def hold_upright(self) -> None:
+        """Turn the layout so that the chord of the datum points up, and take the turning out of the velocities."""
+        if self.upright is None:
+            return
+        position, velocity = self.positions(), np.array(self.velocity.numpy())
+        arm, weight = self._arms(position)
+        velocity -= (np.einsum("ij,ij,i->", arm, velocity, weight) / self._inertia(arm, weight)) * arm
+        chord = position[self.upright[1]] - position[self.upright[0]]
+        length = float(np.hypot(chord[0], chord[1]))
+        if length > 0.0:
+            c, s = chord[1] / length, chord[0] / length
+            turn = np.array([[c, s], [-s, c]])
+            centre = position.mean(axis=0)
+            position = (position - centre) @ turn + centre
+            velocity = velocity @ turn
+        self.position.assign(position)
+        self.velocity.assign(velocity)
+
+    def _arms(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Velocities of a rigid turn by 1 rad/s, and the weights by which motion is averaged: the stiffnesses."""
+        weight = np.asarray(self.network.spring_stiffness.numpy(), dtype=np.float64)
+        offset = position - np.average(position, axis=0, weights=weight)
+        return np.column_stack([-offset[:, 1], offset[:, 0]]), weight
+
+    @staticmethod
+    def _inertia(arm: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
+        return max(float(np.einsum("ij,ij,i->", arm, arm, weight)), 1e-300)
+
     def residual(self) -> float:
         """Largest force on a vertex, at the last evaluated state, over the mean force of the springs.
 
-        The mean has a floor of 1e-9 K L, the force of a spring strained by 1e-9, so that a layout without strain counts
-        as at rest.
+        Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
+        force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
         s = self.network.spring_arrays
         position = self.position.numpy()
         d = position[s.ends[:, 1]] - position[s.ends[:, 0]]
         mean = float(np.mean(s.stiffness * np.abs(np.sqrt(np.einsum("ij,ij->i", d, d)) - s.rest_length)))
         floor = 1e-9 * float(np.mean(s.stiffness * s.rest_length))
-        force = self.force.numpy()
+        force = np.array(self.force.numpy())
+        if self.upright is not None:
+            arm, weight = self._arms(position)
+            turning = np.einsum("ij,ij->", arm, force) / self._inertia(arm, weight)
+            force -= turning * weight[:, None] * arm
         return float(np.sqrt(np.einsum("ij,ij->i", force, force).max())) / max(mean, floor)
 
     def positions(self) -> NDArray[np.float64]:
@@ -293,6 +328,7 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
                 each_step(state, before, residual)
         now = state.energies()
         residual = state.residual()
+        state.hold_upright()
         at_rest = now.potential <= state.negligible_energy
         change = 0.0 if at_rest else abs(now.potential - before.potential) / (chunk * now.potential)
         converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
