@@ -94,6 +94,7 @@ def cli(context: click.Context) -> None:
     Examples:
       warpflat run scenes/dome.toml                       a scene file, into out/dome
       warpflat flatten front.obj --units cm --fabric denim
+      warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
     """
@@ -205,6 +206,75 @@ def flatten(
         tables["datum"] = datum.rstrip("/").rpartition("/")[2]
     scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
     return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+
+
+@cli.command()
+@click.option("--size", metavar="SIZE", help='Of a size table: "EU 38", "UK 10", "US 8", "JIS 9AR", "men 50".')
+@click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
+@click.option("--table", type=click.Choice(["women", "men"]), default="women", help="Completes the measurements.")
+@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, GLB.")
+@click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")
+@click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
+@click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")
+@click.option("--landmark", "landmarks", multiple=True, metavar="NAME=METRES", help="A height known better.")
+@click.option("--mirror", is_flag=True, help="Average the scan's left and right.")
+@click.option("--resolution", type=float, metavar="MM", help="Wished edge of the quads.  [default: 10]")
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
+@click.option("--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else.")
+def mannequin(
+    size: str | None,
+    measures: tuple[str, ...],
+    landmarks: tuple[str, ...],
+    resolution: float | None,
+    out: Path | None,
+    quiet: bool,
+    as_json: bool,
+    **source: Any,
+) -> int:
+    """Build a dress form of feature lines and bricks, and write USD, OBJ, measures and a labelled picture.
+
+    \b
+    Examples:
+      warpflat mannequin --size "EU 38"
+      warpflat mannequin --measure bust=0.90 --measure waist=0.74 --measure hip=0.99
+      warpflat mannequin --scan body.obj --units m --out body
+    """
+    from warpflat.console import mannequin_table
+    from warpflat.mannequin import write_mannequin
+    from warpflat.mannequin.table import MannequinTable, mannequin_from_table
+    from warpflat.toml_file import check_table
+
+    tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
+    if size is not None:
+        tables["size"] = size
+    if measures:
+        tables["measurements"] = dict(_metres(text, "--measure") for text in measures)
+    if landmarks:
+        tables["landmarks"] = dict(_metres(text, "--landmark") for text in landmarks)
+    if resolution is not None:
+        tables["resolution_mm"] = resolution
+    body = mannequin_from_table(check_table(MannequinTable, tables, "command line"), path_of=Path)
+    folder = out if out is not None else Path("out") / "mannequin"
+    files = write_mannequin(body, folder)
+    if as_json:
+        click.echo(files["metrics"].read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        for note in body.notes:
+            click.echo(f"warpflat: note: {note}", err=True)
+        click.echo(mannequin_table(body.source, body.levels()))
+        click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
+    return DONE
+
+
+def _metres(text: str, option: str) -> tuple[str, float]:
+    """NAME=METRES as a pair."""
+    name, equals, value = text.partition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        shown = f"{name.strip()}=0.88" if equals else "bust=0.88"
+        raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}") from None
 
 
 @cli.command()

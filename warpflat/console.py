@@ -13,8 +13,17 @@ from warpflat.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_na
 
 if TYPE_CHECKING:
     from warpflat.flattening import Progress
+    from warpflat.mannequin import Level
 
-__all__ = ["ProgressBar", "fabric_data", "fabric_sheet", "fabric_table", "run_summary", "warnings_of"]
+__all__ = [
+    "ProgressBar",
+    "fabric_data",
+    "fabric_sheet",
+    "fabric_table",
+    "mannequin_table",
+    "run_summary",
+    "warnings_of",
+]
 
 _REFRESH = 0.1  # [s]
 
@@ -97,6 +106,12 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
     return lines
+
+
+def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
+    """Height and girth of every level, from the neck down."""
+    rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
+    return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:

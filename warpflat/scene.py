@@ -19,6 +19,7 @@ from pydantic import ConfigDict, Discriminator, Field, Tag, create_model, model_
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
+from warpflat.mannequin.table import MannequinTable
 from warpflat.relax import RelaxOptions
 from warpflat.surface import (
     Surface,
@@ -168,16 +169,40 @@ class SceneTable(Table):
         Discriminator(_text_or_table),
     ] = DEFAULT_FABRIC
     fabric_files: list[str] = Field(default_factory=list)
-    surface: Annotated[
-        Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],
-        Discriminator(_kind_of_surface),
-    ]
+    surface: (
+        Annotated[
+            Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],
+            Discriminator(_kind_of_surface),
+        ]
+        | None
+    ) = None
+    mannequin: MannequinTable | None = None
+    form: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[dict[str, Any], Tag("table")],
+            Discriminator(_text_or_table),
+        ]
+        | None
+    ) = None
+    """A form's name, or a table of your own (see `warpflat.mannequin.form_from_mapping`)."""
+    half: bool = False
+    """Symmetric pieces as their left half, on the fold."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     datum: str | None = None
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
     device: str | None = None
     relax: RelaxTable = Field(default_factory=RelaxTable)
     output: OutputTable = Field(default_factory=OutputTable)
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SceneTable:
+        if (self.surface is None) == (self.mannequin is None):
+            raise ValueError("a scene needs either a [surface] table or a [mannequin] table with a form")
+        if (self.mannequin is None) != (self.form is None):
+            raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
+        if self.mannequin is not None and (self.lines or self.datum):
+            raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+        return self
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -251,7 +276,7 @@ def run_scene(
     on_progress: Callable[[Progress], None] | None = None,
     device: str | None = None,
 ) -> SceneResult:
-    """Flatten the scene's surface and write `metrics.json`, `NAME.obj`, `frames.usdc` and `picture.png`.
+    """Flatten the scene's surface, or the pieces of its form, and write `metrics.json`, `NAME.obj`, `frames.usdc` and `picture.png`.
 
     Args:
         scene: what to do.
@@ -269,6 +294,10 @@ def run_scene(
     relax = scene_relax_options(scene)
     fabric = scene_fabric(scene)
     folder = prepare_folder(out)
+    if settings.mannequin is not None:
+        from warpflat.scene_garment import run_garment
+
+        return run_garment(scene, folder, on_progress=on_progress, device=device)
     surface = scene_surface(scene)
     schedule = FrameSchedule(settings.output)
     with ExitStack() as stack:
@@ -288,7 +317,7 @@ def run_scene(
             if on_progress is not None:
                 on_progress(progress)
 
-        with _told_by(scene.where):
+        with told_by(scene.where):
             result = flatten(
                 surface,
                 fabric=fabric,
@@ -319,22 +348,24 @@ def scene_surface(scene: Scene) -> Surface:
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
     """
     table = scene.settings.surface
+    if table is None:
+        raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
     if isinstance(table, ShapeSurface):
         from warpflat.shapes import make_shape
 
-        with _told_by(f"{scene.where}: surface"):
+        with told_by(f"{scene.where}: surface"):
             surface = make_shape(table.shape, **(table.model_extra or {}))
     else:
-        with _told_by(f"{scene.where}: surface.file"):
+        with told_by(f"{scene.where}: surface.file"):
             path = scene.folder / expand_variables(table.file)
         surface = read_surface(path, units=table.units, component=table.component, prim=table.prim, name=scene.name)
     surface = replace(surface, name=scene.name)
     for name, line in scene.settings.lines.items():
-        with _told_by(f"{scene.where}: lines.{name}"):
+        with told_by(f"{scene.where}: lines.{name}"):
             surface = with_lines(surface, {name: _line(surface, line)})
     datum = scene.settings.datum
     if datum is not None and datum not in surface.lines:
-        with _told_by(f"{scene.where}: datum"):
+        with told_by(f"{scene.where}: datum"):
             if datum not in SIDES:
                 raise InputError(f"unknown line {datum!r}; {nearest(datum, {*surface.lines, *SIDES})}")
             surface = with_lines(surface, {datum: line_on_border(surface, datum)})
@@ -368,12 +399,12 @@ def scene_fabric(scene: Scene) -> Fabric:
         InputError: an unknown name (names the nearest), or impossible values.
     """
     settings = scene.settings
-    with _told_by(f"{scene.where}: fabric_files"):
+    with told_by(f"{scene.where}: fabric_files"):
         files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
     library = load_library(files)
     if isinstance(settings.fabric, FabricTable):
         return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
-    with _told_by(f"{scene.where}: fabric"):
+    with told_by(f"{scene.where}: fabric"):
         return find_fabric(settings.fabric, library)
 
 
@@ -385,7 +416,7 @@ def scene_relax_options(scene: Scene) -> RelaxOptions:
     """
     given = {key: value for key, value in scene.settings.relax.model_dump().items() if value is not None}
     options = RelaxOptions(**given)
-    with _told_by(scene.where):
+    with told_by(scene.where):
         options.validate()
     return options
 
@@ -437,7 +468,7 @@ class FrameSchedule:
 
 
 @contextmanager
-def _told_by(where: str) -> Iterator[None]:
+def told_by(where: str) -> Iterator[None]:
     """Begin the messages of mistakes inside with `where`."""
     try:
         yield

@@ -1,0 +1,105 @@
+"""Scenes whose pieces are a form on a mannequin."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+from warpflat.flattening import Progress
+from warpflat.garment import Garment, flatten_form
+from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
+from warpflat.mannequin.table import mannequin_from_table
+from warpflat.scene import (
+    FrameSchedule,
+    Scene,
+    SceneResult,
+    expand_variables,
+    scene_fabric,
+    scene_relax_options,
+    told_by,
+)
+
+__all__ = ["run_garment", "scene_form"]
+
+
+def scene_form(scene: Scene) -> tuple[Mannequin, FormResult]:
+    """The scene's mannequin and the pieces of its form.
+
+    Raises:
+        InputError: the body, the form or a brick is wrong.
+    """
+    settings = scene.settings
+    assert settings.mannequin is not None  # the schema sees to it
+    with told_by(f"{scene.where}: mannequin"):
+        mannequin = mannequin_from_table(settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file))
+    with told_by(f"{scene.where}: form"):
+        if isinstance(settings.form, str):
+            form = shipped_form(settings.form)
+        else:
+            form = form_from_mapping(scene.name, settings.form or {})
+        return mannequin, mannequin.form(form, half=settings.half)
+
+
+def run_garment(
+    scene: Scene,
+    out: Path,
+    *,
+    on_progress: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> SceneResult:
+    """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
+    from warpflat.export import FrameWriter
+
+    settings = scene.settings
+    relax = scene_relax_options(scene)
+    fabric = scene_fabric(scene)
+    mannequin, form = scene_form(scene)
+    schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
+    wanted = next(iter(schedules.values())).wanted
+    with ExitStack() as stack:
+        writer: FrameWriter | None = None
+        if wanted:
+            writer = stack.enter_context(FrameWriter(out / "frames.usdc"))
+            for name, piece in form.pieces.items():
+                writer.add_piece(name, piece.surface)
+
+        def each_step(name: str, progress: Progress) -> None:
+            if writer is not None and schedules[name].is_due(progress.step, progress.max_steps):
+                writer.write(
+                    name,
+                    positions=progress.positions(),
+                    face_energy_density=progress.face_energy_density(),
+                    measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
+                )
+            if on_progress is not None:
+                on_progress(progress)
+
+        with told_by(scene.where):
+            garment = flatten_form(
+                mannequin,
+                form,
+                fabric=fabric,
+                grain_angle=settings.grain_angle,
+                relax=relax,
+                callback=each_step,
+                device=device or settings.device,
+            )
+        if writer is not None:
+            _last_frames(writer, garment)
+    files = garment.save(out, picture=settings.output.picture)
+    if wanted:
+        files.append("frames.usdc")
+    return SceneResult(metrics=garment.metrics(), files=tuple(files), notes=garment.notes)
+
+
+def _last_frames(writer: Any, garment: Garment) -> None:
+    for name, piece in garment.pieces.items():
+        numbers = {key: value for key, value in piece.measures.items() if isinstance(value, (int, float))}
+        writer.write(
+            name,
+            positions=piece.positions,
+            face_energy_density=piece.face_energy_density,
+            measures={"step": piece.stages[-1].steps, **numbers},
+        )
