@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from warpflat.errors import InputError
+from warpflat.export import validate_usd
 from warpflat.fabric import DEFAULT_FABRIC, find_fabric
 from warpflat.scene import FrameSchedule, OutputTable, load_scene, run_scene, scene_fabric, scene_surface
 
@@ -95,7 +96,9 @@ DOME = "[surface]\nshape = 'dome'\n"
     [
         ("", r"is empty; a scene needs at least a \[surface\] table"),
         ("name = 'x'\nname = 'y'\n", r"is not valid TOML: Cannot overwrite a value \(at line 2"),
-        ("fabric = 'woven'\n", r"surface: is missing"),
+        ("fabric = 'woven'\n", r"a scene needs either a \[surface\] table or a \[mannequin\] table with a form"),
+        ("[mannequin]\nsize = 'EU 38'\n", r"a mannequin and a form go together"),
+        ("form = 'bodice'\n[mannequin]\nmirror = true\n", r"give the body in one way: size"),
         ("fabrik = 'woven'\n" + DOME, r"fabrik: unknown key 'fabrik'; did you mean 'fabric'\? valid: "),
         ("[surface]\nshpe = 'dome'\n", r"surface.shpe: unknown key 'shpe'; did you mean 'shape'"),
         ("[surface]\nflie = 'x.obj'\n", r"surface.flie: unknown key 'flie'; did you mean 'file'"),
@@ -244,13 +247,15 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         pytest.skip("WARPFLAT_DATA is not set: the folder with the real meshes")
     scene = load_scene(path)
     result = run_scene(scene, tmp_path)
-    piece = result.metrics["pieces"][path.stem]
-    assert piece["stages"][-1]["converged"]
-    assert piece["flipped_faces"] == 0
+    for name, piece in result.metrics["pieces"].items():
+        assert piece["stages"][-1]["converged"], name
+        assert piece["flipped_faces"] == 0, name
     if path.stem in ("cone", "cylinder"):
-        assert piece["length_error"] < 1e-6
+        assert result.metrics["pieces"][path.stem]["length_error"] < 1e-6
     for name in result.files:
         assert (tmp_path / name).stat().st_size > 0
+    assert validate_usd(tmp_path / "frames.usdc") == []
+    assert json.loads((tmp_path / "metrics.json").read_text())["pieces"].keys() == result.metrics["pieces"].keys()
 
 
 def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):

@@ -415,7 +415,10 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
         raise InputError(f"datum {name!r} of piece {surface.name!r} has {len(line)} vertex; it needs two or more")
     if line[0] == line[-1]:
         raise InputError(f"datum {name!r} of piece {surface.name!r} is closed; it must run from one end to another")
-    return line, name, []
+    chord = surface.vertices[line[-1]] - surface.vertices[line[0]]
+    # A pattern lies as the piece hangs on the body (+y is up), whichever way its line happens to run.
+    downward = chord[1] < -0.1 * float(np.linalg.norm(chord))
+    return np.ascontiguousarray(line[::-1] if downward else line), name, []
 
 
 def _device(name: str | None) -> wp.Device:

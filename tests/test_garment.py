@@ -1,0 +1,97 @@
+"""Forms on a mannequin, flattened: pieces, seams, metrics, files."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpflat.errors import InputError
+from warpflat.garment import Garment, flatten_form
+from warpflat.mannequin import Mannequin
+from warpflat.scene import load_scene, run_scene
+
+
+@pytest.fixture(scope="module")
+def mannequin() -> Mannequin:
+    return Mannequin.from_size("EU 38", resolution_mm=25.0)
+
+
+@pytest.fixture(scope="module")
+def block(mannequin: Mannequin) -> Garment:
+    return flatten_form(mannequin, mannequin.form("basic_block"), fabric="woven")
+
+
+def test_every_piece_is_relaxed_and_lies_as_it_hangs(block: Garment):
+    assert list(block.pieces) == ["front_bodice", "back_bodice", "front_skirt", "back_skirt"]
+    for name, piece in block.pieces.items():
+        assert piece.converged, name
+        assert piece.flipped_faces == 0, name
+        centre = piece.datum
+        chord = piece.positions[centre[-1]] - piece.positions[centre[0]]
+        assert abs(chord[0]) < 1e-9, name
+        assert chord[1] > 0, name
+        assert piece.surface.vertices[centre[-1], 1] > piece.surface.vertices[centre[0], 1], name
+
+
+def test_symmetric_pieces_come_out_symmetric(block: Garment):
+    piece = block.pieces["front_skirt"]
+    left, right = (piece.positions[piece.surface.lines[f"side {side}"]] for side in ("left", "right"))
+    axis = piece.positions[piece.datum[0], 0]
+    left, right = left[np.argsort(left[:, 1])], right[np.argsort(right[:, 1])]
+    np.testing.assert_allclose(left[:, 0] - axis, axis - right[:, 0], atol=2e-5)
+
+
+def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
+    names = {seam.name for seam in block.seams}
+    assert {"side left", "side right", "shoulder left", "waist"} <= names
+    for seam, measured in zip(block.form.seams, block.seams, strict=True):
+        first, second = (block.form.pieces[name].surface.vertices for name in seam.pieces)
+        np.testing.assert_array_equal(first[seam.vertices[0]], second[seam.vertices[1]])
+        flat = [block.pieces[n].positions[v] for n, v in zip(seam.pieces, seam.vertices, strict=True)]
+        lengths = [np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for p in flat]
+        np.testing.assert_allclose(measured.lengths, lengths)
+        assert measured.as_dict()["difference_mm"] == pytest.approx(1e3 * (lengths[0] - lengths[1]))
+        assert abs(measured.ease) < 0.08
+
+
+def test_the_skirt_block_measures_what_the_table_says(block: Garment):
+    """Front and back hip lines together are the hip girth: a skirt hangs free of hollows there."""
+    hips = [block.pieces[name] for name in ("front_skirt", "back_skirt")]
+    length = sum(
+        np.linalg.norm(np.diff(piece.positions[piece.surface.lines["hip"]], axis=0), axis=1).sum() for piece in hips
+    )
+    assert length == pytest.approx(0.96, abs=0.01)
+
+
+def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
+    files = block.save(tmp_path)
+    metrics = json.loads((tmp_path / "metrics.json").read_text())
+    assert set(metrics["pieces"]) == set(block.pieces)
+    assert metrics["mannequin"]["levels"]["bust"]["girth_m"] == pytest.approx(0.88, abs=0.001)
+    seam = metrics["seams"][0]
+    assert {"name", "sides", "length_mm", "ease"} <= set(seam)
+    assert all("." in side for side in seam["sides"])
+    for name in block.pieces:
+        assert f"{name}.obj" in files
+        assert (tmp_path / f"{name}.obj").read_text().count("\nvt ") == len(block.pieces[name].positions)
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("form = 'bodise'\n[mannequin]\nsize = 'EU 38'\n", r"form: form 'bodise' is unknown.*'bodice'"),
+        ("form = 'bodice'\n[mannequin]\nsize = 'EU 138'\n", r"mannequin: size 'EU 138' is in no table"),
+        ("form = 'bodice'\n[mannequin.measurements]\nwaist = 3.0\n", r"mannequin: measurement waist = 3 m: valid range"),
+        ("[mannequin]\nsize = 'EU 38'\n[form.pieces]\nx = { bricks = ['wast-hip/front-*'] }\n", r"form: .*wast-hip"),
+        ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: no such file"),
+    ],
+)
+def test_a_wrong_body_or_form_is_one_line(tmp_path: Path, text: str, message: str):
+    path = tmp_path / "trial.toml"
+    path.write_text(text)
+    with pytest.raises(InputError, match=message) as caught:
+        run_scene(load_scene(path), tmp_path / "out")
+    assert "\n" not in str(caught.value)
