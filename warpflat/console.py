@@ -109,9 +109,12 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
-    """Height and girth of every level, from the neck down."""
-    rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
-    return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
+    """Height and girths of every level, from the neck down."""
+    rows = []
+    for name, level in levels.items():
+        body = level.girth if level.section is None else level.section
+        rows.append((name, f"{100 * level.height:.1f} cm", f"{100 * body:.1f} cm", f"{100 * level.girth:.1f} cm"))
+    return f"{source}\n{_aligned(('level', 'height', 'girth', 'by tape'), rows)}"
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:

@@ -60,6 +60,9 @@ def test_levels_are_where_the_body_has_them(sex: str) -> None:
         assert abs(section - girth) < 0.005, level
         # The tape bridges hollows, so it reads no more than the section, and little less.
         assert 0.97 * section < levels[level].girth <= section + 1e-6
+        told = body.metrics()["levels"][level]
+        assert abs(told["girth_m"] - girth) < 0.005, level
+        assert told["tape_m"] == levels[level].girth
     assert len(self_intersections(body.vertices, body.layout.faces)) == 0
 
 

@@ -26,6 +26,9 @@ __all__ = ["Level", "Mannequin"]
 _ROUNDS = 6
 
 
+_TRUNK_LEVELS = ("bust", "underbust", "waist", "abdomen", "hip")
+
+
 @dataclass(frozen=True, kw_only=True)
 class Level:
     """One feature profile.
@@ -164,7 +167,10 @@ class Mannequin:
         for name in reversed(RING_LEVELS):
             points = self.line(name)[:-1]
             found[name] = Level(
-                height=float(points[:, 1].mean()), girth=convex_girth(points), section=self.sections.get(name)
+                height=float(points[:, 1].mean()),
+                girth=convex_girth(points),
+                # Below the hip a section is of two legs, and a skirt's profile goes around both.
+                section=self.sections.get(name) if name in _TRUNK_LEVELS else None,
             )
         for side in ("left", "right"):
             for level in ARM_LEVELS:
@@ -196,10 +202,13 @@ class Mannequin:
         return realise(self, shipped_form(form) if isinstance(form, str) else form, half=half)
 
     def metrics(self) -> dict[str, Any]:
-        """What ``metrics.json`` says about the mannequin: its source and each level's height and girth [m]."""
+        """What ``metrics.json`` says about the mannequin: its source and each level's height and girths [m].
+
+        ``girth_m`` is the body's: of a scan the length of its section there, hollows followed. ``tape_m`` is what a tape
+        reads on the mannequin, which bridges hollows; without a scan the two are one.
+        """
         levels: dict[str, dict[str, float]] = {}
         for name, level in self.levels().items():
-            levels[name] = {"height_m": level.height, "girth_m": level.girth}
-            if level.section is not None:
-                levels[name]["section_m"] = level.section
+            body = level.girth if level.section is None else level.section
+            levels[name] = {"height_m": level.height, "girth_m": body, "tape_m": level.girth}
         return {"source": self.source, "notes": list(self.notes), "levels": levels}
