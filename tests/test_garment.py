@@ -66,6 +66,18 @@ def test_the_skirt_block_measures_what_the_table_says(block: Garment):
     assert length == pytest.approx(0.96, abs=0.01)
 
 
+def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
+    piece, carrier = block.pieces["front_bodice"], block.carrier("front_bodice")
+    drawn = np.linspace(piece.positions[piece.datum[3]], piece.positions[piece.surface.lines["bust"][5]], 7)
+    on_body = carrier.to_body(drawn)
+    np.testing.assert_allclose(carrier.to_pattern(on_body), drawn, atol=1e-6)
+    np.testing.assert_allclose(carrier.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
+    line = carrier.polyline_to_body(drawn)
+    assert len(line) >= len(drawn)
+    with pytest.raises(InputError, match=r"no piece 'front_bodise'; did you mean 'front_bodice'"):
+        block.carrier("front_bodise")
+
+
 def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
     files = block.save(tmp_path)
     metrics = json.loads((tmp_path / "metrics.json").read_text())
@@ -84,7 +96,10 @@ def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
     [
         ("form = 'bodise'\n[mannequin]\nsize = 'EU 38'\n", r"form: form 'bodise' is unknown.*'bodice'"),
         ("form = 'bodice'\n[mannequin]\nsize = 'EU 138'\n", r"mannequin: size 'EU 138' is in no table"),
-        ("form = 'bodice'\n[mannequin.measurements]\nwaist = 3.0\n", r"mannequin: measurement waist = 3 m: valid range"),
+        (
+            "form = 'bodice'\n[mannequin.measurements]\nwaist = 3.0\n",
+            r"mannequin: measurement waist = 3 m: valid range",
+        ),
         ("[mannequin]\nsize = 'EU 38'\n[form.pieces]\nx = { bricks = ['wast-hip/front-*'] }\n", r"form: .*wast-hip"),
         ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: no such file"),
     ],

@@ -90,7 +90,24 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 "yes" if _converged(piece) else "NO",
             )
         )
-    return f"{_aligned(head, rows)}\n{folder}: {', '.join(files)}"
+    tables = [_aligned(head, rows)]
+    if metrics.get("seams"):
+        tables.append(_seam_table(metrics["seams"]))
+    return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
+
+
+def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
+    head = ("seam", "sides", "mm", "mm", "difference")
+    rows = [
+        (
+            seam["name"],
+            " = ".join(seam["sides"]),
+            *(f"{length:.1f}" for length in seam["length_mm"]),
+            f"{seam['length_mm'][0] - seam['length_mm'][1]:+.1f} mm",
+        )
+        for seam in seams
+    ]
+    return _aligned(head, rows, left=(0, 1))
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:

@@ -10,9 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening import Flattening, Progress, flatten
-from warpflat.mannequin import FormResult, FormSeam, Mannequin
+from warpflat.mannequin import Carrier, FormResult, FormSeam, Mannequin
 from warpflat.relax import RelaxOptions
 
 __all__ = ["Garment", "SeamLengths", "flatten_form"]
@@ -93,6 +94,17 @@ class Garment:
             length_3d=_length(first.surface.vertices[seam.vertices[0]]),
             lengths=(_length(first.positions[seam.vertices[0]]), _length(second.positions[seam.vertices[1]])),
         )
+
+    def carrier(self, piece: str) -> Carrier:
+        """What carries points and drawn lines between a piece's pattern and the body, both ways.
+
+        Raises:
+            InputError: there is no such piece.
+        """
+        if piece not in self.pieces:
+            raise InputError(f"garment {self.name!r} has no piece {piece!r}; {nearest(piece, self.pieces)}")
+        flat = self.pieces[piece]
+        return Carrier(flat.surface.vertices, flat.positions, flat.faces)
 
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
