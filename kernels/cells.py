@@ -21,6 +21,7 @@ class Cells:
     weight: #C, 1 for a triangle, 1/2 for each of a quad's four corner triangles.
     offset: #V+1, where each vertex's entries in `slot` begin.
     slot: 3 times the cell plus the corner, for every cell around a vertex.
+    slack: #C, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
     """
 
     corner: wp.array(dtype=wp.vec3i)
@@ -28,6 +29,7 @@ class Cells:
     weight: wp.array(dtype=wp.float64)
     offset: wp.array(dtype=wp.int32)
     slot: wp.array(dtype=wp.int32)
+    slack: wp.array(dtype=wp.vec2d)
 
 
 @wp.struct
@@ -71,7 +73,7 @@ def thread_stress(worn: wp.vec2d, thread: wp.vec2d, stiffness: wp.float64, onset
 
 
 @wp.func
-def thread_curvature(worn: wp.vec2d, thread: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset: wp.float64):
+def thread_curvature(worn: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset: wp.float64):
     """The gradient of psi's stretch by a corner's place is -(F^T F e / |F e|) (grad w . e) for the barycentric weight w:
     returns K |F^T F e|^2 / |F e|^2, or 0 where the thread is not about to be guarded."""
     length = wp.length(worn)
@@ -119,8 +121,10 @@ def evaluate_guard(
         clearance[c] = det / longest
         inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
         F = cells.edges[c] * inv
-        worn_warp = F * guard.warp
-        worn_weft = F * guard.weft
+        warp = guard.warp * cells.slack[c][0]
+        weft = guard.weft * cells.slack[c][1]
+        worn_warp = F * warp
+        worn_weft = F * weft
         y_warp = excess_stretch(worn_warp, guard.onset_warp)
         y_weft = excess_stretch(worn_weft, guard.onset_weft)
         # The stiffness counts from half of the onset on, and always in slender cells: a step can take these from far
@@ -136,22 +140,22 @@ def evaluate_guard(
             density = wp.float64(0.5) * (
                 guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
             )
-            P = thread_stress(worn_warp, guard.warp, guard.stiffness_warp, guard.onset_warp) + thread_stress(
-                worn_weft, guard.weft, guard.stiffness_weft, guard.onset_weft
+            P = thread_stress(worn_warp, warp, guard.stiffness_warp, guard.onset_warp) + thread_stress(
+                worn_weft, weft, guard.stiffness_weft, guard.onset_weft
             )
             # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
             inv_t = wp.transpose(inv)
             G = (inv_t * density - wp.transpose(F) * P * inv_t) * area
             f1 = wp.vec2d(-G[0, 0], -G[1, 0])
             f2 = wp.vec2d(-G[0, 1], -G[1, 1])
-            q_warp = thread_curvature(worn_warp, guard.warp, F, guard.stiffness_warp, near_warp)
-            q_weft = thread_curvature(worn_weft, guard.weft, F, guard.stiffness_weft, near_weft)
+            q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, near_warp)
+            q_weft = thread_curvature(worn_weft, F, guard.stiffness_weft, near_weft)
             # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
             w1 = wp.vec2d(inv[0, 0], inv[0, 1])
             w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-            k0 = area * guard_bound(-(w1 + w2), guard, q_warp, q_weft, density)
-            k1 = area * guard_bound(w1, guard, q_warp, q_weft, density)
-            k2 = area * guard_bound(w2, guard, q_warp, q_weft, density)
+            k0 = area * guard_bound(-(w1 + w2), warp, weft, q_warp, q_weft, density)
+            k1 = area * guard_bound(w1, warp, weft, q_warp, q_weft, density)
+            k2 = area * guard_bound(w2, warp, weft, q_warp, q_weft, density)
             v0 = velocity[corner[0]]
             v1 = velocity[corner[1]]
             v2 = velocity[corner[2]]
@@ -168,11 +172,14 @@ def evaluate_guard(
 
 
 @wp.func
-def guard_bound(w: wp.vec2d, guard: ThreadGuard, q_warp: wp.float64, q_weft: wp.float64, density: wp.float64):
-    """Per area, the Gauss-Newton part of the second derivative, doubled since the three corners of a cell move at
-    once, and the part that the change of the area adds."""
-    along_warp = wp.dot(w, guard.warp)
-    along_weft = wp.dot(w, guard.weft)
+def guard_bound(
+    w: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q_warp: wp.float64, q_weft: wp.float64, density: wp.float64
+):
+    """Per area, twice the Gauss-Newton part of the second derivative by the corner's place, and the part that the change
+    of the area adds: at least the second derivative of a corner that moves alone, and, since the three corners of a cell
+    move at once, enough for the step to be stable (eigenvalues of the step's matrix below 2; measured 1.57)."""
+    along_warp = wp.dot(w, warp)
+    along_weft = wp.dot(w, weft)
     return wp.float64(2.0) * (
         q_warp * along_warp * along_warp + q_weft * along_weft * along_weft + density * wp.dot(w, w)
     )
@@ -195,8 +202,8 @@ def compute_guard_energy(
     if det > wp.float64(0.0):
         inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
         F = cells.edges[c] * inv
-        y_warp = excess_stretch(F * guard.warp, guard.onset_warp)
-        y_weft = excess_stretch(F * guard.weft, guard.onset_weft)
+        y_warp = excess_stretch(F * (guard.warp * cells.slack[c][0]), guard.onset_warp)
+        y_weft = excess_stretch(F * (guard.weft * cells.slack[c][1]), guard.onset_weft)
         energy[c] = (
             wp.float64(0.25)
             * det

@@ -12,6 +12,19 @@ wp.set_module_options({"enable_backward": False})
 STEP_SHARE = wp.constant(wp.float64(0.4))
 
 
+@wp.struct
+class Bonds:
+    """What else acts on the vertices, and where they may go.
+
+    offset: #V+1, where each vertex's entries in `slot` begin. slot: into the arrays of the bonds' forces, say of seams.
+    freedom: #V, (1, 1) for a free vertex, (0, 1) for one that keeps its x, as on a fold.
+    """
+
+    offset: wp.array(dtype=wp.int32)
+    slot: wp.array(dtype=wp.int32)
+    freedom: wp.array(dtype=wp.vec2d)
+
+
 @wp.kernel
 def gather_forces(
     position: wp.array(dtype=wp.vec2d),
@@ -25,6 +38,11 @@ def gather_forces(
     cell_force: wp.array(dtype=wp.vec2d),
     cell_viscosity: wp.array(dtype=wp.vec2d),
     cell_stiffness: wp.array(dtype=wp.float64),
+    bonds: Bonds,
+    bond_force: wp.array(dtype=wp.vec2d),
+    bond_viscosity: wp.array(dtype=wp.vec2d),
+    bond_stiffness: wp.array(dtype=wp.float64),
+    load: wp.array(dtype=wp.vec2d),
     time_step: wp.float64,
     first: int,
     # outputs
@@ -37,12 +55,13 @@ def gather_forces(
 ):
     """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), and the neighbours' share, eq. (9).
 
-    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. cell_*: as `cells.evaluate_guard`.
+    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. cell_*: as `cells.evaluate_guard`. bond_*: as
+    `seams.evaluate_seams`. load: #V, constant forces [N].
     force F [N], power F.v / K [m2/s], driving_force F~ [N], first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
     the cells' around the vertex [N/m], reach: how far it may move in this step [m]. All #V.
     """
     i = wp.tid() + first
-    total = spring_forces_on(i, position, springs)
+    total = spring_forces_on(i, position, springs) + load[i]
     driving = viscosity_forces_on(i, velocity, springs, time_step)
     k = spring_stiffness[i]
     height = wp.float64(wp.inf)
@@ -54,7 +73,13 @@ def gather_forces(
             total += cell_force[slot]
             driving += cell_viscosity[slot]
             k += cell_stiffness[slot]
-    driving += total
+    for b in range(bonds.offset[i], bonds.offset[i + 1]):
+        bond = bonds.slot[b]
+        total += bond_force[bond]
+        driving += bond_viscosity[bond]
+        k += bond_stiffness[bond]
+    total = wp.cw_mul(total, bonds.freedom[i])
+    driving = wp.cw_mul(driving, bonds.freedom[i]) + total
     force[i] = total
     power[i] = wp.dot(total, velocity[i]) / k
     driving_force[i] = driving
@@ -67,6 +92,7 @@ def gather_forces(
 def advance(
     mass: wp.array(dtype=wp.float64),
     springs: Springs,
+    bonds: Bonds,
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
@@ -86,7 +112,7 @@ def advance(
     for s in range(springs.offset[i], springs.offset[i + 1]):
         coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
     h2 = time_step * time_step
-    dv = (driving_force[i] * time_step + h2 * coupling) / (mass[i] + h2 * stiffness[i])
+    dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] + dv
     distance = wp.length(v) * time_step
     if distance > reach[i]:

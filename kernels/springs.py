@@ -13,12 +13,14 @@ class Springs:
     neighbor: the vertex at the far end.
     rest_length: length on the surface in space [m].
     stiffness: k_ij [N/m].
+    pull: 1 where the springs are the cloth, 0 where a membrane is and their k_ij only are the matrix of the step.
     """
 
     offset: wp.array(dtype=wp.int32)
     neighbor: wp.array(dtype=wp.int32)
     rest_length: wp.array(dtype=wp.float64)
     stiffness: wp.array(dtype=wp.float64)
+    pull: wp.float64
 
 
 @wp.func
@@ -37,7 +39,7 @@ def spring_forces_on(i: int, position: wp.array(dtype=wp.vec2d), springs: Spring
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     for s in range(springs.offset[i], springs.offset[i + 1]):
         force += spring_force(position[springs.neighbor[s]] - here, springs.rest_length[s], springs.stiffness[s])
-    return force
+    return springs.pull * force
 
 
 @wp.func
@@ -68,4 +70,4 @@ def compute_spring_energy(
     for s in range(springs.offset[i], springs.offset[i + 1]):
         stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
         total += wp.float64(0.25) * springs.stiffness[s] * stretch * stretch
-    energy[i] = total
+    energy[i] = springs.pull * total

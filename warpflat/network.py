@@ -14,19 +14,27 @@ which the springs lose their hold,
 with F from the plane to the surface and a the flat area. It is zero below the onset, it makes the energy convex against
 kinks (its sideways stiffness outweighs the springs' loss), and it grows without bound as a cell collapses, so that no
 face can be mirrored. Its share is reported as `guard_energy_j`.
+
+**Or a membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`):
+exact on any mesh, and without a guard. The springs then pull at nothing; their k_ij, set so that they bound the membrane's
+stiffness, stay the matrix of the approximate implicit step.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric
-from warpflat.kernels.cells import Cells, ThreadGuard
+from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
+from warpflat.kernels.implicit import Bonds
+from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
+from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
+from warpflat.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges, unfold_quad_diagonals
 
@@ -198,6 +206,42 @@ def _cell_stiffness(
     return np.where(swapped, across, along), np.where(swapped, along, across), np.full(len(corner), shear)
 
 
+def _shortened(
+    springs: SpringArrays,
+    surface: Surface,
+    positions: FloatArray,
+    axes: tuple[FloatArray, FloatArray],
+    stretch: FloatArray,
+) -> SpringArrays:
+    """The springs of a cloth that is worn stretched: a thread of unit direction u is |(s_warp u_warp, s_weft u_weft)| long."""
+    used = surface.faces >= 0
+    at = surface.faces[used]
+    faces = np.bincount(at, minlength=len(surface.vertices))
+    at_vertex = np.stack(
+        [
+            np.bincount(at, np.broadcast_to(stretch[:, k, None], used.shape)[used], minlength=len(faces)) / faces
+            for k in range(2)
+        ],
+        axis=1,
+    )
+    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
+    length = np.linalg.norm(d, axis=1)
+    u = np.stack([d @ axes[0], d @ axes[1]], axis=1) / np.where(length > 0.0, length, 1.0)[:, None]
+    worn = np.linalg.norm(u * 0.5 * (at_vertex[springs.ends[:, 0]] + at_vertex[springs.ends[:, 1]]), axis=1)
+    return replace(springs, rest_length=springs.rest_length / np.where(worn > 0.0, worn, 1.0))
+
+
+def _with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
+    """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
+    size = np.int64(springs.ends.max()) + 1
+    keys = np.sort(springs.ends, axis=1).astype(np.int64) @ np.array([size, 1])
+    order = np.argsort(keys)
+    sides = np.sort(np.stack([cells.corner, np.roll(cells.corner, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
+    spring = order[np.searchsorted(keys[order], (sides @ np.array([size, 1])).ravel())]
+    stiffness = np.bincount(spring, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
+    return replace(springs, stiffness=stiffness, clamped_cells=0)
+
+
 def vertex_masses(cells: CellArrays, fabric: Fabric, vertex_count: int) -> FloatArray:
     """#V [kg], a third of each cell's share of the cloth at each of its corners."""
     share = np.repeat(fabric.areal_density * cells.area / 3.0, 3)
@@ -211,7 +255,10 @@ class SpringNetwork:
     Attributes:
         surface, fabric, grain_angle: what it was made from.
         spring_arrays, cell_arrays: the same on the host, springs and cells once each.
-        springs, cells, guard: what the kernels take.
+        model: "springs", with their guard, or "membrane".
+        stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
+        held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
+        springs, cells, guard, cloth: what the kernels take.
         mass: #V [kg]. spring_stiffness: #V, sum of k_ij around each vertex, and a half of the stiffest [N/m].
         device: Warp device.
     """
@@ -222,9 +269,15 @@ class SpringNetwork:
     spring_arrays: SpringArrays
     cell_arrays: CellArrays
     device: wp.Device
+    model: Model = "springs"
+    stretch: FloatArray | None = None
+    held: FloatArray | None = None
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
     guard: ThreadGuard = field(init=False)
+    cloth: Cloth | None = field(init=False, default=None)
+    seams: Seams | None = field(init=False, default=None)
+    bonds: Bonds = field(init=False)
     mass: wp.array = field(init=False)
     spring_stiffness: wp.array = field(init=False)
 
@@ -237,15 +290,44 @@ class SpringNetwork:
         *,
         grain_angle: float = 0.0,
         device: str | wp.Device | None = None,
+        model: Model = "springs",
+        stretch: FloatArray | None = None,
     ) -> SpringNetwork:
-        """Network for the surface, with directions measured in the layout `positions` (#V by 2 [m])."""
+        """Network for the surface, with directions measured in the layout `positions` (#V by 2 [m]).
+
+        Args:
+            surface, fabric: what it is of.
+            positions: #V by 2, a layout [m].
+            grain_angle: of the warp against +y, degrees.
+            device: Warp device.
+            model: "springs" or "membrane".
+            stretch: #F by 2, length worn over length flat that is meant along warp and weft. Springs and cells then are at
+                rest in a pattern that is so much smaller.
+
+        Raises:
+            InputError: an unknown model.
+        """
+        check_model(model)
+        springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), cells_of(surface)
+        if stretch is not None:
+            springs = _shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
+        held = None
+        if model == "membrane":
+            meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
+            weights, held = step_matrix(
+                fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, meant
+            )
+            springs = _with_stiffness(springs, cells, weights)
         return cls(
             surface=surface,
             fabric=fabric,
             grain_angle=grain_angle,
-            spring_arrays=springs_of(surface, fabric, positions, grain_angle=grain_angle),
-            cell_arrays=cells_of(surface),
+            spring_arrays=springs,
+            cell_arrays=cells,
             device=wp.get_device(device),
+            model=model,
+            stretch=stretch,
+            held=held,
         )
 
     def __post_init__(self) -> None:
@@ -260,6 +342,7 @@ class SpringNetwork:
         springs.neighbor = wp.array(there[order], dtype=wp.int32, device=device)
         springs.rest_length = wp.array(s.rest_length[both], dtype=wp.float64, device=device)
         springs.stiffness = wp.array(s.stiffness[both], dtype=wp.float64, device=device)
+        springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
         sums = np.bincount(here, np.tile(s.stiffness, 2), minlength=count)
         stiffest = np.zeros(count)
@@ -274,7 +357,13 @@ class SpringNetwork:
         cells.weight = wp.array(c.weight, dtype=wp.float64, device=device)
         cells.offset = wp.array(cell_offset, dtype=wp.int32, device=device)
         cells.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=device)
+        slack = np.ones((len(c.corner), 2)) if self.stretch is None else 1.0 / self.stretch[c.face]
+        cells.slack = wp.array(slack, dtype=wp.vec2d, device=device)
         self.cells = cells
+        self.bonds = Bonds()
+        self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
+        self.bonds.slot = wp.zeros(0, dtype=wp.int32, device=device)
+        self.bonds.freedom = wp.array(np.ones((count, 2)), dtype=wp.vec2d, device=device)
 
         warp, weft = grain_axes(self.grain_angle)
         fabric = self.fabric
@@ -284,6 +373,16 @@ class SpringNetwork:
         guard.onset_warp = fabric.shear_stiffness / fabric.stiffness_warp
         guard.onset_weft = fabric.shear_stiffness / fabric.stiffness_weft
         self.guard = guard
+        if self.held is not None:
+            # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
+            self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
+
+    @property
+    def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
+        """Kernels of the forces and of the energy on the cells, and their parameters."""
+        if self.cloth is None:
+            return evaluate_guard, compute_guard_energy, self.guard
+        return evaluate_membrane, compute_membrane_energy, self.cloth
 
     @property
     def vertex_count(self) -> int:
@@ -294,6 +393,35 @@ class SpringNetwork:
     def cell_count(self) -> int:
         """#C."""
         return len(self.cell_arrays.corner)
+
+    @property
+    def seam_count(self) -> int:
+        """#P, pairs of edges that are sewn together."""
+        return 0 if self.seams is None else len(self.seams.ends)
+
+    def sew(self, ends: IntArray, ratio: FloatArray, stiffness: FloatArray) -> None:
+        """Sew pairs of edges together.
+
+        Args:
+            ends: #P by 4, vertices of the first edge, then of the second.
+            ratio: #P, wished length of the first over the second.
+            stiffness: #P [N/m].
+        """
+        seams = Seams()
+        seams.ends = wp.array(ends, dtype=wp.vec4i, device=self.device)
+        seams.ratio = wp.array(ratio, dtype=wp.float64, device=self.device)
+        seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=self.device)
+        seams.offset = wp.zeros(len(ends), dtype=wp.float64, device=self.device)
+        self.seams = seams
+        slot, offset = _by_vertex(ends.ravel(), np.zeros(ends.size, dtype=np.int32), self.vertex_count)
+        self.bonds.offset = wp.array(offset, dtype=wp.int32, device=self.device)
+        self.bonds.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=self.device)
+
+    def guide(self, vertices: IntArray) -> None:
+        """Let these vertices move up and down only, as on a fold or a straight centre front."""
+        freedom = np.ones((self.vertex_count, 2))
+        freedom[vertices, 0] = 0.0
+        self.bonds.freedom = wp.array(freedom, dtype=wp.vec2d, device=self.device)
 
     @property
     def spring_count(self) -> int:

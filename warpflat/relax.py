@@ -9,20 +9,20 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import InitVar, dataclass
+from collections.abc import Callable, Sequence
+from dataclasses import InitVar, dataclass, field
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
-from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
+from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
 from warpflat.network import SpringNetwork
 
-__all__ = ["Energies", "Outcome", "RelaxOptions", "Relaxation", "relax"]
+__all__ = ["Energies", "Outcome", "RelaxOptions", "Relaxation", "Upright", "relax"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +63,7 @@ class RelaxOptions:
 
 @dataclass(frozen=True)
 class Energies:
-    """[J]: of the springs, of the guard (see `warpflat.network`), and of the motion."""
+    """[J]: of the springs (of the membrane, where that is the model), of the guard (see `warpflat.network`), of the motion."""
 
     spring: float
     guard: float
@@ -103,6 +103,20 @@ class Outcome:
     seconds: float
 
 
+@dataclass(frozen=True, kw_only=True)
+class Upright:
+    """A piece and the two of its vertices that lie one above the other.
+
+    Attributes:
+        lower, upper: vertex indices.
+        vertices: those of the piece; all, if not given.
+    """
+
+    lower: int
+    upper: int
+    vertices: slice = field(default_factory=lambda: slice(None))
+
+
 @dataclass
 class Relaxation:
     """State and buffers of a running relaxation: allocated once, then a flat list of launches per step.
@@ -111,23 +125,26 @@ class Relaxation:
         network: the model.
         options: of `relax`; the time step is fixed once made.
         start: #V by 2, the first layout [m].
-        upright: two vertices whose chord is kept along +y, the ends of the datum: it is the grain, and nothing else
-            says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to the plane.
+        upright: of each piece the vertices whose chord is kept along +y, the ends of the datum: it is the grain, and
+            nothing else says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to
+            the plane.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. On the network's device.
     """
 
     network: SpringNetwork
     options: RelaxOptions
     start: InitVar[NDArray[np.float64]]
-    upright: tuple[int, int] | None = None
+    upright: Sequence[Upright] = ()
 
     def __post_init__(self, start: NDArray[np.float64]) -> None:
         n, c, device = self.network.vertex_count, self.network.cell_count, self.network.device
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
+        net_seams = self.network.seam_count
         self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
         self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self._load = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._power = wp.zeros(n, dtype=wp.float64, device=device)
@@ -138,6 +155,9 @@ class Relaxation:
         self._cell_viscosity = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
         self._cell_stiffness = wp.zeros(3 * c, dtype=wp.float64, device=device)
         self._cell_clearance = wp.zeros(c, dtype=wp.float64, device=device)
+        self._seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
+        self._seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
+        self._seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
         self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
         self._cell_energy = wp.zeros(c, dtype=wp.float64, device=device)
         springs = self.network.spring_arrays
@@ -151,10 +171,11 @@ class Relaxation:
         """Record the launches of a step: a recorded launch costs a fifth of a fresh one."""
         net, h = self.network, self.options.time_step
         n, c, device = net.vertex_count, net.cell_count, net.device
+        evaluate_cells, _, parameters = net.cell_model
         self._evaluate_cells = wp.launch(
-            evaluate_guard,
+            evaluate_cells,
             dim=c,
-            inputs=[self.position, self.velocity, net.cells, net.guard, h, 0],
+            inputs=[self.position, self.velocity, net.cells, parameters, h, 0],
             outputs=[
                 self._cell_acting,
                 self._cell_clearance,
@@ -165,6 +186,16 @@ class Relaxation:
             device=device,
             record_cmd=True,
         )
+        self._evaluate_seams = None
+        if net.seams is not None:
+            self._evaluate_seams = wp.launch(
+                evaluate_seams,
+                dim=net.seam_count,
+                inputs=[self.position, self.velocity, net.seams, h, 0],
+                outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
+                device=device,
+                record_cmd=True,
+            )
         self._gather = wp.launch(
             gather_forces,
             dim=n,
@@ -180,6 +211,11 @@ class Relaxation:
                 self._cell_force,
                 self._cell_viscosity,
                 self._cell_stiffness,
+                net.bonds,
+                self._seam_force,
+                self._seam_viscosity,
+                self._seam_stiffness,
+                self._load,
                 h,
                 0,
             ],
@@ -200,6 +236,7 @@ class Relaxation:
             inputs=[
                 net.mass,
                 net.springs,
+                net.bonds,
                 self._driving_force,
                 self._first_guess,
                 self._stiffness,
@@ -212,14 +249,18 @@ class Relaxation:
             record_cmd=True,
         )
 
+    def _evaluate(self) -> None:
+        self._evaluate_cells.launch()
+        if self._evaluate_seams is not None:
+            self._evaluate_seams.launch()
+        self._gather.launch()
+
     def step(self) -> None:
         """One approximate implicit step."""
-        self._evaluate_cells.launch()
-        self._gather.launch()
+        self._evaluate()
         if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
             self.velocity.zero_()
-            self._evaluate_cells.launch()
-            self._gather.launch()
+            self._evaluate()
             self.restarts += 1
         self._advance.launch()
         self.steps += 1
@@ -244,37 +285,52 @@ class Relaxation:
             device=device,
         )
         kinetic = float(self._vertex_energy.numpy().sum())
+        _, compute_cell_energy, parameters = net.cell_model
         wp.launch(
-            compute_guard_energy,
+            compute_cell_energy,
             dim=c,
-            inputs=[self.position, net.cells, net.guard, 0],
+            inputs=[self.position, net.cells, parameters, 0],
             outputs=[self._cell_energy],
             device=device,
         )
-        return Energies(spring, float(self._cell_energy.numpy().sum()), kinetic)
+        cells = float(self._cell_energy.numpy().sum())
+        return Energies(spring, cells, kinetic) if net.model == "springs" else Energies(cells, 0.0, kinetic)
 
     def hold_upright(self) -> None:
-        """Turn the layout so that the chord of the datum points up, and take the turning out of the velocities."""
-        if self.upright is None:
+        """Turn each piece so that the chord of its datum points up, and hold it there.
+
+        A load that is spread over the piece balances the torque with which the cloth would turn; what turning there is
+        in the velocities is taken out.
+        """
+        if not self.upright:
             return
         position, velocity = self.positions(), np.array(self.velocity.numpy())
-        arm, weight = self._arms(position)
-        velocity -= (np.einsum("ij,ij,i->", arm, velocity, weight) / self._inertia(arm, weight)) * arm
-        chord = position[self.upright[1]] - position[self.upright[0]]
-        length = float(np.hypot(chord[0], chord[1]))
-        if length > 0.0:
-            c, s = chord[1] / length, chord[0] / length
-            turn = np.array([[c, s], [-s, c]])
-            centre = position.mean(axis=0)
-            position = (position - centre) @ turn + centre
-            velocity = velocity @ turn
+        load = np.zeros_like(position)
+        force = self._cloth_force()
+        for piece in self.upright:
+            here = piece.vertices
+            chord = position[piece.upper] - position[piece.lower]
+            length = float(np.hypot(chord[0], chord[1]))
+            turn = np.array([[chord[1], chord[0]], [-chord[0], chord[1]]]) / length if length > 0.0 else np.eye(2)
+            centre = position[here].mean(axis=0)
+            position[here] = (position[here] - centre) @ turn + centre
+            velocity[here] = velocity[here] @ turn
+            arm, weight = self._arms(position, here)
+            inertia = self._inertia(arm, weight)
+            velocity[here] -= (np.einsum("ij,ij,i->", arm, velocity[here], weight) / inertia) * arm
+            load[here] = -(np.einsum("ij,ij->", arm, force[here] @ turn) / inertia) * weight[:, None] * arm
         self.position.assign(position)
         self.velocity.assign(velocity)
+        self._load.assign(load)
 
-    def _arms(self, position: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    def _cloth_force(self) -> NDArray[np.float64]:
+        """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
+        return np.array(self.force.numpy()) - self._load.numpy()
+
+    def _arms(self, position: NDArray[np.float64], vertices: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocities of a rigid turn by 1 rad/s, and the weights by which motion is averaged: the stiffnesses."""
-        weight = np.asarray(self.network.spring_stiffness.numpy(), dtype=np.float64)
-        offset = position - np.average(position, axis=0, weights=weight)
+        weight = np.asarray(self.network.spring_stiffness.numpy(), dtype=np.float64)[vertices]
+        offset = position[vertices] - np.average(position[vertices], axis=0, weights=weight)
         return np.column_stack([-offset[:, 1], offset[:, 0]]), weight
 
     @staticmethod
@@ -292,11 +348,11 @@ class Relaxation:
         d = position[s.ends[:, 1]] - position[s.ends[:, 0]]
         mean = float(np.mean(s.stiffness * np.abs(np.sqrt(np.einsum("ij,ij->i", d, d)) - s.rest_length)))
         floor = 1e-9 * float(np.mean(s.stiffness * s.rest_length))
-        force = np.array(self.force.numpy())
-        if self.upright is not None:
-            arm, weight = self._arms(position)
-            turning = np.einsum("ij,ij->", arm, force) / self._inertia(arm, weight)
-            force -= turning * weight[:, None] * arm
+        force = self._cloth_force()
+        for piece in self.upright:
+            arm, weight = self._arms(position, piece.vertices)
+            turning = np.einsum("ij,ij->", arm, force[piece.vertices]) / self._inertia(arm, weight)
+            force[piece.vertices] -= turning * weight[:, None] * arm
         return float(np.sqrt(np.einsum("ij,ij->i", force, force).max())) / max(mean, floor)
 
     def positions(self) -> NDArray[np.float64]:

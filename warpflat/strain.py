@@ -13,7 +13,9 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric
+from warpflat.kernels.membrane import compute_membrane_strain
 from warpflat.kernels.strain import Membrane, compute_worn_strain
+from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import border_edges, mesh_edges
@@ -26,13 +28,9 @@ FloatArray = NDArray[np.float64]
 def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
     """The fabric as an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21), and so on."""
     warp, weft = grain_axes(grain_angle)
-    nu = fabric.poisson_ratio
-    share = 1.0 / (1.0 - nu * nu * fabric.stiffness_weft / fabric.stiffness_warp)
     membrane = Membrane()
     membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
-    membrane.c_warp = fabric.stiffness_warp * share
-    membrane.c_weft = fabric.stiffness_weft * share
-    membrane.c_cross = nu * fabric.stiffness_weft * share
+    membrane.c_warp, membrane.c_weft, membrane.c_cross = plane_stress(fabric)
     membrane.shear = fabric.shear_stiffness
     return membrane
 
@@ -60,17 +58,23 @@ class WornStrain:
 
 
 def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
-    """Worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric."""
+    """Worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric.
+
+    Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
+    """
     count, device = network.cell_count, network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     strain = wp.empty(count, dtype=wp.vec3d, device=device)
     stress = wp.empty(count, dtype=wp.vec3d, device=device)
     energy = wp.empty(count, dtype=wp.float64, device=device)
     area = wp.empty(count, dtype=wp.float64, device=device)
+    kernel, cloth = compute_worn_strain, membrane_of(network.fabric, network.grain_angle)
+    if network.model == "membrane":
+        kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
     wp.launch(
-        compute_worn_strain,
+        kernel,
         dim=count,
-        inputs=[at, network.cells, membrane_of(network.fabric, network.grain_angle), 0],
+        inputs=[at, network.cells, cloth, 0],
         outputs=[strain, stress, energy, area],
         device=device,
     )

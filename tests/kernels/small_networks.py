@@ -1,0 +1,131 @@
+"""A network of a handful of faces, quads and triangles, and single kernels launched over it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from itertools import pairwise
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
+from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
+from warpflat.kernels.springs import compute_spring_energy
+
+from warpflat.fabric import Fabric
+from warpflat.network import SpringNetwork
+from warpflat.surface import make_surface
+
+DEVICE = "cpu"
+
+CLOTH = Fabric(
+    name="cloth",
+    stiffness_warp=1000.0,
+    stiffness_weft=600.0,
+    shear_stiffness=50.0,
+    areal_density=0.15,
+    poisson_ratio=0.1,
+)
+
+
+def small_network(*, fabric: Fabric = CLOTH, grain_angle: float = 0.0) -> SpringNetwork:
+    """Two quads below four triangles on a bent patch of 0.2 m by 0.24 m."""
+    x, y = np.meshgrid([-0.1, 0.0, 0.1], [0.0, 0.11, 0.24])
+    points = np.stack([x + 0.01 * y, y, 1.5 * x**2 - 0.8 * y**2], axis=-1).reshape(-1, 3)
+    faces = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, -1], [3, 7, 6, -1], [4, 5, 8, -1], [4, 8, 7, -1]]
+    surface = make_surface(points, faces)
+    return SpringNetwork.build(surface, fabric, surface.vertices[:, :2], grain_angle=grain_angle, device=DEVICE)
+
+
+def shaken(network: SpringNetwork, *, scale: float, noise: float = 0.004, seed: int = 3) -> NDArray[np.float64]:
+    """#V by 2, the patch seen from the front, made smaller or larger and shaken."""
+    rng = np.random.default_rng(seed)
+    return scale * network.surface.vertices[:, :2] + rng.normal(scale=noise, size=(network.vertex_count, 2))
+
+
+def vec2(values: NDArray[np.float64]) -> wp.array:
+    return wp.array(np.ascontiguousarray(values), dtype=wp.vec2d, device=DEVICE)
+
+
+def zeros(count: int, dtype: type = wp.float64) -> wp.array:
+    return wp.zeros(count, dtype=dtype, device=DEVICE)
+
+
+@dataclass
+class Launched:
+    """The kernels of one step, launched one by one in as many pieces as asked for; every output kept.
+
+    A kernel is given what it asks for by name, from the network or from `arrays`.
+    """
+
+    network: SpringNetwork
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+    time_step: float = 0.01
+    pieces: int = 1
+    arrays: dict[str, wp.array] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        n, c = self.network.vertex_count, self.network.cell_count
+        still = np.zeros((n, 2))
+        self.arrays = {
+            "position": vec2(self.positions),
+            "velocity": vec2(still if self.velocities is None else self.velocities),
+            "cell_acting": zeros(c, wp.int32),
+            "cell_clearance": zeros(c),
+            "cell_force": zeros(3 * c, wp.vec2d),
+            "cell_viscosity": zeros(3 * c, wp.vec2d),
+            "cell_stiffness": zeros(3 * c),
+            "cell_energy": zeros(c),
+            "force": zeros(n, wp.vec2d),
+            "power": zeros(n),
+            "driving_force": zeros(n, wp.vec2d),
+            "first_guess": zeros(n, wp.vec2d),
+            "stiffness": zeros(n),
+            "reach": zeros(n),
+            "energy": zeros(n),
+        }
+
+    def __getitem__(self, name: str) -> NDArray[np.float64]:
+        return np.array(self.arrays[name].numpy(), copy=True)
+
+    def _launch(self, kernel: wp.Kernel, count: int, *, per_cell: bool = False) -> None:
+        given = {
+            name: getattr(self.network, name) for name in ("springs", "cells", "guard", "mass", "spring_stiffness")
+        }
+        given |= {"bonds": getattr(self.network, "bonds", None), "time_step": self.time_step}
+        # no seam binds this network
+        given |= {"bond_force": zeros(0, wp.vec2d), "bond_viscosity": zeros(0, wp.vec2d), "bond_stiffness": zeros(0)}
+        given |= {"load": zeros(self.network.vertex_count, wp.vec2d)}
+        given |= self.arrays
+        if per_cell:
+            given |= {name[5:]: array for name, array in self.arrays.items() if name.startswith("cell_")}
+        names = [argument.label for argument in kernel.adj.args]
+        for first, last in pairwise(np.linspace(0, count, self.pieces + 1).astype(int).tolist()):
+            wp.launch(
+                kernel, dim=last - first, inputs=[{**given, "first": first}[name] for name in names], device=DEVICE
+            )
+
+    def evaluate_guard(self) -> Launched:
+        self._launch(evaluate_guard, self.network.cell_count, per_cell=True)
+        return self
+
+    def gather_forces(self) -> Launched:
+        self._launch(gather_forces, self.network.vertex_count)
+        return self
+
+    def advance(self) -> Launched:
+        self._launch(advance, self.network.vertex_count)
+        return self
+
+    def spring_energy(self) -> NDArray[np.float64]:
+        self._launch(compute_spring_energy, self.network.vertex_count)
+        return self["energy"]
+
+    def kinetic_energy(self) -> NDArray[np.float64]:
+        self._launch(compute_kinetic_energy, self.network.vertex_count)
+        return self["energy"]
+
+    def guard_energy(self) -> NDArray[np.float64]:
+        self._launch(compute_guard_energy, self.network.cell_count, per_cell=True)
+        return self["cell_energy"]

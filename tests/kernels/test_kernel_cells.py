@@ -1,0 +1,223 @@
+"""The thread guard on cells: energy, force, stiffness bound, clearance, and what becomes of collapsed cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from small_networks import CLOTH, DEVICE, Launched, shaken, small_network
+
+from warpflat.network import SpringNetwork, grain_axes
+from warpflat.surface import make_surface
+
+# How the patch, seen from the front, is made larger or smaller along weft and warp.
+SQUEEZES = {"none": (1.15, 1.2), "warp": (1.15, 0.8), "weft": (0.8, 1.2), "both": (0.75, 0.7)}
+
+
+def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """#C, a [1/2 K_warp <|F e_warp| - 1 - G/K_warp>^2 + the same for weft]."""
+    fabric, energies = network.fabric, []
+    for corner, edges, weight in zip(
+        network.cell_arrays.corner, network.cell_arrays.edges, network.cell_arrays.weight, strict=True
+    ):
+        flat = np.stack(
+            [positions[corner[1]] - positions[corner[0]], positions[corner[2]] - positions[corner[0]]], axis=1
+        )
+        area = 0.5 * np.linalg.det(flat)
+        deformation = edges @ np.linalg.inv(flat)
+        density = 0.0
+        for thread, stiffness in zip(
+            grain_axes(network.grain_angle), (fabric.stiffness_warp, fabric.stiffness_weft), strict=True
+        ):
+            excess = np.linalg.norm(deformation @ thread) - 1.0 - fabric.shear_stiffness / stiffness
+            density += 0.5 * stiffness * max(excess, 0.0) ** 2
+        energies.append(weight * area * density)
+    return np.array(energies)
+
+
+def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
+    """A network of one triangle (3 by 2 [m])."""
+    surface = make_surface(np.column_stack([shape, np.zeros(3)]), [[0, 1, 2]])
+    return SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE)
+
+
+def random_cell(seed: int) -> tuple[SpringNetwork, NDArray[np.float64]]:
+    """A triangle on the body and one in the plane, strained by up to a half, neither a sliver."""
+    rng = np.random.default_rng(seed)
+    angle = rng.uniform(0, 2 * np.pi) + 2 * np.pi * (np.arange(3) + rng.uniform(-0.25, 0.25, 3)) / 3
+    shape = 0.02 * np.column_stack([np.cos(angle), np.sin(angle)]) * rng.uniform(0.6, 1.4, (3, 1))
+    stretch = np.diag(rng.uniform(0.55, 1.1, 2)) + rng.uniform(-0.1, 0.1, (2, 2))
+    return one_cell(shape), shape @ stretch
+
+
+@pytest.mark.parametrize("grain_angle", [0.0, 45.0, 110.0])
+@pytest.mark.parametrize("active", SQUEEZES)
+def test_energy_is_that_of_the_formula(active: str, grain_angle: float):
+    network = small_network(grain_angle=grain_angle)
+    positions = shaken(network, scale=1.0, noise=0.001) * SQUEEZES[active]
+    by_hand = guard_energy_by_hand(network, positions)
+    np.testing.assert_allclose(Launched(network, positions).guard_energy(), by_hand, rtol=1e-10, atol=1e-15)
+    if active == "both":
+        assert (by_hand > 0).all()
+
+
+@pytest.mark.parametrize("grain_angle", [0.0, 30.0])
+@pytest.mark.parametrize("active", SQUEEZES)
+def test_forces_are_minus_the_gradient_of_the_energy(active: str, grain_angle: float):
+    network = small_network(grain_angle=grain_angle)
+    positions = shaken(network, scale=1.0, noise=0.001) * SQUEEZES[active]
+    at = Launched(network, positions).evaluate_guard()
+    corner_force = at["cell_force"].reshape(-1, 3, 2) * at["cell_acting"][:, None, None]
+    force = np.zeros_like(positions)
+    np.add.at(force, network.cell_arrays.corner, corner_force)
+    step, size = 1e-7, max(np.abs(force).max(), 1e-3)
+    for vertex in range(network.vertex_count):
+        for axis in (0, 1):
+            moved = np.stack([positions, positions])
+            moved[0, vertex, axis] += step
+            moved[1, vertex, axis] -= step
+            slope = np.subtract(*(Launched(network, p).guard_energy().sum() for p in moved)) / (2 * step)
+            assert force[vertex, axis] == pytest.approx(-slope, abs=2e-6 * size)
+    if active == "none":
+        assert not force.any()
+    else:
+        assert np.abs(force).max() > 1.0
+
+
+def test_each_direction_acts_alone():
+    """Squeezed across the other threads, a cell's force comes from one family only: it has that thread's direction."""
+    shape = np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]])
+    network = one_cell(shape)
+    for squeeze, axis in (((1.0, 0.8), 1), ((0.8, 1.0), 0)):
+        at = Launched(network, shape * squeeze).evaluate_guard()
+        force = at["cell_force"]
+        assert force[1 + axis, axis] > 0.1
+        # the other threads feel the area only: 1/2 K y^2 a / l, small against K y a / l
+        assert 0 <= -force[2 - axis, 1 - axis] < 0.2 * force[1 + axis, axis]
+
+
+def test_the_share_of_the_force_that_no_one_else_balances_is_zero():
+    network = small_network()
+    at = Launched(network, shaken(network, scale=0.8)).evaluate_guard()
+    force = at["cell_force"].reshape(-1, 3, 2)
+    assert at["cell_acting"].all()
+    np.testing.assert_allclose(force.sum(axis=1), 0.0, atol=1e-12 * np.abs(force).max())
+
+
+def corner_hessian(network: SpringNetwork, positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """6 by 6, second derivative of one cell's guard energy by its corners, from differences of its forces."""
+    step, columns = 1e-7, []
+    for index in range(6):
+        sides = []
+        for sign in (1.0, -1.0):
+            moved = positions.copy()
+            moved.ravel()[index] += sign * step
+            sides.append(Launched(network, moved).evaluate_guard()["cell_force"].ravel())
+        columns.append((sides[1] - sides[0]) / (2 * step))
+    return np.array(columns)
+
+
+@pytest.mark.parametrize("seed", range(30))
+def test_stiffness_bounds_the_second_derivative(seed: int):
+    """Of each corner moved alone by twice; and of all three at once within a factor of 2, beyond which an explicit
+    update by force over stiffness would diverge."""
+    network, positions = random_cell(seed)
+    at = Launched(network, positions).evaluate_guard()
+    hessian, bound = corner_hessian(network, positions), at["cell_stiffness"]
+    hessian = 0.5 * (hessian + hessian.T)
+    assert at.guard_energy()[0] > 0
+    for corner in range(3):
+        block = hessian[2 * corner : 2 * corner + 2, 2 * corner : 2 * corner + 2]
+        assert np.linalg.eigvalsh(block).max() <= 0.5 * bound[corner] * (1 + 1e-5)
+    scale = np.repeat(bound, 2) ** -0.5
+    assert np.linalg.eigvalsh(scale[:, None] * hessian * scale).max() < 1.8
+
+
+def test_stiffness_counts_from_half_of_the_onset():
+    shape = np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]])
+    network = one_cell(shape)
+    onset = CLOTH.shear_stiffness / CLOTH.stiffness_warp
+    for share, acts in ((0.4, 0), (0.6, 1)):
+        at = Launched(network, shape * [1.1, 1.0 / (1.0 + share * onset)]).evaluate_guard()
+        assert at["cell_acting"][0] == acts
+        assert not at["cell_force"].any()
+        assert at["cell_stiffness"].any() == bool(acts)
+        assert at.guard_energy()[0] == 0.0
+
+
+def test_slender_cells_always_count():
+    """Far from squeezed along both threads, a needle is one step away from it."""
+    shape = np.array([[0.0, 0.0], [0.1, 0.0], [0.05, 0.004]])
+    at = Launched(one_cell(shape), 1.5 * shape).evaluate_guard()
+    assert at["cell_acting"][0] == 1
+    assert (at["cell_stiffness"] > 0).any()
+    assert not at["cell_force"].any()
+
+
+@pytest.mark.parametrize("time_step", [1e-3, 10.0])
+def test_viscosity_pulls_towards_the_cells_mean_velocity(time_step: float):
+    network = small_network()
+    velocities = np.random.default_rng(8).normal(size=(network.vertex_count, 2))
+    positions = shaken(network, scale=0.8)
+    at = Launched(network, positions, velocities, time_step).evaluate_guard()
+    stiffness = at["cell_stiffness"].reshape(-1, 3)
+    v = velocities[network.cell_arrays.corner]
+    mean = np.einsum("ck,ckx->cx", stiffness, v) / stiffness.sum(axis=1)[:, None]
+    by_hand = time_step * stiffness[:, :, None] * (mean[:, None] - v)
+    np.testing.assert_allclose(at["cell_viscosity"].reshape(-1, 3, 2), by_hand, rtol=1e-10, atol=1e-12)
+    assert (np.einsum("ckx,ckx->c", by_hand, v) <= 0).all()
+    as_one = Launched(network, positions, np.tile([[0.3, -0.2]], (len(velocities), 1)), time_step).evaluate_guard()
+    np.testing.assert_allclose(as_one["cell_viscosity"], 0.0, atol=1e-9 * time_step * stiffness.max())
+
+
+def test_clearance_is_the_least_height():
+    network = small_network()
+    positions = shaken(network, scale=1.0)
+    at = Launched(network, positions).evaluate_guard()
+    p = positions[network.cell_arrays.corner]
+    area = 0.5 * np.linalg.det(np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2))
+    longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
+    np.testing.assert_allclose(at["cell_clearance"], 2 * area / longest, rtol=1e-12)
+
+
+@pytest.mark.parametrize(
+    "layout",
+    [
+        [[0.0, 0.0], [0.0, 0.02], [0.02, 0.0]],
+        [[0.0, 0.0], [0.01, 0.0], [0.02, 0.0]],
+        [[0.01, 0.01], [0.01, 0.01], [0.02, 0.0]],
+        [[0.01, 0.01], [0.01, 0.01], [0.01, 0.01]],
+    ],
+    ids=["mirrored", "collapsed", "two corners in one", "a point"],
+)
+def test_a_lost_cell_is_infinite_in_energy_and_has_no_force(layout: list[list[float]]):
+    network = one_cell(np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]]))
+    at = Launched(network, np.array(layout)).evaluate_guard()
+    assert at["cell_acting"][0] == 0
+    assert at["cell_clearance"][0] == 0.0
+    assert not at["cell_force"].any()
+    assert at.guard_energy()[0] == np.inf
+
+
+def test_nearly_collapsed_cells_stay_finite_and_push_apart():
+    shape = np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]])
+    network = one_cell(shape)
+    for squeeze in (1e-3, 1e-6, 1e-9):
+        at = Launched(network, shape * [1.0, squeeze]).evaluate_guard()
+        assert np.isfinite(at["cell_force"]).all()
+        assert np.isfinite(at["cell_stiffness"]).all()
+        assert at["cell_force"][2, 1] > 0
+        # 1/2 K <1/s - 1 - onset>^2 s A
+        onset = CLOTH.shear_stiffness / CLOTH.stiffness_warp
+        energy = 0.5 * CLOTH.stiffness_warp * (1 / squeeze - 1 - onset) ** 2 * squeeze * 0.0002
+        assert at.guard_energy()[0] == pytest.approx(energy, rel=1e-9)
+
+
+def test_pieces_of_a_launch_equal_the_whole():
+    network = small_network()
+    velocities = np.random.default_rng(2).normal(size=(network.vertex_count, 2))
+    arguments = (network, shaken(network, scale=0.8), velocities)
+    whole, parts = Launched(*arguments).evaluate_guard(), Launched(*arguments, pieces=2).evaluate_guard()
+    for name in ("cell_acting", "cell_clearance", "cell_force", "cell_viscosity", "cell_stiffness"):
+        assert np.array_equal(whole[name], parts[name]), name
+    assert np.array_equal(whole.guard_energy(), parts.guard_energy())

@@ -1,0 +1,102 @@
+"""Seams: forces against the energy's finite difference, viscosity against the force's change along the velocity."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from warpflat.kernels.seams import Seams, compute_seam_misses, evaluate_seams
+
+POSITIONS = np.array([[0.0, 0.0], [0.11, 0.02], [0.5, 0.1], [0.52, 0.19], [0.1, 0.12]])
+ENDS = np.array([[0, 1, 2, 3], [1, 4, 2, 3]], dtype=np.int32)
+RATIO, STIFFNESS, OFFSET = np.array([1.0, 1.2]), np.array([300.0, 500.0]), np.array([0.0, 0.004])
+
+
+def seams() -> Seams:
+    made = Seams()
+    made.ends = wp.array(ENDS, dtype=wp.vec4i, device="cpu")
+    made.ratio = wp.array(RATIO, dtype=wp.float64, device="cpu")
+    made.stiffness = wp.array(STIFFNESS, dtype=wp.float64, device="cpu")
+    made.offset = wp.array(OFFSET, dtype=wp.float64, device="cpu")
+    return made
+
+
+def misses(positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    lengths = [np.linalg.norm(positions[ENDS[:, k + 1]] - positions[ENDS[:, k]], axis=1) for k in (0, 2)]
+    return lengths[0] - RATIO * lengths[1]
+
+
+def energy(positions: NDArray[np.float64]) -> float:
+    return float((0.5 * STIFFNESS * (misses(positions) + OFFSET) ** 2).sum())
+
+
+def launch(positions: NDArray[np.float64], velocities: NDArray[np.float64], time_step: float = 0.01):
+    force, viscosity = (wp.zeros(8, dtype=wp.vec2d, device="cpu") for _ in range(2))
+    stiffness = wp.zeros(8, dtype=wp.float64, device="cpu")
+    at, moving = (wp.array(a, dtype=wp.vec2d, device="cpu") for a in (positions, velocities))
+    wp.launch(
+        evaluate_seams,
+        dim=2,
+        inputs=[at, moving, seams(), time_step, 0],
+        outputs=[force, viscosity, stiffness],
+        device="cpu",
+    )
+
+    def gathered(slots: NDArray[np.float64]) -> NDArray[np.float64]:
+        total = np.zeros((len(positions), *slots.shape[1:]))
+        np.add.at(total, ENDS.ravel(), slots)
+        return total
+
+    return gathered(force.numpy()), gathered(viscosity.numpy()), gathered(stiffness.numpy())
+
+
+def test_forces_are_minus_the_gradient_of_the_energy():
+    force, _, _ = launch(POSITIONS, np.zeros_like(POSITIONS))
+    for vertex in range(len(POSITIONS)):
+        for axis in range(2):
+            moved = [POSITIONS.copy(), POSITIONS.copy()]
+            moved[0][vertex, axis] += 1e-7
+            moved[1][vertex, axis] -= 1e-7
+            slope = (energy(moved[0]) - energy(moved[1])) / 2e-7
+            assert force[vertex, axis] == pytest.approx(-slope, rel=1e-6, abs=1e-6)
+
+
+def test_viscosity_is_h_times_k_times_the_rate_of_the_miss():
+    velocities = np.random.default_rng(0).normal(size=POSITIONS.shape)
+    _, viscosity, _ = launch(POSITIONS, velocities, time_step=0.5)
+    rate = (misses(POSITIONS + 1e-7 * velocities) - misses(POSITIONS - 1e-7 * velocities)) / 2e-7
+    power = float((viscosity * velocities).sum())
+    assert power == pytest.approx(-0.5 * float((STIFFNESS * rate**2).sum()), rel=1e-6)
+
+
+def test_a_piece_that_moves_as_a_whole_feels_no_viscosity():
+    _, viscosity, _ = launch(POSITIONS, np.tile([3.0, -2.0], (len(POSITIONS), 1)))
+    np.testing.assert_allclose(viscosity, 0.0, atol=1e-12)
+
+
+def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
+    """Gauss-Newton part of the energy's second derivative, against the diagonal of the step."""
+    _, _, stiffness = launch(POSITIONS, np.zeros_like(POSITIONS))
+    rows = np.zeros((2, POSITIONS.size))
+    for k in range(POSITIONS.size):
+        moved = [POSITIONS.copy().ravel(), POSITIONS.copy().ravel()]
+        moved[0][k] += 1e-7
+        moved[1][k] -= 1e-7
+        rows[:, k] = (misses(moved[0].reshape(-1, 2)) - misses(moved[1].reshape(-1, 2))) / 2e-7
+    scaled = rows / np.sqrt(np.repeat(stiffness, 2))
+    assert np.linalg.eigvalsh(scaled.T @ np.diag(STIFFNESS) @ scaled).max() < 2.0
+
+
+def test_misses_and_edges_of_no_length():
+    found = wp.zeros(2, dtype=wp.float64, device="cpu")
+    wp.launch(
+        compute_seam_misses,
+        dim=2,
+        inputs=[wp.array(POSITIONS, dtype=wp.vec2d, device="cpu"), seams(), 0],
+        outputs=[found],
+        device="cpu",
+    )
+    np.testing.assert_allclose(found.numpy(), misses(POSITIONS))
+    force, _, _ = launch(np.zeros_like(POSITIONS), np.zeros_like(POSITIONS))
+    assert np.isfinite(force).all()

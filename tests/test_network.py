@@ -1,0 +1,207 @@
+"""The model: springs that store the membrane's energy, masses, the guard's onset."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from warpflat.kernels.springs import compute_spring_energy
+
+from warpflat.fabric import Fabric
+from warpflat.network import SpringNetwork, cells_of, grain_axes, springs_of, vertex_masses
+from warpflat.shapes import make_shape
+from warpflat.surface import Surface, make_surface
+
+
+def cloth(*, warp: float = 1000.0, weft: float = 1000.0, shear: float = 200.0, nu: float = 0.0) -> Fabric:
+    return Fabric(
+        name="cloth",
+        stiffness_warp=warp,
+        stiffness_weft=weft,
+        shear_stiffness=shear,
+        areal_density=0.15,
+        poisson_ratio=nu,
+    )
+
+
+def sheet(columns: int, rows: int, hx: float, hy: float) -> Surface:
+    """A rectangle of quads in the plane z = 0."""
+    x, y = np.meshgrid(hx * np.arange(columns + 1), hy * np.arange(rows + 1))
+    i = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    return make_surface(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), quads)
+
+
+def equilateral(rings: int, side: float) -> Surface:
+    """A hexagon of equilateral triangles in the plane z = 0."""
+    lattice = [(a, b) for a in range(-rings, rings + 1) for b in range(-rings, rings + 1) if abs(a + b) <= rings]
+    index = {place: number for number, place in enumerate(lattice)}
+    points = [(side * (a + 0.5 * b), side * b * np.sqrt(0.75), 0.0) for a, b in lattice]
+    corners = [((a, b), (a + 1, b), (a, b + 1)) for a, b in lattice] + [
+        ((a + 1, b), (a + 1, b + 1), (a, b + 1)) for a, b in lattice
+    ]
+    triangles = [[index[p] for p in corner] for corner in corners if all(p in index for p in corner)]
+    return make_surface(points, triangles)
+
+
+def spring_energy(network: SpringNetwork, positions: NDArray[np.float64]) -> float:
+    energy = wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu")
+    at = wp.array(positions, dtype=wp.vec2d, device="cpu")
+    wp.launch(
+        compute_spring_energy, dim=network.vertex_count, inputs=[at, network.springs, 0], outputs=[energy], device="cpu"
+    )
+    return float(energy.numpy().sum())
+
+
+def energy_of_strain(network: SpringNetwork, strain: NDArray[np.float64]) -> float:
+    """Energy per strain squared in the limit of small strain (2 by 2): both signs averaged, and extrapolated."""
+    flat = network.surface.vertices[:, :2]
+
+    def both_signs(size: float) -> float:
+        moved = (flat + size * flat @ strain, flat - size * flat @ strain)
+        return sum(spring_energy(network, np.ascontiguousarray(p)) for p in moved) / (2 * size**2)
+
+    size = 2e-3
+    coarse, middle, fine = both_signs(size), both_signs(size / 2), both_signs(size / 4)
+    first, second = (4 * middle - coarse) / 3, (4 * fine - middle) / 3
+    return (16 * second - first) / 15
+
+
+STRAINS = {
+    "weft": [[1.0, 0.0], [0.0, 0.0]],
+    "warp": [[0.0, 0.0], [0.0, 1.0]],
+    "both": [[1.0, 0.0], [0.0, 1.0]],
+    "opposite": [[1.0, 0.0], [0.0, -0.7]],
+    "shear": [[0.0, 0.5], [0.5, 0.0]],
+    "all": [[0.6, 0.25], [0.25, -0.4]],
+}
+
+
+@pytest.mark.parametrize("strain", STRAINS)
+@pytest.mark.parametrize(("hx", "hy"), [(0.01, 0.01), (0.013, 0.01), (0.01, 0.017)])
+@pytest.mark.parametrize(("warp", "weft", "shear"), [(1000, 1000, 200), (1000, 1000, 20), (1400, 600, 150)])
+def test_a_rectangle_under_uniform_strain_stores_the_membranes_energy(strain, hx, hy, warp, weft, shear):
+    """1/2 (C11 exx^2 + C22 eyy^2 + 2 C12 exx eyy + C66 gamma^2) A, with C12 = C66 = G as in any crossed lattice."""
+    surface = sheet(6, 4, hx, hy)
+    network = SpringNetwork.build(
+        surface, cloth(warp=warp, weft=weft, shear=shear), surface.vertices[:, :2], device="cpu"
+    )
+    assert network.spring_arrays.clamped_cells == 0
+    e = np.array(STRAINS[strain])
+    exx, eyy, gamma = e[0, 0], e[1, 1], 2 * e[0, 1]
+    density = 0.5 * (weft * exx**2 + warp * eyy**2 + 2 * shear * exx * eyy + shear * gamma**2)
+    assert energy_of_strain(network, e) == pytest.approx(density * 24 * hx * hy, rel=1e-9)
+
+
+@pytest.mark.parametrize("strain", STRAINS)
+def test_equilateral_triangles_store_an_isotropic_sheets_energy(strain: str):
+    """Van Gelder 1998: exact for nu = 1/3 (plane stress); border springs have one triangle and so half of it."""
+    k, nu = 1000.0, 1.0 / 3.0
+    surface = equilateral(3, 0.01)
+    network = SpringNetwork.build(surface, cloth(shear=k / 2 / (1 + nu), nu=nu), surface.vertices[:, :2], device="cpu")
+    e = np.array(STRAINS[strain])
+    exx, eyy, gamma = e[0, 0], e[1, 1], 2 * e[0, 1]
+    c = k / (1 - nu**2)
+    density = 0.5 * (c * (exx**2 + eyy**2 + 2 * nu * exx * eyy) + k / 2 / (1 + nu) * gamma**2)
+    area = len(surface.faces) * np.sqrt(0.75) / 2 * 0.01**2
+    assert energy_of_strain(network, e) == pytest.approx(density * area, rel=1e-9)
+
+
+@pytest.mark.parametrize("grain_angle", [0.0, 90.0, 180.0])
+def test_the_grain_decides_which_edges_are_warp(grain_angle: float):
+    surface = sheet(5, 5, 0.01, 0.01)
+    network = SpringNetwork.build(
+        surface,
+        cloth(warp=1500.0, weft=500.0, shear=100.0),
+        surface.vertices[:, :2],
+        grain_angle=grain_angle,
+        device="cpu",
+    )
+    along_x, along_y = (energy_of_strain(network, np.diag(d)) / (25e-4 / 2) for d in ((1.0, 0.0), (0.0, 1.0)))
+    wanted = (1500.0, 500.0) if grain_angle == 90.0 else (500.0, 1500.0)
+    assert (along_x, along_y) == pytest.approx(wanted, rel=1e-9)
+
+
+def test_a_turned_grid_has_the_rotated_stiffness_on_the_bias():
+    """At 45 degrees a square cell pulled along its edge is as stiff as C'11 = (K_warp + K_weft + 6 G) / 4."""
+    surface = sheet(5, 5, 0.01, 0.01)
+    network = SpringNetwork.build(
+        surface, cloth(warp=1200.0, weft=800.0, shear=100.0), surface.vertices[:, :2], grain_angle=45.0, device="cpu"
+    )
+    assert energy_of_strain(network, np.diag([1.0, 0.0])) / (25e-4 / 2) == pytest.approx((2000 + 600) / 4, rel=1e-9)
+    assert energy_of_strain(network, np.array([[0, 0.5], [0.5, 0]])) / (25e-4 / 2) == pytest.approx(1800 / 4, rel=1e-9)
+
+
+def test_grain_axes_are_at_right_angles_with_the_warp_up():
+    np.testing.assert_allclose(grain_axes(0.0), ([0, 1], [1, 0]), atol=1e-15)
+    for angle in (17.0, 45.0, -120.0):
+        warp, weft = grain_axes(angle)
+        assert np.linalg.norm(warp) == pytest.approx(1.0)
+        assert warp @ weft == pytest.approx(0.0, abs=1e-15)
+        assert np.degrees(np.arctan2(-warp[0], warp[1])) == pytest.approx(angle)
+
+
+def test_long_cells_keep_a_little_of_their_structural_springs_and_are_counted():
+    surface = sheet(3, 3, 0.05, 0.01)
+    springs = springs_of(surface, cloth(shear=200.0), surface.vertices[:, :2])
+    assert springs.clamped_cells == 9
+    assert (springs.stiffness > 0).all()
+
+
+def test_rest_lengths_are_those_in_space_and_diagonals_go_over_the_unfolded_quad():
+    surface = make_shape("cylinder", resolution=9)
+    springs = springs_of(surface, cloth(), surface.vertices[:, :2])
+    edges, diagonals = springs.ends[: springs.edge_count], springs.ends[springs.edge_count :]
+    space = np.linalg.norm(surface.vertices[edges[:, 0]] - surface.vertices[edges[:, 1]], axis=1)
+    np.testing.assert_array_equal(springs.rest_length[: springs.edge_count], space)
+    assert len(diagonals) == 2 * len(surface.faces)
+    chord, rise = 2 * 0.15 * np.sin(np.pi / 16), 0.05
+    np.testing.assert_allclose(springs.rest_length[springs.edge_count :], np.hypot(chord, rise), rtol=1e-12)
+
+
+def test_every_spring_once_with_positive_stiffness_and_the_sum_around_each_vertex():
+    surface = make_shape("saddle", resolution=9)
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    s = network.spring_arrays
+    assert (s.stiffness > 0).all()
+    assert len(np.unique(np.sort(s.ends, axis=1), axis=0)) == len(s.ends) == network.spring_count
+    sums = np.bincount(s.ends.ravel(), np.repeat(s.stiffness, 2))
+    stiffest = np.zeros(len(sums))
+    np.maximum.at(stiffest, s.ends.ravel(), np.repeat(s.stiffness, 2))
+    np.testing.assert_allclose(network.spring_stiffness.numpy(), sums + 0.5 * stiffest, rtol=1e-12)
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_masses_add_up_to_the_cloth_and_none_is_zero(triangles: bool):
+    surface = make_shape("dome", resolution=9, triangles=triangles)
+    cells = cells_of(surface)
+    mass = vertex_masses(cells, cloth(), len(surface.vertices))
+    assert (mass > 0).all()
+    assert mass.sum() == pytest.approx(0.15 * cells.area.sum(), rel=1e-12)
+
+
+def test_the_guard_begins_where_the_shear_springs_lose_their_hold():
+    surface = sheet(2, 2, 0.01, 0.01)
+    network = SpringNetwork.build(
+        surface, cloth(warp=1500.0, weft=500.0, shear=100.0), surface.vertices[:, :2], device="cpu"
+    )
+    assert network.guard.onset_warp == pytest.approx(100 / 1500)
+    assert network.guard.onset_weft == pytest.approx(100 / 500)
+
+
+def test_a_compressed_thread_kinks_beyond_the_onset_and_the_guard_holds_it():
+    """The reason for the guard: the second derivative of the energy along a zigzag of the weft threads."""
+    surface = sheet(12, 12, 0.01, 0.01)
+    network = SpringNetwork.build(surface, cloth(shear=50.0), surface.vertices[:, :2], device="cpu")
+    columns = np.arange(13 * 13) % 13
+    zigzag = np.column_stack([np.zeros(169), 1e-5 * (-1.0) ** columns])
+
+    def curvature(squeeze: float) -> float:
+        flat = surface.vertices[:, :2] * [squeeze, 1.0]
+        sides = [spring_energy(network, flat + sign * zigzag) for sign in (1, -1)]
+        return (sum(sides) - 2 * spring_energy(network, flat)) / 1e-10
+
+    onset = network.guard.onset_weft
+    assert curvature(1 / (1 + 0.5 * onset)) > 0
+    assert curvature(1 / (1 + 2.0 * onset)) < 0
