@@ -193,9 +193,12 @@ def _grid_lines(surface: Surface, line: IntArray) -> Iterator[IntArray]:
         yield current.astype(np.int32)
 
 
-def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray:
+def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """Any mesh: x is the signed geodesic distance from the datum, y the arc length of the nearest datum point. #V by 2 [m]."""
-    distance, station = signed_distance_and_station(surface, datum)
+    try:
+        distance, station = signed_distance_and_station(surface, datum)
+    except RuntimeError:  # a singular system: the ways to the datum go in circles on faces without height
+        return None
     return np.column_stack([distance, station])
 
 

@@ -184,8 +184,11 @@ class _Ways:
         at = np.clip(self._foot - slope * self._height / np.sqrt(1 - slope**2), 0, self._side)
         share = at / safe
         leg = np.hypot(at - self._foot, self._height)
-        value = (1 - share) * da + share * db + leg
         vertex = self._corner[:, 0]
+        before = (1 - share) * da + share * db
+        # A way leads downhill. Where rounding leaves none that does, the lowest will do; on needles two vertices would
+        # else lead to each other.
+        value = np.where(before < distance[vertex], before + leg, 1e6 * (1.0 + before))
         least = np.minimum.reduceat(value, self._first_row)
         row = np.flatnonzero(value == np.repeat(least, np.diff(np.append(self._first_row, len(value)))))
         chosen, which = np.unique(vertex[row], return_index=True)

@@ -1,0 +1,236 @@
+"""The first layout: profiles, geodesics, the map that cannot fold, and the datum."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpflat.develop import choose_datum, develop, geodesic_layout, harmonic_layout, profile_layout
+from warpflat.errors import InputError
+from warpflat.network import cells_of
+from warpflat.shapes import make_shape
+from warpflat.strain import signed_cell_areas
+from warpflat.surface import Surface, line_from_indices, make_surface, mesh_edges, triangulate
+
+FloatArray = NDArray[np.float64]
+
+
+def mirrored(surface: Surface, positions: FloatArray) -> int:
+    return int((signed_cell_areas(cells_of(surface).corner, positions) <= 0).sum())
+
+
+def edge_errors(surface: Surface, positions: FloatArray) -> FloatArray:
+    edges = mesh_edges(surface.faces)
+    in_space = np.linalg.norm(np.diff(surface.vertices[edges], axis=1)[:, 0], axis=1)
+    return np.abs(np.linalg.norm(np.diff(positions[edges], axis=1)[:, 0], axis=1) / in_space - 1.0)
+
+
+def disk(count: int, height, *, seed: int = 0, noise: float = 0.0) -> Surface:
+    """Random triangles over the unit disc, at z = height(x, y)."""
+    from scipy.spatial import Delaunay
+
+    rng = np.random.default_rng(seed)
+    inner = rng.uniform(-1, 1, (count, 2))
+    inner = inner[np.linalg.norm(inner, axis=1) < 0.93]
+    turn = np.linspace(0, 2 * np.pi, 40, endpoint=False)
+    points = np.concatenate([inner, np.column_stack([np.cos(turn), np.sin(turn)])])
+    z = height(points[:, 0], points[:, 1]) + noise * rng.normal(size=len(points))
+    return make_surface(np.column_stack([points, z]), Delaunay(points).simplices)
+
+
+def ring(inner: float, outer: float, *, height: float = 0.0, around: int = 24, across: int = 5) -> Surface:
+    """A closed band of quads between two circles, the inner one so much higher."""
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    share = np.linspace(0, 1, across)
+    radius = outer + (inner - outer) * share
+    x, y = radius[:, None] * np.cos(turn), radius[:, None] * np.sin(turn)
+    points = np.stack([x, y, np.broadcast_to(height * share[:, None], x.shape)], axis=-1).reshape(-1, 3)
+    i = np.arange(around * across).reshape(across, around)
+    right = np.roll(i, -1, axis=1)
+    return make_surface(points, np.stack([i[:-1], right[:-1], right[1:], i[1:]], axis=-1).reshape(-1, 4))
+
+
+# --- profiles
+
+
+def test_profiles_run_out_from_the_datum_at_their_arc_lengths():
+    surface = make_shape("bodice", resolution=9)
+    positions = profile_layout(surface, surface.lines["centre"])
+    assert positions is not None
+    p, flat = surface.vertices.reshape(9, 9, 3), positions.reshape(9, 9, 2)
+    steps = np.linalg.norm(np.diff(p[:, 4], axis=0), axis=1)
+    np.testing.assert_allclose(flat[:, 4, 0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(flat[:, 4, 1], np.concatenate([[0.0], np.cumsum(steps)]), rtol=1e-12)
+    for row in range(9):
+        np.testing.assert_allclose(flat[row, :, 1], flat[row, 4, 1], rtol=1e-12)
+        np.testing.assert_allclose(
+            np.diff(flat[row, :, 0]), np.linalg.norm(np.diff(p[row], axis=0), axis=1), rtol=1e-12
+        )
+
+
+def test_profiles_may_end_at_different_places():
+    """An armhole: the upper profiles are shorter."""
+    surface = make_shape("bodice", resolution=9)
+    column = np.arange(64) % 8
+    row = np.arange(64) // 8
+    keep = (row < 4) | ((column >= 2) & (column < 6)) | ((row == 4) & (column >= 1))
+    ragged = make_surface(surface.vertices, surface.faces[keep], lines={"centre": surface.lines["centre"]})
+    positions = profile_layout(ragged, ragged.lines["centre"])
+    assert positions is not None
+    whole = profile_layout(surface, surface.lines["centre"])
+    assert whole is not None
+    np.testing.assert_allclose(positions, whole[ragged.input_index], rtol=1e-12)
+    assert develop(ragged, ragged.lines["centre"]).method == "profiles"
+    assert mirrored(ragged, positions) == 0
+
+
+def test_a_datum_at_the_side_or_an_upside_down_one_gives_the_same_piece():
+    surface = make_shape("dome", resolution=9)
+    for line in (surface.lines["left"], surface.lines["right"], surface.lines["centre"][::-1].copy()):
+        development = develop(surface, line)
+        assert development.method == "profiles"
+        assert mirrored(surface, development.positions) == 0
+
+
+@pytest.mark.parametrize("line", ["bent", "triangles"], ids=["a datum that turns a corner", "a mesh of triangles"])
+def test_what_is_no_grid_has_no_profiles(line: str):
+    surface = make_shape("dome", resolution=9, triangles=line == "triangles")
+    datum = np.array([0, 1, 10, 19]) if line == "bent" else surface.lines["centre"]
+    assert profile_layout(surface, np.asarray(datum, dtype=np.int32)) is None
+
+
+# --- geodesics
+
+
+@pytest.mark.parametrize("shape", ["cylinder", "cone", "strip"])
+def test_geodesics_lay_developable_triangles_out_exactly(shape: str):
+    angle = {"angle": 60.0} if shape == "cone" else {}
+    surface = make_shape(shape, resolution=17, triangles=True, **angle)
+    positions = geodesic_layout(surface, surface.lines["centre"])
+    # the cone's upper border is hollow: ways to places beyond the datum's end would lead through the air
+    reached = positions[:, 1] < (0.7 * positions[:, 1].max() if shape == "cone" else np.inf)
+    inside = reached[mesh_edges(surface.faces)].all(axis=1)
+    assert inside.mean() > 0.6
+    assert edge_errors(surface, positions)[inside].max() < 1e-6
+
+
+def test_the_development_of_triangles_is_by_geodesics():
+    surface = make_shape("dome", resolution=17, triangles=True)
+    development = develop(surface, surface.lines["centre"])
+    assert development.method == "geodesic"
+    np.testing.assert_array_equal(development.positions, geodesic_layout(surface, surface.lines["centre"]))
+    assert not development.mended
+
+
+# --- the map that cannot fold
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("kind", ["bowl", "noise", "steep"])
+def test_the_harmonic_map_has_no_mirrored_cell(kind: str, seed: int):
+    heights = {
+        "bowl": lambda x, y: 2.0 * (x**2 + y**2),
+        "noise": lambda x, y: 0 * x,
+        "steep": lambda x, y: 1.5 * np.sin(4 * x) * np.cos(5 * y),
+    }
+    surface = disk(300, heights[kind], seed=seed, noise=0.3 if kind == "noise" else 0.0)
+    positions = harmonic_layout(surface)
+    assert mirrored(surface, positions) == 0
+    p = surface.vertices[triangulate(surface.faces)[0]]
+    area = 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1).sum()
+    size = np.linalg.norm(positions, axis=1).max()
+    assert np.pi * size**2 == pytest.approx(area, rel=1e-9)
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_more_than_a_hemisphere_is_laid_out_without_a_mirrored_cell(triangles: bool):
+    surface = make_shape("hemisphere", opening=115.0, resolution=17, triangles=triangles)
+    development = develop(surface, surface.lines["centre"])
+    assert mirrored(surface, development.positions) == 0
+    chord = development.positions[surface.lines["centre"][[0, -1]]]
+    assert chord[1, 1] > chord[0, 1]
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_whatever_the_mesh_the_first_layout_is_unfolded_and_says_how_it_came_about(seed: int):
+    surface = disk(250, lambda x, y: 1.2 * np.sin(3 * x + seed) * np.cos(2 * y), seed=seed, noise=0.05)
+    datum = choose_datum(surface)
+    development = develop(surface, datum)
+    assert mirrored(surface, development.positions) == 0
+    assert np.isfinite(development.positions).all()
+    assert (development.method == "geodesic" and not development.mended) == (not development.notes)
+
+
+def test_a_layout_that_winds_twice_is_not_taken_for_unfolded():
+    """A ruled ramp, the shape of a spiral stair of more than a turn, has every cell the right way up all the same."""
+    turns, columns = np.linspace(0, 1.3 * 2 * np.pi, 41), np.linspace(0.2, 1.0, 5)
+    x, y = columns[None] * np.cos(turns)[:, None], columns[None] * np.sin(turns)[:, None]
+    z = np.broadcast_to(0.02 * turns[:, None], x.shape)
+    i = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    surface = make_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads, lines={"inside": i[:, 0]})
+    development = develop(surface, surface.lines["inside"])
+    assert mirrored(surface, development.positions) == 0
+
+
+# --- rings and tubes
+
+
+def test_a_flat_ring_is_laid_out():
+    surface = ring(0.1, 0.3)
+    for given in (choose_datum(surface), line_from_indices(surface, [0, 24, 48, 72, 96])):
+        development = develop(surface, given)
+        assert mirrored(surface, development.positions) == 0
+
+
+def test_a_shallow_ring_is_laid_out_and_a_tube_is_refused_with_what_to_do():
+    surface = ring(0.1, 0.3, height=0.05)
+    assert mirrored(surface, develop(surface, choose_datum(surface)).positions) == 0
+    tube = ring(0.29, 0.3, height=0.5, across=9)
+    with pytest.raises(
+        InputError, match=r"closed tube .* cm long, runs around it at vertex \d+\): cut it open"
+    ) as told:
+        develop(tube, line_from_indices(tube, [24 * k for k in range(9)]))
+    assert "\n" not in str(told.value)
+
+
+# --- the datum
+
+
+def test_the_datum_runs_up_the_long_axis_through_the_middle():
+    surface = make_shape("strip", resolution=33)
+    np.testing.assert_array_equal(choose_datum(surface), surface.lines["centre"])
+    surface = make_shape("cylinder", resolution=17, height=0.8)
+    np.testing.assert_array_equal(choose_datum(surface), surface.lines["centre"])
+
+
+@pytest.mark.parametrize("name", ["dome", "saddle", "bodice", "hemisphere"])
+def test_pieces_about_as_wide_as_long_hang_down(name: str):
+    surface = make_shape(name, resolution=17)
+    line = surface.vertices[choose_datum(surface)]
+    assert line[-1, 1] > line[0, 1]
+    assert np.ptp(line[:, 1]) > 0.8 * np.ptp(surface.vertices[:, 1])
+    assert np.ptp(line[:, 0]) < 0.2 * np.ptp(surface.vertices[:, 0])
+
+
+def test_the_choice_does_not_depend_on_the_numbering_or_the_place():
+    surface = make_shape("bodice", resolution=17, triangles=True)
+    line = choose_datum(surface)
+    np.testing.assert_array_equal(line, choose_datum(surface))
+    order = np.random.default_rng(3).permutation(len(surface.vertices))
+    place = np.empty_like(order)
+    place[order] = np.arange(len(order))
+    faces = np.where(surface.faces >= 0, place[surface.faces], -1)
+    shuffled = make_surface(surface.vertices[order] + [0.3, -2.0, 1.0], faces)
+    np.testing.assert_array_equal(order[choose_datum(shuffled)], line)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_any_piece_has_a_datum_along_its_edges(seed: int):
+    surface = disk(150, lambda x, y: x * y, seed=seed)
+    line = choose_datum(surface)
+    assert len(line) >= 2
+    assert len(np.unique(line)) == len(line)
+    edges = {tuple(edge) for edge in mesh_edges(surface.faces).tolist()}
+    assert all((min(a, b), max(a, b)) in edges for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True))
