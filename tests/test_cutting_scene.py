@@ -1,0 +1,140 @@
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpflat.cli import main
+from warpflat.errors import InputError
+from warpflat.scene import make_scene, run_scene
+
+pxr = pytest.importorskip("pxr")
+
+BODICE = {"datum": "centre", "fabric": "woven", "surface": {"shape": "bodice", "resolution": 17}}
+QUIET = {"output": {"frames": 0, "picture": False}}
+Run = Callable[..., tuple[int, str, str]]
+
+
+def scene(**tables: object):
+    return make_scene({**BODICE, **tables}, name="trial", folder=Path(), where="trial.toml")
+
+
+def test_a_scene_cuts_along_lines_points_and_planes(tmp_path: Path):
+    cuts = [
+        {"line": "bust", "part": [0.0, 0.3], "tip_back": 0.02},
+        {"name": "slant", "from": [0.16, 0.20, 0.02], "to": [0.08, 0.26, 0.14]},
+        {
+            "name": "down",
+            "plane": {"point": [-0.06, 0.12, 0.08], "normal": [1.0, 0.0, 0.0], "towards": [0.0, -1.0, 0.0]},
+        },
+    ]
+    coarse = {"residual_tolerance": 0.03, "energy_tolerance": 1e-5}
+    result = run_scene(scene(cuts=cuts, relax=coarse, **QUIET), tmp_path)
+    piece = result.metrics["pieces"]["trial"]
+    assert [stage["name"] for stage in piece["stages"]] == ["develop", "relax", "cut:bust", "cut:slant", "cut:down"]
+    energy = [stage["spring_energy_j"] + stage["guard_energy_j"] for stage in piece["stages"][1:]]
+    assert energy == sorted(energy, reverse=True)
+    assert piece["flipped_faces"] == 0
+    # The slanted path begins a little inside the border: a fish-eye dart.
+    assert [made["seams"][0]["kind"] for made in piece["cuts"]] == ["dart", "fish-eye", "dart"]
+    assert json.loads((tmp_path / "metrics.json").read_text())["pieces"]["trial"]["cuts"][0]["name"] == "bust"
+
+
+def test_one_film_tells_the_whole_story(tmp_path: Path):
+    from pxr import Usd, UsdGeom
+
+    from warpflat.export import validate_usd
+
+    cuts = [{"name": "bust", "line": "bust", "part": [0.0, 0.3]}, {"name": "bust", "line": "bust", "part": [1.0, 0.7]}]
+    run_scene(scene(cuts=cuts, output={"frames": 12, "picture": False}), tmp_path)
+    film = tmp_path / "frames.usdc"
+    assert list(validate_usd(film)) == []
+    stage = Usd.Stage.Open(str(film))
+    pattern = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern"))
+    times = pattern.GetPointsAttr().GetTimeSamples()
+    counts = [len(pattern.GetPointsAttr().Get(time)) for time in times]
+    changes = np.flatnonzero(np.diff(counts))
+    assert len(changes) == 1, "the topology changes once"
+    assert counts[0] == 17 * 17 < counts[-1]
+    assert len(pattern.GetFaceVertexIndicesAttr().GetTimeSamples()) >= 2
+    before, after = times[changes[0]], times[changes[0] + 1]
+    root = stage.GetPrimAtPath("/World/trial/pattern_cuts")
+    (lines,) = [UsdGeom.BasisCurves(prim) for prim in Usd.PrimRange(root) if prim.IsA(UsdGeom.BasisCurves)]
+    # The line is drawn before the scissors come: one curve a side, then both sides of each crack.
+    assert len(lines.GetCurveVertexCountsAttr().Get(before)) == 2
+    assert len(lines.GetCurveVertexCountsAttr().Get(after)) == 4
+    opened = np.array(pattern.GetPointsAttr().Get(times[-1]))
+    closed = np.array(pattern.GetPointsAttr().Get(after))
+    assert np.linalg.norm(opened - closed, axis=1).max() > 0.02
+
+
+def test_a_cut_from_border_to_border_gives_two_pieces_with_files_of_their_own(tmp_path: Path):
+    result = run_scene(scene(cuts=[{"line": "centre"}], output={"frames": 0}), tmp_path)
+    assert set(result.metrics["pieces"]) == {"trial.left", "trial.right"}
+    assert {"trial.left.obj", "trial.right.obj", "picture.png"} <= set(result.files)
+
+
+def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
+    found = run_scene(scene(auto_cut={"max_cuts": 1, "by": "per_cm"}, **QUIET), tmp_path / "one")
+    stages = found.metrics["pieces"]["trial"]["stages"]
+    assert len(stages) == 3
+    assert any(note.startswith("cuts found: ") for note in found.notes)
+    enough = stages[1]["spring_energy_j"] + stages[1]["guard_energy_j"] + 0.01
+    none = run_scene(scene(auto_cut={"max_cuts": 1, "stop_below": enough}, **QUIET), tmp_path / "none")
+    assert len(none.metrics["pieces"]["trial"]["stages"]) == 2
+
+
+@pytest.mark.parametrize(
+    ("cuts", "message"),
+    [
+        ([{"line": "burst"}], r"trial.toml: cuts\[0\]: .*no line 'burst'.*did you mean 'bust'"),
+        ([{"line": "bottom"}], "runs along the border between vertices 0 and 1"),
+        ([{"from": 40, "to": 40}], r"cuts\[0\]: .*vertex 40"),
+        ([{"line": "bust"}, {"name": "b", "line": "bust"}], "is cut by two paths"),
+    ],
+)
+def test_a_wrong_cut_is_told_in_one_line(tmp_path: Path, cuts: list[dict[str, object]], message: str):
+    with pytest.raises(InputError, match=message) as caught:
+        run_scene(scene(cuts=cuts, **QUIET), tmp_path)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("cuts", "message"),
+    [
+        ([{}], r"cuts\[0\]: give the cut in one way"),
+        ([{"line": "bust", "from": 1, "to": 2}], "give the cut in one way"),
+        ([{"from": 1}], "needs both from and to"),
+        ([{"from": 1, "to": 2, "part": [0.0, 0.5]}], "part takes a part of a line"),
+        ([{"line": "bust", "tip": 1.0}], "unknown key 'tip'"),
+    ],
+)
+def test_a_wrong_table_is_told_in_one_line(cuts: list[dict[str, object]], message: str):
+    with pytest.raises(InputError, match=message):
+        scene(cuts=cuts)
+
+
+def test_the_command_compares_cuts_and_applies_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]
+):
+    monkeypatch.chdir(tmp_path)
+    Path("b.toml").write_text(
+        'datum = "centre"\nfabric = "woven"\n[surface]\nshape = "bodice"\nresolution = 17\n'
+        "[output]\nframes = 0\npicture = false\n"
+    )
+    assert main(["cuts", "b.toml"]) == 0
+    table = capfd.readouterr().out
+    assert "peak 1: " in table
+    assert "bust" in table
+    ledger = json.loads(Path("out/b/ledger.json").read_text())
+    assert len(ledger["entries"]) > 2
+    assert Path("out/b/ledger.png").stat().st_size > 10_000
+    assert not Path("out/b/metrics.json").exists()
+    assert main(["cuts", "b.toml", "--apply", "1", "--quiet"]) == 0
+    piece = json.loads(Path("out/b/metrics.json").read_text())["pieces"]["b"]
+    assert piece["stages"][-1]["name"] == f"cut:{ledger['entries'][0]['name']}"
+    assert main(["cuts", "b.toml", "--apply", "99"]) == 2
+    assert "there is no candidate 99; valid: 1 to" in capfd.readouterr().err

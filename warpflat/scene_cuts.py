@@ -1,0 +1,208 @@
+"""Cuts in scene files: `[[cuts]]` along lines, between points, along planes, and `[auto_cut]`, which looks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Annotated, Literal
+
+from pydantic import Field, model_validator
+
+from warpflat.scene_types import PlaneTable, Point, PointOrVertex
+from warpflat.toml_file import Table
+
+if TYPE_CHECKING:
+    import numpy as np
+    from numpy.typing import NDArray
+
+    from warpflat.cutting import CutPlan
+    from warpflat.flattening import Flattening
+    from warpflat.ledger import AutoCut, Ledger
+    from warpflat.relax import RelaxOptions
+    from warpflat.surface.mesh import Surface
+    from warpflat.surface.trace import SurfacePath
+
+__all__ = ["AutoCutTable", "CutPlane", "CutStory", "CutTable", "plan_automatic_cuts", "plan_cuts", "story_of_entry"]
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class CutPlane(PlaneTable):
+    """A plane through a point [m]; with `towards` only the part from the point in that direction to the border."""
+
+    towards: Point | None = None
+
+
+class CutTable(Table):
+    """A cut, given in one of three ways. Vertices count those of the file, from 0; points are in metres.
+
+    `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
+    straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
+    between points or along a plane runs through are divided. Tables with one `name` are one cut.
+    """
+
+    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.+-]*$", max_length=100)] | None = None
+    line: str | None = None
+    part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    through: list[PointOrVertex] = Field(default_factory=list)
+    plane: CutPlane | None = None
+    tip_back: Annotated[float, Field(ge=0.0)] = 0.0
+    """How far the tips of its darts are drawn back, [m]."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> CutTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a path needs both from and to")
+        if sum(way is not None for way in (self.line, self.from_, self.plane)) != 1:
+            raise ValueError("give the cut in one way: line, from and to, or plane")
+        if self.part is not None and self.line is None:
+            raise ValueError("part takes a part of a line; give line")
+        if self.through and self.from_ is None:
+            raise ValueError("through lists places between from and to; give both")
+        return self
+
+
+class AutoCutTable(Table):
+    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
+
+    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
+    """At most so many; a mirrored pair counts as one."""
+    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
+    """Spring energy that is low enough, [J]."""
+    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
+    """Worn strain along warp or weft that is low enough on 98 % of the cloth."""
+    by: Literal["released", "per_cm"] = "released"
+    """What makes a cut the best: the energy it releases in all, or per centimetre."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CutStory:
+    """What is to be cut, worked into the surface so that no face changes on the way.
+
+    Attributes:
+        surface: with every path along its edges.
+        plans: the cuts in their order.
+        auto: when those found automatically are enough; they begin at plan `first_auto`.
+        notes: what was chosen, one sentence each.
+    """
+
+    surface: Surface
+    plans: tuple[CutPlan, ...] = ()
+    auto: AutoCut | None = None
+    first_auto: int = 0
+    notes: tuple[str, ...] = ()
+
+    def goes_on(self, result: Flattening, number: int) -> bool:
+        """Whether the cut of that number is made on the piece as it is by then."""
+        return self.auto is None or number < self.first_auto or not self.auto.is_enough(result)
+
+
+def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
+    """The surface with the paths of all cuts worked into its edges, and the cuts.
+
+    Raises:
+        InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
+    """
+    from warpflat.cutting import CutPlan, draw_line, line_part
+    from warpflat.scene import told_by
+
+    names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
+    drawn: dict[int, str] = {}
+    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+        if table.line is None:
+            line, copy = name, 2
+            while line in surface.lines:
+                line, copy = f"{name} {copy}", copy + 1
+            with told_by(f"cuts[{number}]"):
+                surface = draw_line(surface, line, _path(surface, table))
+            drawn[number] = line
+    paths: dict[str, list[NDArray[np.int32]]] = {}
+    tip_back: dict[str, float] = {}
+    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+        with told_by(f"cuts[{number}]"):
+            part = (0.0, 1.0) if table.part is None else (table.part[0], table.part[1])
+            row = line_part(surface, table.line or drawn[number], part)
+        paths.setdefault(name, []).append(row)
+        tip_back[name] = max(tip_back.get(name, 0.0), table.tip_back)
+    plans = tuple(CutPlan(name=name, paths=tuple(rows), tip_back=tip_back[name]) for name, rows in paths.items())
+    return CutStory(surface=surface, plans=plans, first_auto=len(plans))
+
+
+def _path(surface: Surface, table: CutTable) -> SurfacePath:
+    from warpflat.surface.paths import as_vertex
+    from warpflat.surface.section import plane_path
+    from warpflat.surface.trace import polyline_path
+
+    if table.plane is not None:
+        as_vertex(surface, table.plane.point)  # says so if the point is off the piece
+        return plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
+    stops: list[int | list[float]] = []
+    for place in (table.from_, *table.through, table.to):
+        assert place is not None  # the schema sees to it
+        vertex = as_vertex(surface, place, as_read=True)
+        stops.append(place if isinstance(place, list) else vertex)
+    return polyline_path(surface, stops)
+
+
+def plan_automatic_cuts(
+    story: CutStory,
+    table: AutoCutTable,
+    *,
+    flatten: Callable[[Surface, RelaxOptions], Flattening],
+    relax: RelaxOptions,
+) -> tuple[CutStory, tuple[Ledger, ...]]:
+    """Look for the best cuts, coarsely; which of them are needed is decided once each has been relaxed fully.
+
+    Args:
+        story: what is cut before.
+        table: the settings.
+        flatten: flattens a surface with the scene's other settings.
+        relax: the scene's options.
+
+    Raises:
+        InputError: the piece has no line to cut along.
+    """
+    from warpflat.cutting import replace_paths
+    from warpflat.ledger import AutoCut, coarse, cut_automatically
+
+    auto = AutoCut(**table.model_dump())
+    # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
+    search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
+    result = flatten_and_cut(story, flatten=flatten, relax=coarse(relax))
+    result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
+    plans = tuple(replace_paths(made, made.paths) for made in result.cuts)
+    found = [plan.name for plan in plans[len(story.plans) :]]
+    note = f"cuts found: {'; '.join(found)}" if found else "no cut was found that would release energy"
+    planned = CutStory(
+        surface=result.surface, plans=plans, auto=auto, first_auto=len(story.plans), notes=(*story.notes, note)
+    )
+    return planned, ledgers
+
+
+def flatten_and_cut(
+    story: CutStory, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
+) -> Flattening:
+    """The piece after all cuts of a story."""
+    from warpflat.cutting import cut
+
+    result = flatten(story.surface, relax)
+    for plan in story.plans:
+        result = cut(result, plan, relax=relax)
+    return result
+
+
+def story_of_entry(ledger: Ledger, number: int) -> CutStory:
+    """The cuts that a ledger's piece has, and its candidate of that number, from 1.
+
+    Raises:
+        InputError: there is no such number.
+    """
+    from warpflat.cutting import replace_paths
+    from warpflat.errors import InputError
+
+    if not 1 <= number <= len(ledger.entries):
+        raise InputError(f"there is no candidate {number}; valid: 1 to {len(ledger.entries)}")
+    result = ledger.entries[number - 1].result
+    return CutStory(surface=result.surface, plans=tuple(replace_paths(made, made.paths) for made in result.cuts))
