@@ -1,0 +1,378 @@
+"""Tightness: how a pattern sits when it is worn, and how much smaller it is cut to sit tight.
+
+Worn, the cloth lies on the body point for point as it was flattened. Strain and tension follow from that, and what the
+cloth presses onto the skin is its tension times the curvature of the body along it (Laplace's law).
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.errors import InputError
+from warpflat.fabric import Fabric
+from warpflat.kernels.membrane import compute_membrane_strain
+from warpflat.membrane import cloth_of, plane_stress
+from warpflat.network import SpringNetwork, grain_axes
+from warpflat.strain_map import smooth_to_vertices
+from warpflat.surface import Surface
+from warpflat.surface.curvature import curvature_tensors
+
+__all__ = ["MAPS", "Misfit", "Wear", "WornFit", "assess_fit", "assess_pattern", "meant_stretch"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+# Cloth bridges what is smaller than this, and a scan is rough below it: curvature is taken over such lengths [m].
+SKIN_LENGTH = 0.01
+# A pattern fits if less than this share of its cloth is strained beyond the limit: a corner's last face may be.
+TOLERATED = 0.01
+
+MAPS: dict[str, tuple[str, float, str]] = {
+    "strain_warp": ("worn strain along warp", 100.0, "%"),
+    "strain_weft": ("worn strain along weft", 100.0, "%"),
+    "strain_bias": ("worn strain on the bias", 100.0, "%"),
+    "tension_warp": ("tension along warp", 1.0, "N/m"),
+    "tension_weft": ("tension along weft", 1.0, "N/m"),
+    "pressure": ("pressure on the skin", 1.0, "Pa"),
+}
+"""What is known of each face: a name for people, the factor to their unit, and that unit."""
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wear:
+    """How a garment is meant to be worn.
+
+    Attributes:
+        stretch_warp, stretch_weft: so much longer the cloth is on the body than flat; 0.2 for 20 %.
+        pressure: on the skin [Pa], if that is what is asked for; the threads that run around the body, across its stronger
+            curvature, get the stretch that gives it, face by face, and the other ones the stretch given here.
+    """
+
+    stretch_warp: float = 0.0
+    stretch_weft: float = 0.0
+    pressure: float | None = None
+
+    def __post_init__(self) -> None:
+        for key, highest, unit in (("stretch_warp", 2.0, ""), ("stretch_weft", 2.0, ""), ("pressure", 20_000.0, "Pa")):
+            value = getattr(self, key)
+            if value is None and key == "pressure":
+                continue
+            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+                raise InputError(f"wear: {key} = {value!r} is not a number")
+            if not 0.0 <= value <= highest:
+                hint = f" (if that is in percent, write {value / 100:g})" if unit == "" and 2.0 < value <= 100.0 else ""
+                raise InputError(
+                    f"wear: {key} = {value:g} {unit}".rstrip() + f"; must be 0 to {highest:g} {unit}{hint}"
+                )
+
+    @property
+    def is_tight(self) -> bool:
+        """Whether anything but the body's own size is asked for."""
+        return self.stretch_warp > 0.0 or self.stretch_weft > 0.0 or bool(self.pressure)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Misfit:
+    """A connected region of cloth that is strained beyond the fabric's limit.
+
+    Attributes:
+        faces: of it.
+        area: flat [m2].
+        worst: the strain furthest beyond the limit.
+        thread: "warp" or "weft".
+        vertex: the corner of the worst face nearest to the middle of the region.
+        words: what is wrong and where, for a pattern maker.
+    """
+
+    faces: IntArray
+    area: float
+    worst: float
+    thread: str
+    vertex: int
+    words: str
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WornFit:
+    """A pattern as worn. Arrays are #F, means over each face by flat area.
+
+    Attributes:
+        strain_warp, strain_weft: length on the body over length flat, minus 1.
+        strain_bias: the larger of those along both bisectors of warp and weft.
+        shear: angle by which warp and weft are off the right angle [rad].
+        tension_warp, tension_weft: force along the threads per width of the cloth as worn [N/m].
+        pressure: on the skin [Pa]; 0 where the body is hollow and the cloth would lift off.
+        area: flat [m2].
+        limit: the fabric's.
+        misfits: regions beyond the limit, largest first.
+        outside: share of the flat area that is beyond the limit.
+        hollow: share of the flat area where the tension would lift the cloth off.
+    """
+
+    strain_warp: FloatArray
+    strain_weft: FloatArray
+    strain_bias: FloatArray
+    shear: FloatArray
+    tension_warp: FloatArray
+    tension_weft: FloatArray
+    pressure: FloatArray
+    area: FloatArray
+    limit: float
+    misfits: tuple[Misfit, ...] = field(default=())
+    outside: float = 0.0
+    hollow: float = 0.0
+
+    @property
+    def fits(self) -> bool:
+        """Whether no more than 1 % of the cloth is strained beyond the fabric's limit, either way."""
+        return self.outside <= TOLERATED
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `metrics.json`: fractions, N/m and Pa, each at 5, 50 and 95 % of the area, least, most and mean."""
+        return {
+            "fits": self.fits,
+            "strain_limit": self.limit,
+            "outside": self.outside,
+            "hollow": self.hollow,
+            "where_not": [misfit.words for misfit in self.misfits[:3]],
+            **{name: _spread(getattr(self, name), self.area) for name in MAPS},
+        }
+
+
+def _spread(values: FloatArray, area: FloatArray) -> dict[str, float]:
+    from warpflat.export.colours import weighted_percentile
+
+    spread = {f"p{percent:02d}": weighted_percentile(values, area, percent / 100) for percent in (5, 50, 95)}
+    mean = float(values @ area) / max(float(area.sum()), 1e-300)
+    return {"min": float(values.min()), **spread, "max": float(values.max()), "mean": mean}
+
+
+def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grain_angle: float = 0.0) -> WornFit:
+    """How a given pattern of a surface sits in a fabric.
+
+    Args:
+        surface: the piece on the body.
+        fabric: the cloth.
+        pattern: #V by 2 [m], the piece flat, its grain along +y, or turned from it by `grain_angle` degrees.
+        grain_angle: of the warp against +y, degrees.
+
+    Raises:
+        InputError: the pattern is no such array.
+    """
+    flat = np.asarray(pattern, dtype=np.float64)
+    if flat.shape != (len(surface.vertices), 2) or not np.isfinite(flat).all():
+        raise InputError(f"pattern has shape {flat.shape}; must be ({len(surface.vertices)}, 2) finite numbers [m]")
+    return assess_fit(SpringNetwork.build(surface, fabric, flat, grain_angle=grain_angle, device="cpu"), flat)
+
+
+def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_length: float = SKIN_LENGTH) -> WornFit:
+    """How a layout (#V by 2 [m]) of the network's surface sits in the network's fabric, whatever the model.
+
+    Args:
+        network: of the piece.
+        positions: #V by 2, its pattern [m].
+        smoothing_length: over which the pressure is averaged [m].
+    """
+    fabric, surface = network.fabric, network.surface
+    strain, stress, area = _worn_cells(network, positions)
+    along_warp, along_weft, crossed = _curvature_along(network, positions)
+    lengths = 1.0 + strain[:, :2]
+    # sigma = P F^T / J: force per worn width, and per worn area times curvature.
+    spread = np.maximum(np.sqrt(np.maximum((lengths[:, 0] * lengths[:, 1]) ** 2 - strain[:, 2] ** 2, 0.0)), 1e-12)
+    pull = stress[:, :2] * lengths / spread[:, None]
+    load = pull[:, 0] * along_warp + pull[:, 1] * along_weft + 2.0 * stress[:, 2] * crossed / spread
+    unit = lengths[:, 0] ** 2 + lengths[:, 1] ** 2
+    bias = np.sqrt(np.maximum(0.5 * (unit + 2.0 * np.abs(strain[:, 2])), 0.0)) - 1.0
+    sine = np.clip(strain[:, 2] / np.maximum(lengths[:, 0] * lengths[:, 1], 1e-12), -1.0, 1.0)
+
+    face, faces = network.cell_arrays.face, len(surface.faces)
+    face_area = np.bincount(face, area, minlength=faces).astype(np.float64)
+
+    def mean(values: FloatArray) -> FloatArray:
+        total = np.bincount(face, area * values, minlength=faces)
+        return np.asarray(np.divide(total, face_area, out=np.zeros(faces), where=face_area > 0.0))
+
+    pressure = _smoothed(surface, mean(load), smoothing_length)
+    weight = np.maximum(face_area, 0.0)
+    strain_warp, strain_weft = mean(strain[:, 0]), mean(strain[:, 1])
+    excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
+    total_area = max(float(weight.sum()), 1e-300)
+    return WornFit(
+        strain_warp=strain_warp,
+        strain_weft=strain_weft,
+        strain_bias=mean(bias),
+        shear=mean(np.arcsin(sine)),
+        tension_warp=mean(pull[:, 0]),
+        tension_weft=mean(pull[:, 1]),
+        pressure=np.maximum(pressure, 0.0),
+        area=weight,
+        limit=fabric.strain_limit,
+        misfits=_misfits(surface, strain_warp, strain_weft, excess, weight, fabric.strain_limit),
+        outside=float(weight[excess > 1e-9].sum()) / total_area,
+        hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
+    )
+
+
+def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """#C by 3 strains, #C by 3 stresses [N/m], #C flat areas [m2], by the fabric's own law with its curves."""
+    count, device = network.cell_count, network.device
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    strain, stress = (wp.empty(count, dtype=wp.vec3d, device=device) for _ in range(2))
+    energy, area = (wp.empty(count, dtype=wp.float64, device=device) for _ in range(2))
+    wp.launch(
+        compute_membrane_strain,
+        dim=count,
+        inputs=[at, network.cells, cloth_of(network.fabric, grain_axes(network.grain_angle), device), 0],
+        outputs=[strain, stress, energy, area],
+        device=device,
+    )
+    return np.array(strain.numpy()), np.array(stress.numpy()), np.maximum(np.array(area.numpy()), 0.0)
+
+
+def _curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """#C each: curvature of the body along the worn warp, along the worn weft, and the twist between them [1/m]."""
+    cells, surface = network.cell_arrays, network.surface
+    p = positions[cells.corner]
+    D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+    det = D[:, 0, 0] * D[:, 1, 1] - D[:, 0, 1] * D[:, 1, 0]
+    inverse = (
+        np.stack([np.stack([D[:, 1, 1], -D[:, 0, 1]], -1), np.stack([-D[:, 1, 0], D[:, 0, 0]], -1)], -2)
+        / np.where(det > 0.0, det, 1.0)[:, None, None]
+    )
+    deformation = np.where((det > 0.0)[:, None, None], cells.edges @ inverse, 0.0)
+    q = surface.vertices[cells.corner]
+    a, b = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
+    x = a / np.maximum(np.linalg.norm(a, axis=1), 1e-300)[:, None]
+    across = b - np.einsum("ij,ij->i", b, x)[:, None] * x
+    y = across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
+    bend = curvature_tensors(surface)[cells.corner].mean(axis=1)
+    trace = float((np.einsum("ijj->i", bend) * cells.area).sum())
+    if trace < 0.0:
+        # Wound the other way round: a body is convex on the whole.
+        bend = -bend
+    threads = []
+    for axis in grain_axes(network.grain_angle):
+        worn = deformation @ axis
+        worn = worn / np.maximum(np.linalg.norm(worn, axis=1), 1e-300)[:, None]
+        threads.append(worn[:, :1] * x + worn[:, 1:] * y)
+    warp, weft = threads
+    return (
+        np.einsum("ij,ijk,ik->i", warp, bend, warp),
+        np.einsum("ij,ijk,ik->i", weft, bend, weft),
+        np.einsum("ij,ijk,ik->i", warp, bend, weft),
+    )
+
+
+def _smoothed(surface: Surface, values: FloatArray, length: float) -> FloatArray:
+    at_vertices = smooth_to_vertices(surface, values, smoothing_length=length)
+    used = surface.faces >= 0
+    corners = np.where(used, at_vertices[np.maximum(surface.faces, 0)], 0.0)
+    return np.asarray(corners.sum(axis=1) / used.sum(axis=1))
+
+
+def _misfits(
+    surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
+) -> tuple[Misfit, ...]:
+    from warpflat.strain_map import energy_peak
+    from warpflat.surface.topology import components
+
+    outside = np.flatnonzero(excess > 1e-9)
+    if len(outside) == 0:
+        return ()
+    part = components(surface.faces[outside])
+    found = []
+    for number in range(int(part.max()) + 1):
+        faces = outside[part == number]
+        worst = faces[np.argmax(excess[faces])]
+        on_warp = abs(warp[worst]) >= abs(weft[worst])
+        strain = float(warp[worst] if on_warp else weft[worst])
+        corner = surface.faces[worst]
+        bump = np.zeros(len(surface.vertices))
+        bump[corner[corner >= 0][0]] = 1.0
+        peak = energy_peak(surface, bump)
+        thread = "warp" if on_warp else "weft"
+        state = "stretched" if strain > 0 else "slack"
+        words = (
+            f"{state} {100 * abs(strain):.1f} % along {thread} (limit {100 * limit:.3g} %), {peak.words}; "
+            f"{1e4 * float(area[faces].sum()):.3g} cm2 beyond the limit"
+        )
+        found.append(
+            Misfit(
+                faces=faces.astype(np.int32),
+                area=float(area[faces].sum()),
+                worst=strain,
+                thread=thread,
+                vertex=peak.vertex,
+                words=words,
+            )
+        )
+    return tuple(sorted(found, key=lambda misfit: -misfit.area))
+
+
+def meant_stretch(
+    surface: Surface, fabric: Fabric, positions: FloatArray, wear: Wear, *, grain_angle: float = 0.0
+) -> tuple[FloatArray | None, tuple[str, ...]]:
+    """Length worn over length flat that is meant, per face along warp and weft, and notes.
+
+    For a pressure, p = T_warp k_warp / s_weft + T_weft k_weft / s_warp is solved for the stretch s of the threads that run
+    across the stronger curvature k, with the fabric's own curve for their tension T; k is that along the threads of the
+    layout, averaged over 10 mm. No stretch goes beyond the fabric's limit.
+
+    Args:
+        surface: the piece on the body.
+        fabric: the cloth.
+        positions: #V by 2, a layout, for the directions of the threads [m].
+        wear: what is meant.
+        grain_angle: of the warp against +y, degrees.
+
+    Returns:
+        #F by 2, or None where the pattern is to be of the body's own size.
+    """
+    if not wear.is_tight:
+        return None, ()
+    stretch = np.tile([1.0 + wear.stretch_warp, 1.0 + wear.stretch_weft], (len(surface.faces), 1))
+    if not wear.pressure:
+        return stretch, ()
+    network = SpringNetwork.build(surface, fabric, positions, grain_angle=grain_angle, device="cpu")
+    area = network.cell_arrays.area
+    face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
+    curved = [
+        _smoothed(
+            surface,
+            np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area,
+            SKIN_LENGTH,
+        )
+        for k in _curvature_along(network, positions)[:2]
+    ]
+    around = int(np.abs(curved[1]) @ face_area >= np.abs(curved[0]) @ face_area)
+    thread = ("warp", "weft")[around]
+    other = 1 - around
+    still = stretch[:, other]
+    c_warp, c_weft, c_cross = plane_stress(fabric)
+    beyond = (c_warp - fabric.stiffness_warp, c_weft - fabric.stiffness_weft)
+
+    def pull(along: int, e: FloatArray, across: FloatArray) -> FloatArray:
+        return fabric.tension(e, "weft" if along else "warp") + beyond[along] * e + c_cross * across
+
+    low, high = np.zeros(len(stretch)), np.full(len(stretch), fabric.strain_limit)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        pressure = pull(around, middle, still - 1.0) * curved[around] / still
+        pressure += pull(other, still - 1.0, middle) * curved[other] / (1.0 + middle)
+        enough = pressure >= wear.pressure
+        high, low = np.where(enough, middle, high), np.where(enough, low, middle)
+    stretch[:, around] = 1.0 + 0.5 * (low + high)
+    short = float(face_area[low > fabric.strain_limit - 1e-6].sum() / face_area.sum())
+    notes = [f"pressure {wear.pressure:g} Pa by stretch along {thread}, which runs around the body"]
+    if short > 0.001:
+        notes.append(
+            f"{wear.pressure:g} Pa cannot be reached within {fabric.name}'s limit of {100 * fabric.strain_limit:.3g} % on "
+            f"{100 * short:.0f} % of the piece: too flat, or the cloth too soft"
+        )
+    return stretch, tuple(notes)

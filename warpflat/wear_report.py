@@ -1,0 +1,265 @@
+"""How a garment sits, for people: what would help where it does not fit, the maps, and the lines on the console."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+from warpflat.tightness import MAPS, Misfit, WornFit, assess_fit
+
+if TYPE_CHECKING:
+    from warpflat.flattening import Flattening
+
+__all__ = ["Remedy", "fit_lines", "remedies", "wear_measures", "write_wear_picture"]
+
+IntArray = NDArray[np.int32]
+
+# A line that passes within this distance of the worst place can take the dart for it [m].
+_NEARBY = 0.03
+# The share that is beyond the limit settles long before the energy does.
+_TRIAL_TOLERANCE = 20.0
+_MOST_TRIALS = 8
+# Nobody sews a dart shorter than this [m].
+_LEAST_CUT = 0.025
+# Below these a map would show rounding.
+_LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Remedy:
+    """A cut, sewn as a dart or a seam, that may relieve a misfit.
+
+    Attributes:
+        words: what to cut.
+        path: vertices of the uncut surface.
+        length: [m].
+        outside: share of the cloth beyond the limit once it is made, by trial; None if it was not tried.
+    """
+
+    words: str
+    path: IntArray
+    length: float
+    outside: float | None = None
+
+
+def wear_measures(result: Flattening) -> dict[str, Any]:
+    """The entry `wear` in `metrics.json`; where a way of wearing was asked for, the remedies have been tried."""
+    asked = result.wear is not None
+    measures = {**(asdict(result.wear) if result.wear is not None else {}), **result.fit.as_dict()}
+    measures["would_help"] = [
+        {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside}
+        for remedy in remedies(result, result.fit, trial=asked)
+    ]
+    return measures
+
+
+def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
+    """Darts and seams for the worst places: along lines that pass by, and straight from the border.
+
+    Args:
+        result: a flattened piece.
+        fit: how it sits.
+        trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
+    """
+    if fit.fits:
+        return []
+    found: list[Remedy] = []
+    for misfit in fit.misfits[:4]:
+        for remedy in _candidates(result, misfit):
+            known = any(np.array_equal(remedy.path, other.path) for other in found)
+            if not known and remedy.length >= _LEAST_CUT:
+                found.append(remedy)
+    if not trial:
+        return found[:3]
+    tried = [_tried(result, remedy) for remedy in found[:_MOST_TRIALS]]
+    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * fit.outside]
+    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:3]
+
+
+def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
+    from warpflat.surface import line_between
+    from warpflat.surface.topology import border_edges
+
+    surface = result.surface
+    worst = int(result.vertex_origin[misfit.vertex])
+    border = np.unique(border_edges(surface.faces))
+    points = surface.vertices
+    for name, line in surface.lines.items():
+        row = np.asarray(line)
+        if len(row) < 2 or np.isin(row, border).all():
+            continue
+        nearest = int(np.argmin(np.linalg.norm(points[row] - points[worst], axis=1)))
+        if np.linalg.norm(points[row[nearest]] - points[worst]) > _NEARBY:
+            continue
+        dart = min(row[: nearest + 1], row[nearest:][::-1], key=len)
+        if len(dart) > 2 and dart[0] in border and not np.isin(dart[1:], border).any():
+            yield _remedy(result, dart, f"a dart along {name}")
+        if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
+            yield _remedy(result, row, f"a seam along {name}")
+    if worst in border:
+        # At the border itself a short cut relieves nothing: it has to reach behind the region.
+        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
+        if len(inside) == 0:
+            return
+        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
+    for start in _border_feet(points, border, worst):
+        try:
+            path = line_between(surface, int(start), worst)
+        except InputError:
+            continue
+        # A shortest path may run along the border first.
+        last = int(np.flatnonzero(np.isin(path, border))[-1])
+        if len(path) - last > 1:
+            yield _remedy(result, path[last:], "a dart from the border")
+
+
+def _border_feet(points: NDArray[np.float64], border: IntArray, worst: int) -> list[int]:
+    """The border's vertex nearest to the place, and the nearest in a direction at right angles to that or further off."""
+    away = points[border] - points[worst]
+    distance = np.linalg.norm(away, axis=1)
+    first = int(np.argmin(distance))
+    cosine = away @ away[first] / np.maximum(distance * distance[first], 1e-300)
+    others = np.flatnonzero(cosine < 0.3)
+    feet = [int(border[first])]
+    if len(others):
+        feet.append(int(border[others[np.argmin(distance[others])]]))
+    return feet
+
+
+def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy:
+    points = result.surface.vertices[path]
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
+    return Remedy(
+        words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm", path=path.astype(np.int32), length=length
+    )
+
+
+def _tried(result: Flattening, remedy: Remedy) -> Remedy:
+    from warpflat.cutting import CutPlan, cut
+    from warpflat.relax import RelaxOptions
+
+    options = RelaxOptions()
+    quick = replace(
+        options,
+        energy_tolerance=_TRIAL_TOLERANCE * options.energy_tolerance,
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        max_steps=result.stages[-1].steps + 2000,
+    )
+    try:
+        opened = cut(result, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
+    except InputError:
+        # The path meets a cut that was made before.
+        return remedy
+    return replace(remedy, outside=assess_fit(opened.network, opened.positions).outside)
+
+
+def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """What the console says of each piece's fit: one line, and one for each place and remedy where it does not."""
+    lines = []
+    for name, piece in metrics["pieces"].items():
+        wear = piece.get("wear")
+        if wear is None:
+            continue
+        strains = ", ".join(
+            f"{thread} {100 * wear[f'strain_{thread}']['p05']:+.1f} to {100 * wear[f'strain_{thread}']['p95']:+.1f} %"
+            for thread in ("warp", "weft")
+        )
+        pressure = wear["pressure"]
+        told = f"{name}: fits: {'yes' if wear['fits'] else 'no'} ({strains}, limit {100 * wear['strain_limit']:.3g} %"
+        if pressure["p50"] >= 1.0:
+            told += f"; pressure {pressure['p05']:.0f} to {pressure['p95']:.0f} Pa, median {pressure['p50']:.0f}"
+        lines.append(told + ")")
+        if wear["fits"]:
+            continue
+        lines += [f"  where not: {words}" for words in wear["where_not"]]
+        for remedy in wear["would_help"]:
+            after = remedy["outside_after"]
+            gain = "" if after is None else f": {100 * wear['outside']:.1f} % -> {100 * after:.1f} % beyond the limit"
+            lines.append(f"  {'may help' if after is None else 'would help'}: {remedy['cut']}{gain}")
+        if not wear["would_help"]:
+            lines.append("  would help: another fabric, or another stretch; no single dart does")
+    return lines
+
+
+def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
+    """Strains, tensions and pressure on the pattern, six maps with their scales; what lies beyond the limit is outlined.
+
+    Args:
+        path: the file, ``*.png``.
+        result: a flattened piece.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    from warpflat.export.atomic import atomic_path, require_writable
+
+    require_writable(path)
+    span = np.ptp(result.positions, axis=0)
+    width = 3.4
+    height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
+    figure = Figure(figsize=(3 * (width + 1.1), 2 * (height + 0.75) + 0.5), dpi=110, facecolor="white")
+    FigureCanvasAgg(figure)
+    axes = figure.subplots(2, 3)
+    for axis, name in zip(axes.ravel(), MAPS, strict=True):
+        _draw_map(figure, axis, result, name)
+    fit = result.fit
+    verdict = (
+        "fits" if fit.fits else f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
+    )
+    figure.suptitle(
+        f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {100 * fit.limit:.3g} %", fontsize=12
+    )
+    figure.tight_layout()
+    with atomic_path(path) as temporary:
+        figure.savefig(temporary, format="png", metadata={"Software": "warpflat"})
+
+
+def _draw_map(figure: Any, axis: Any, result: Flattening, name: str) -> None:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    from warpflat.export.colours import weighted_percentile
+    from warpflat.surface.topology import border_edges
+
+    fit, p = result.fit, result.positions
+    label, factor, unit = MAPS[name]
+    values = factor * getattr(fit, name)
+    polygons = [p[face[face >= 0]] for face in result.faces]
+    low, high = (weighted_percentile(values, fit.area, share) for share in (0.01, 0.99))
+    least = _LEAST_SCALE[unit]
+    if (low > 0.3 * high and high > least) or name == "pressure":
+        # All of it pulls: from the least to the most, or from nothing where that is near.
+        colours, low, high = "YlOrRd", 0.0 if low < 0.3 * high else low, max(high, least)
+        high = max(high, low + 0.1 * least)
+    else:
+        # White is rest; red pulls, blue is slack.
+        colours, high = "RdBu_r", max(abs(low), abs(high), least)
+        low = -high
+    drawn = PolyCollection(
+        polygons, array=values, cmap=colours, edgecolors="face", linewidths=0.2, clim=(low, high), rasterized=True
+    )
+    axis.add_collection(drawn)
+    axis.add_collection(LineCollection(list(p[border_edges(result.faces)]), colors="black", linewidths=0.9))
+    if fit.misfits:
+        for misfit in fit.misfits:
+            axis.add_collection(
+                LineCollection(list(p[border_edges(result.faces[misfit.faces])]), colors="#00a000", linewidths=0.7)
+            )
+    axis.set_aspect("equal")
+    axis.autoscale_view()
+    axis.set_axis_off()
+    middle = weighted_percentile(values, fit.area, 0.5)
+    shown = f"{middle:,.0f}" if abs(middle) >= 100 else f"{middle:.3g}"
+    axis.set_title(f"{label}, median {shown} {unit}", fontsize=10)
+    bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend="both" if name != "pressure" else "max", pad=0.02)
+    bar.set_label(unit, fontsize=9)
+    bar.ax.tick_params(labelsize=8)
