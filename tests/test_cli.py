@@ -18,6 +18,7 @@ from warpflat.console import ProgressBar
 
 Run = Callable[..., tuple[int, str, str]]
 
+PATTERN_FILES = ("cloth.dxf", "cloth.svg", "pattern.pdf", "pattern.json")
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
 TETRAHEDRON = "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 1\nf 1 3 2\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
 RING = "".join(
@@ -63,7 +64,7 @@ def test_flatten_writes_its_files_and_a_summary(warpflat: Run):
     assert "out/cloth: " in out
     assert "it/s" not in err
     assert {path.name for path in Path("out/cloth").iterdir()} == {
-        "metrics.json", "cloth.obj", "frames.usdc", "picture.png"
+        "metrics.json", "cloth.obj", "frames.usdc", "picture.png", *PATTERN_FILES
     }  # fmt: skip
     assert json.loads(Path("out/cloth/metrics.json").read_text())["pieces"]["cloth"]["fabric"] == "denim"
 
@@ -79,7 +80,7 @@ def test_run_prints_its_metrics_as_json_and_nothing_else(warpflat: Run):
 def test_quiet_prints_nothing(warpflat: Run):
     Path("cloth.obj").write_text(SQUARE)
     assert warpflat("flatten", "cloth.obj", "--units", "m", "--frames", "0", "--no-picture", "-q") == (0, "", "")
-    assert {path.name for path in Path("out/cloth").iterdir()} == {"metrics.json", "cloth.obj"}
+    assert {path.name for path in Path("out/cloth").iterdir()} == {"metrics.json", "cloth.obj", *PATTERN_FILES}
 
 
 def test_a_run_that_does_not_converge_exits_with_1_and_says_so(warpflat: Run):

@@ -186,7 +186,8 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
     steps: list[int] = []
     result = run_scene(scene, tmp_path / "out", on_progress=lambda progress: steps.append(progress.step))
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(result.files)
-    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png"}
+    pattern = {"trial.dxf", "trial.svg", "pattern.pdf", "pattern.json"}
+    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", *pattern}
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert metrics == json.loads(json.dumps(result.metrics))
     piece = metrics["pieces"]["trial"]
@@ -213,7 +214,9 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
 
 
 def test_files_that_are_not_wanted_are_not_written(tmp_path: Path):
-    text = "[surface]\nshape = 'strip'\nresolution = 9\n[output]\nframes = 0\npicture = false\n"
+    text = (
+        "[surface]\nshape = 'strip'\nresolution = 9\n[output]\nframes = 0\npicture = false\n[pattern]\nformats = []\n"
+    )
     result = run_scene(load_scene(write_scene(tmp_path, text)), tmp_path)
     assert set(result.files) == {"metrics.json", "trial.obj"}
 

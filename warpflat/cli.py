@@ -9,7 +9,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -18,6 +18,7 @@ from warpflat.errors import InputError
 
 if TYPE_CHECKING:
     from warpflat.scene import Scene
+    from warpflat.scene_cuts import CutStory
 
 __all__ = ["cli", "main"]
 
@@ -35,7 +36,11 @@ What comes out, in DIR:
   metrics.json  errors, energies [J], flips and stages of every piece
   NAME.obj      the surface [m] with the pattern [m] as texture coordinates
   frames.usdc   surface and pattern from the development to the end, coloured by energy
-  picture.png   both side by side, with a scale in J/m2"""
+  picture.png   both side by side, with a scale in J/m2
+  NAME.dxf      the pattern for apparel CAD: cut and sewing lines, notches, grain
+  NAME.svg      the same for screen and plotter, in millimetres
+  pattern.pdf   the same in true size, tiled on A4
+  pattern.json  everything of the pattern; warpflat export makes the others from it"""
 
 
 class _Interrupted(Exception):
@@ -95,6 +100,7 @@ def cli(context: click.Context) -> None:
       warpflat run scenes/dome.toml                       a scene file, into out/dome
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
+      warpflat cuts scenes/bodice.toml                    which cut would release how much energy
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
     """
@@ -158,6 +164,10 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
     "middle]",
 )
 @click.option("--grain-angle", type=float, metavar="DEGREES", help="Turns the warp from the datum; 45 is the bias.")
+@click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
+@click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
+@click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
+@click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
 @click.option("--max-steps", type=int, metavar="N", help="Give up after so many steps.")
 @click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
 @click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
@@ -185,13 +195,16 @@ def flatten(
         "max_steps": ("relax", "max_steps"),
         "time_step": ("relax", "time_step"),
         "frames": ("output", "frames"),
+        "stretch_warp": ("wear", "stretch_warp"),
+        "stretch_weft": ("wear", "stretch_weft"),
+        "pressure": ("wear", "pressure"),
     }
     for option, (table, key) in places.items():
         if options[option] is not None:
-            tables[table][key] = options[option]
+            tables.setdefault(table, {})[key] = options[option]
     if options["component"] is not None and options["component"].isdecimal():
         tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "grain_angle"):
+    for key in ("name", "fabric", "grain_angle", "model"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
@@ -278,6 +291,46 @@ def _metres(text: str, option: str) -> tuple[str, float]:
 
 
 @cli.command()
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option(
+    "--fabric", "fabrics", multiple=True, metavar="NAME", help="One of those to compare; the first is the base."
+)
+@_output_options
+def compare(
+    scene: Path, fabrics: tuple[str, ...], out: Path | None, quiet: bool, as_json: bool, device: str | None
+) -> int:
+    """Run a scene in several fabrics and lay the outlines upon each other: table, compare.png, compare.svg, compare.json.
+
+    \b
+    Examples:
+      warpflat compare scenes/bodice.toml --fabric denim --fabric jersey --fabric power-net
+    """
+    from warpflat.compare import compare_fabrics, comparison_table, save_comparison
+    from warpflat.console import ProgressBar, warnings_of
+    from warpflat.scene import load_scene
+
+    job = load_scene(scene)
+    _start_warp()
+    with ProgressBar(job.name, hidden=quiet or as_json) as bar:
+        comparison = compare_fabrics(job, fabrics, on_progress=lambda _, progress: bar(progress), device=device)
+    folder = out if out is not None else Path("out") / f"{job.name}-compared"
+    files = save_comparison(comparison, folder)
+    warnings = [
+        f"{fabric}: {line}"
+        for fabric, pieces in comparison.results.items()
+        for line in warnings_of({"pieces": {name: piece.measures for name, piece in pieces.items()}})
+    ]
+    for warning in warnings:
+        click.echo(f"warpflat: {warning}", err=True)
+    if as_json:
+        click.echo((folder / "compare.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        click.echo(comparison_table(comparison))
+        click.echo(f"{folder}: {', '.join(files)}")
+    return NOT_CONVERGED if warnings else DONE
+
+
+@cli.command()
 @click.argument("name", required=False)
 @click.option("--file", "files", multiple=True, type=click.Path(path_type=Path), help="A fabric file of your own.")
 @click.option("--json", "as_json", is_flag=True, help="Print JSON.")
@@ -301,6 +354,86 @@ def fabrics(name: str | None, files: tuple[Path, ...], as_json: bool) -> None:
         click.echo(fabric_table(shown))
     else:
         click.echo(fabric_sheet(shown[0]))
+
+
+@cli.command(epilog=_EXIT_CODES)
+@click.argument("scene", type=click.Path(path_type=Path))
+@click.option("--apply", "apply", type=int, metavar="N", help="Make the cut of that number and run the scene with it.")
+@click.option(
+    "--by",
+    type=click.Choice(["per_cm", "released"]),
+    default="per_cm",
+    show_default=True,
+    help="What the order goes by: energy released per centimetre cut, or in all.",
+)
+@_output_options
+def cuts(
+    scene: Path,
+    out: Path | None,
+    quiet: bool,
+    as_json: bool,
+    device: str | None,
+    apply: int | None,
+    by: Literal["per_cm", "released"],
+) -> int:
+    """Compare cuts: where the energy is, and what each candidate would release.
+
+    Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, and
+    paths that follow the energy. Each is tried with a coarse relaxation; --apply relaxes fully. Writes ledger.json and
+    ledger.png.
+
+    \b
+    Examples:
+      warpflat cuts scenes/bodice.toml
+      warpflat cuts scenes/bodice.toml --apply 1 --out cut
+    """
+    from warpflat.console import ledger_table
+    from warpflat.export import prepare_folder, write_json
+    from warpflat.ledger_picture import write_ledger_picture
+    from warpflat.scene import load_scene, scene_ledger
+    from warpflat.scene_cuts import story_of_entry
+
+    loaded = load_scene(scene)
+    _start_warp()
+    folder = prepare_folder(out if out is not None else Path("out") / loaded.name)
+    ledger = scene_ledger(loaded, by=by, device=device)
+    story = None if apply is None else story_of_entry(ledger, apply)
+    write_json(folder / "ledger.json", ledger.as_dict())
+    write_ledger_picture(folder / "ledger.png", ledger)
+    if as_json and story is None:
+        click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
+    elif not (quiet or as_json):
+        click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
+    if story is None:
+        return DONE
+    return _run(loaded, folder, quiet=quiet, as_json=as_json, device=device, cuts=story)
+
+
+@cli.command()
+@click.argument("folder", metavar="DIR", type=click.Path(path_type=Path))
+@click.option(
+    "--format", "formats", type=click.Choice(["dxf", "svg", "pdf", "json"]), multiple=True, required=True, help="Which."
+)
+@click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
+@click.option("--paper", type=click.Choice(["A4", "Letter", "A0"]), default="A4", show_default=True, help="Of the PDF.")
+@click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern.")
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
+def export(
+    folder: Path, formats: tuple[str, ...], dialect: str, paper: str, sizes: tuple[str, ...], quiet: bool
+) -> int:
+    """Write a run's pattern files again, from its pattern.json: another dialect, another paper, one size.
+
+    \b
+    Examples:
+      warpflat export out/dress --format dxf --dialect astm
+      warpflat export out/dress --format pdf --paper Letter --size "EU 38"
+    """
+    from warpflat.pattern_files import export_pattern
+
+    files = [export_pattern(folder, kind, dialect=dialect, paper=paper, sizes=sizes or None) for kind in formats]
+    if not quiet:
+        click.echo(f"{folder}: {', '.join(files)}")
+    return DONE
 
 
 def _start_warp() -> None:
@@ -327,14 +460,17 @@ def _start_warp() -> None:
                 click.echo(line, err=True)
 
 
-def _run(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:
+def _run(
+    scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None, cuts: CutStory | None = None
+) -> int:
     from warpflat.console import ProgressBar, run_summary, warnings_of
     from warpflat.scene import run_scene
+    from warpflat.wear_report import fit_lines
 
     _start_warp()
     folder = out if out is not None else Path("out") / scene.name
     with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
-        result = run_scene(scene, folder, on_progress=bar, device=device)
+        result = run_scene(scene, folder, on_progress=bar, device=device, cuts=cuts)
     if not (quiet or as_json):
         for note in result.notes:
             click.echo(f"warpflat: note: {note}", err=True)
@@ -345,6 +481,8 @@ def _run(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: 
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         click.echo(run_summary(result.metrics, result.files, str(folder)))
+        for line in fit_lines(result.metrics):
+            click.echo(line)
     return NOT_CONVERGED if warnings else DONE
 
 

@@ -13,6 +13,7 @@ from warpflat.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_na
 
 if TYPE_CHECKING:
     from warpflat.flattening import Progress
+    from warpflat.ledger import Ledger
     from warpflat.mannequin import Level
 
 __all__ = [
@@ -20,6 +21,7 @@ __all__ = [
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
+    "ledger_table",
     "mannequin_table",
     "run_summary",
     "warnings_of",
@@ -36,6 +38,7 @@ class ProgressBar:
         self._name = name
         self._hidden = hidden or not sys.stderr.isatty()
         self._bar: Any = None
+        self._stage = ""
 
     def __enter__(self) -> ProgressBar:
         if not self._hidden:
@@ -60,6 +63,9 @@ class ProgressBar:
         """Show where the run stands."""
         if self._bar is None:
             return
+        if progress.stage != self._stage and progress.step == 0:
+            self._bar.reset()
+        self._stage = progress.stage
         self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
         told = f"{progress.spring_energy * 1e3:.4g} mJ"
         if math.isfinite(progress.residual):
@@ -132,6 +138,35 @@ def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
         body = level.girth if level.section is None else level.section
         rows.append((name, f"{100 * level.height:.1f} cm", f"{100 * body:.1f} cm", f"{100 * level.girth:.1f} cm"))
     return f"{source}\n{_aligned(('level', 'height', 'girth', 'by tape'), rows)}"
+
+
+def ledger_table(ledger: Ledger) -> str:
+    """The candidates of a ledger, the best first, with the numbers that `--apply` takes."""
+    from warpflat.ledger_picture import candidate_words
+
+    head = (
+        "",
+        "cut",
+        "per cm",
+        "released",
+        "left",
+        "length",
+        "opening",
+        "angle",
+        "length error",
+        "area error",
+        "flips",
+    )
+    rows = []
+    for number, entry in enumerate(ledger.entries, start=1):
+        errors = (
+            f"{100 * entry.length_error_before:.2f} > {100 * entry.length_error:.2f} %",
+            f"{100 * entry.area_error_before:.2f} > {100 * entry.area_error:.2f} %",
+        )
+        rows.append((str(number), entry.candidate.name, *candidate_words(entry), *errors, str(entry.flipped_faces)))
+    peaks = "\n".join(f"peak {number}: {words}" for number, words in enumerate(ledger.peaks.words, start=1))
+    refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
+    return "\n".join([peaks, _aligned(head, rows, left=(1,)), *refused])
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import platform
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -14,19 +13,21 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat._version import __version__
+from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, choose_datum, develop
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric
-from warpflat.network import SpringNetwork
-from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, relax
+from warpflat.membrane import Model, check_model
+from warpflat.network import SpringNetwork, grain_axes
+from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, Upright, relax
 from warpflat.strain import WornStrain, layout_errors, worn_strain
-from warpflat.surface import Surface, line_from_indices, read_surface
+from warpflat.surface import Surface, components, line_from_indices, read_surface
+from warpflat.tightness import Wear, WornFit, assess_fit, meant_stretch
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
 
-__all__ = ["Flattening", "Progress", "Stage", "flatten"]
+__all__ = ["Flattening", "Progress", "Stage", "flatten", "relax_cut"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -62,7 +63,7 @@ class Progress:
     """Where a run stands; what a callback gets after every step.
 
     Attributes:
-        stage: "develop" or "relax".
+        stage: "develop", "relax" or "cut:NAME".
         step: approximate implicit steps so far.
         max_steps: at most so many.
         spring_energy: [J], of the last look (see `RelaxOptions.check_every`).
@@ -79,6 +80,11 @@ class Progress:
         self.residual = residual
         self._state = state
 
+    @property
+    def surface(self) -> Surface:
+        """The surface with the present topology: after a cut its vertices are doubled."""
+        return self._state.network.surface
+
     def positions(self) -> FloatArray:
         """#V by 2, the layout [m], a copy."""
         return self._state.positions()
@@ -93,14 +99,16 @@ class Flattening:
     """A relaxed pattern and what is known of it.
 
     Attributes:
-        surface: the piece in space.
+        surface: the piece in space, uncut; with the cuts made it is `network.surface`.
         fabric: the cloth.
         datum: vertex indices of the line from which it was developed; the grain.
         datum_name: its name, or how it was chosen.
-        positions: #V by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
+        positions: #P by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
         stages: development and relaxation, with their energies.
         history: #K by 4, step, spring energy [J], guard energy [J], residual, at every look.
         notes: what was mended or chosen on the way, one sentence each.
+        cuts: made since the first relaxation, see `warpflat.cutting`.
+        wear: how it is meant to be worn, if that was asked for.
     """
 
     surface: Surface
@@ -114,11 +122,21 @@ class Flattening:
     stages: tuple[Stage, ...]
     history: FloatArray
     notes: tuple[str, ...]
+    cuts: tuple[AppliedCut, ...] = ()
+    wear: Wear | None = None
 
     @property
     def faces(self) -> IntArray:
-        """#F by 4, as the surface's."""
-        return self.surface.faces
+        """#F by 4, the surface's faces in the pattern's numbering: cuts double vertices."""
+        return self.network.surface.faces
+
+    @cached_property
+    def vertex_origin(self) -> IntArray:
+        """#P, for each vertex of the pattern its vertex on the surface."""
+        origin = np.arange(len(self.positions), dtype=np.int32)
+        used = self.faces >= 0
+        origin[self.faces[used]] = self.surface.faces[used]
+        return origin
 
     @property
     def converged(self) -> bool:
@@ -135,6 +153,11 @@ class Flattening:
         """Worn strain and strain energy per face."""
         return worn_strain(self.network, self.positions)
 
+    @cached_property
+    def fit(self) -> WornFit:
+        """How it sits when worn: strain, tension and pressure, against the fabric's limit."""
+        return assess_fit(self.network, self.positions)
+
     @property
     def face_energy_density(self) -> FloatArray:
         """#F, strain energy per flat area [J/m2]."""
@@ -143,13 +166,16 @@ class Flattening:
     @cached_property
     def measures(self) -> dict[str, Any]:
         """The piece's entry in `metrics.json`."""
-        errors = layout_errors(self.surface, self.network, self.positions)
+        from warpflat.wear_report import wear_measures
+
+        errors = layout_errors(self.network.surface, self.network, self.positions)
         last = self.stages[-1]
         return {
             "vertices": len(self.surface.vertices),
             "faces": len(self.surface.faces),
             "springs": self.network.spring_count,
             "fabric": self.fabric.name,
+            "model": self.network.model,
             "datum": self.datum_name,
             "development": self.development.method,
             "flipped_faces": errors.flipped_faces,
@@ -160,20 +186,18 @@ class Flattening:
             "spring_energy_j": last.spring_energy_j,
             "guard_energy_j": last.guard_energy_j,
             "area_m2": float(self.worn.area.sum()),
+            "wear": wear_measures(self),
             "converged": self.converged,
             "stages": [stage.as_dict() for stage in self.stages],
+            "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
             "notes": list(self.notes),
         }
 
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
-        return {
-            "schema": 1,
-            "warpflat": __version__,
-            "warp": wp.config.version,
-            "device": _device_name(self.network.device),
-            "pieces": {self.surface.name: self.measures},
-        }
+        from warpflat.result_files import metrics_of
+
+        return metrics_of([self])
 
     def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
         """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), each atomically.
@@ -189,50 +213,23 @@ class Flattening:
         Raises:
             InputError: the folder cannot be written.
         """
-        from warpflat.export import FrameWriter, prepare_folder, write_json, write_picture
+        from warpflat.result_files import write_results
 
-        to = prepare_folder(folder)
-        name = self.surface.name
-        files = [self.write_obj(to)]
-        if frames:
-            files.append("frames.usdc")
-            with FrameWriter(to / files[-1]) as writer:
-                writer.add_piece(name, self.surface)
-                first = worn_strain(self.network, self.development.positions).energy_density
-                writer.write(name, positions=self.development.positions, face_energy_density=first)
-                writer.write(name, positions=self.positions, face_energy_density=self.face_energy_density)
-        if picture:
-            files.append("picture.png")
-            write_picture(to / files[-1], [self.picture_piece()])
-        files.append("metrics.json")
-        write_json(to / files[-1], self.metrics())
-        return files
+        return write_results([self], folder, picture=picture, frames=frames)
 
     def write_obj(self, folder: Path) -> str:
         """Write `NAME.obj` and return its name."""
         from warpflat.export import write_obj
 
         file = f"{self.surface.name}.obj"
-        write_obj(folder / file, self.surface, self.positions)
+        write_obj(folder / file, self.surface, self.positions, faces=self.faces, pattern_to_surface=self.vertex_origin)
         return file
 
     def picture_piece(self) -> PicturePiece:
         """Its row in a picture."""
-        from warpflat.export import PicturePiece
+        from warpflat.result_files import picture_piece
 
-        lines = dict(self.surface.lines)
-        lines.setdefault(self.datum_name, self.datum)
-        return PicturePiece(
-            name=self.surface.name,
-            surface=self.surface,
-            faces=self.faces,
-            positions=self.positions,
-            face_energy_density=self.face_energy_density,
-            lines=lines,
-            surface_lines=lines,
-            datum=self.datum_name,
-            captions=self.captions(),
-        )
+        return picture_piece(self)
 
     def captions(self) -> dict[str, str]:
         """The key measures as short texts."""
@@ -257,6 +254,8 @@ def flatten(
     datum: str | ArrayLike | None = None,
     grain_angle: float = 0.0,
     units: str | None = None,
+    model: Model = "springs",
+    wear: Wear | None = None,
     relax: RelaxOptions | None = None,
     callback: Callable[[Progress], None] | None = None,
     device: str | None = None,
@@ -270,6 +269,9 @@ def flatten(
             indices along mesh edges; if not given, the line along the long axis through the middle.
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
         units: of a mesh file that carries none: "m", "cm", "mm", "in", "ft".
+        model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.network`); what is
+            minimised is reported as `spring_energy_j` either way.
+        wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         relax: options of the relaxation.
         callback: called with a `Progress` for the development (step 0) and after every step.
         device: Warp device, "cpu" or "cuda:0"; Warp's own choice if not given.
@@ -284,15 +286,16 @@ def flatten(
     options.validate()
     if not np.isfinite(grain_angle):
         raise InputError(f"grain_angle = {grain_angle} is not a number of degrees")
+    check_model(model)
     where = _device(device)
     line, line_name, notes = _datum(surface, datum)
 
     begun = time.perf_counter()
-    development = develop(surface, line)
-    run = _Run(surface, cloth, grain_angle, where, options, callback, line)
+    run = _Run(surface, cloth, grain_angle, where, options, callback, line, model=model, wear=wear)
+    development = run.let_go(develop(surface, line))
     state = run.state_at(development.positions)
     stages = [run.stage("develop", state, seconds=time.perf_counter() - begun)]
-    state, outcome = run.relax(state, development)
+    state, outcome = run.relax(state, mended=development.mended)
     stages.append(run.stage("relax", state, outcome=outcome, seconds=outcome.seconds))
     return Flattening(
         surface=surface,
@@ -306,6 +309,49 @@ def flatten(
         stages=tuple(stages),
         history=np.array(run.history),
         notes=(*surface.notes, *notes, *development.notes, *run.notes),
+        wear=run.wear,
+    )
+
+
+def relax_cut(
+    result: Flattening,
+    surface: Surface,
+    positions: FloatArray,
+    *,
+    stage: str,
+    cuts: Sequence[AppliedCut],
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """Go on from a layout of a piece whose topology has changed; `warpflat.cutting.cut` makes such.
+
+    Args:
+        result: of the piece before.
+        surface: `result.surface` with vertices doubled (#P), of which the first keep their numbers.
+        positions: #P by 2, where to go on from [m].
+        stage: what it is called in the history.
+        cuts: all that `surface` has.
+        options: of the relaxation.
+        callback: called with a `Progress` before the first step and after every step.
+    """
+    options.validate()
+    part = components(surface.faces)
+    part_of = np.full(len(surface.vertices), -1)
+    used = surface.faces >= 0
+    part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
+    # A cut may part the datum: then the first part of it stays upright.
+    datum = result.datum[part_of[result.datum] == part_of[result.datum[0]]]
+    run = _Run(surface, result.fabric, result.grain_angle, result.network.device, options, callback, datum, stage)
+    run.model, run.wear = result.network.model, result.wear
+    state, outcome = run.relax(run.state_at(positions), mended=False)
+    return replace(
+        result,
+        network=state.network,
+        positions=state.positions(),
+        stages=(*result.stages, run.stage(stage, state, outcome=outcome, seconds=outcome.seconds)),
+        history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
+        notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
+        cuts=tuple(cuts),
     )
 
 
@@ -320,25 +366,52 @@ class _Run:
     options: RelaxOptions
     callback: Callable[[Progress], None] | None
     datum: IntArray
+    stage_name: str = "relax"
+    model: Model = "springs"
+    wear: Wear | None = None
 
     def __post_init__(self) -> None:
         self.history: list[tuple[float, float, float, float]] = []
         self.notes: list[str] = []
 
+    def let_go(self, development: Development) -> Development:
+        """The development made smaller by the mean stretch that is meant: the cloth as it was on the body, let go."""
+        stretch, _ = self._meant(development.positions)
+        if stretch is None:
+            return development
+        shrink = sum(
+            np.outer(axis, axis) / s for axis, s in zip(grain_axes(self.grain_angle), stretch.mean(0), strict=True)
+        )
+        return replace(development, positions=development.positions @ shrink)
+
+    def _meant(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
+        if self.wear is None:
+            return None, ()
+        return meant_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
+
     def state_at(self, positions: FloatArray, *, after: Relaxation | None = None) -> Relaxation:
         """A relaxation that starts at a layout, with directions measured in it."""
+        stretch, notes = self._meant(positions)
+        self.notes += [note for note in notes if note not in self.notes]
         network = SpringNetwork.build(
-            self.surface, self.fabric, positions, grain_angle=self.grain_angle, device=self.device
+            self.surface,
+            self.fabric,
+            positions,
+            grain_angle=self.grain_angle,
+            device=self.device,
+            model=self.model,
+            stretch=stretch,
         )
-        ends = (int(self.datum[0]), int(self.datum[-1]))
-        state = Relaxation(network, self.options, start=positions, upright=ends)
+        ends = Upright(lower=int(self.datum[0]), upper=int(self.datum[-1]))
+        state = Relaxation(network, self.options, start=positions, upright=[ends])
         if after is not None:
             state.steps, state.restarts = after.steps, after.restarts
         return state
 
-    def relax(self, state: Relaxation, development: Development) -> tuple[Relaxation, Outcome]:
+    def relax(self, state: Relaxation, *, mended: bool) -> tuple[Relaxation, Outcome]:
         """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
-        self._tell("develop", state, state.energies(), float("nan"))
+        first = "develop" if self.stage_name == "relax" else self.stage_name
+        self._tell(first, state, state.energies(), float("nan"))
         begun = time.perf_counter()
         clamped = state.network.spring_arrays.clamped_cells
         if clamped:
@@ -347,7 +420,7 @@ class _Run:
                 "structural springs were kept at 5 % of it"
             )
         isotropic = _is_isotropic(self.fabric)
-        if development.mended or (not isotropic and not self.surface.is_quad.all()):
+        if mended or (not isotropic and not self.surface.is_quad.all()):
             state.options = replace(
                 self.options,
                 energy_tolerance=_FIRST_ROUND * self.options.energy_tolerance,
@@ -366,7 +439,7 @@ class _Run:
         self.history.append((float(state.steps), energies.spring, energies.guard, residual))
 
     def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self._tell("relax", state, energies, residual)
+        self._tell(self.stage_name, state, energies, residual)
 
     def _tell(self, stage: str, state: Relaxation, energies: Energies, residual: float) -> None:
         if self.callback is not None:
@@ -427,7 +500,3 @@ def _device(name: str | None) -> wp.Device:
     except Exception as error:
         devices: Sequence[str] = [d.alias for d in wp.get_devices()]
         raise InputError(f"device {name!r} is not available; {nearest(str(name), devices)}") from error
-
-
-def _device_name(device: wp.Device) -> str:
-    return platform.machine() + " cpu" if device.is_cpu else str(device.name)

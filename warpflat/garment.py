@@ -15,6 +15,7 @@ from warpflat.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.mannequin import Carrier, FormResult, FormSeam, Mannequin
 from warpflat.relax import RelaxOptions
+from warpflat.sewing import SeamPair, Sewn, sew
 
 __all__ = ["Garment", "SeamLengths", "flatten_form"]
 
@@ -68,12 +69,14 @@ class Garment:
         mannequin: whose form it is.
         form: the pieces in space, with their edges and seams.
         pieces: the flat pieces by name, in the form's order.
+        sewn: how they were relaxed together under their seams, and what equal seams cost; None if they were not.
     """
 
     name: str
     mannequin: Mannequin
     form: FormResult
     pieces: Mapping[str, Flattening]
+    sewn: Sewn | None = None
 
     @property
     def seams(self) -> tuple[SeamLengths, ...]:
@@ -114,6 +117,7 @@ class Garment:
             "pieces": {name: piece.measures for name, piece in self.pieces.items()},
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
+            **({} if self.sewn is None else {"sewing": self.sewn.as_dict()}),
         }
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
@@ -143,15 +147,18 @@ def flatten_form(
     relax: RelaxOptions | None = None,
     callback: Callable[[str, Progress], None] | None = None,
     device: str | None = None,
+    sewn: bool = True,
     **options: Any,
 ) -> Garment:
-    """Flatten every piece of a form, each from its own datum line.
+    """Flatten every piece of a form, each from its own datum line, then all together, so that their seams match.
 
     Args:
         mannequin: whose form it is.
         form: what `Mannequin.form` gives.
         fabric, grain_angle, relax, device, options: as :func:`warpflat.flatten` takes them.
-        callback: called with the piece's name and its `Progress` after every step.
+        callback: called with the piece's name and its `Progress` after every step of its own.
+        sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
+            keeps its own minimum.
 
     Raises:
         InputError: a piece cannot be flattened; one line says which and why.
@@ -173,7 +180,12 @@ def flatten_form(
             device=device,
             **options,
         )
-    return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
+    if not sewn:
+        return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
+    pairs = [SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices) for seam in form.seams]
+    folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
+    together = sew(pieces, pairs, straight=folds, options=relax)
+    return Garment(name=form.name, mannequin=mannequin, form=form, pieces=together.pieces, sewn=together)
 
 
 def _length(points: NDArray[np.float64]) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
 import os
 import re
@@ -10,17 +9,31 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import ConfigDict, Discriminator, Field, Tag, create_model, model_validator
+from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
 from warpflat.mannequin.table import MannequinTable
 from warpflat.relax import RelaxOptions
+from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
+from warpflat.scene_types import (
+    BorderTable,
+    FileSurface,
+    LineTable,
+    MarkerTable,
+    OutputTable,
+    PatternTable,
+    RelaxTable,
+    ShapeSurface,
+    WearTable,
+    kind_of_surface,
+    text_or_table,
+)
 from warpflat.surface import (
     Surface,
     line_between,
@@ -35,7 +48,9 @@ from warpflat.surface.border import SIDES
 from warpflat.toml_file import Table, check_table, read_toml
 
 if TYPE_CHECKING:
-    from warpflat.flattening import Progress
+    from warpflat.flattening import Flattening, Progress
+    from warpflat.ledger import Ledger
+    from warpflat.tightness import Wear
 
 __all__ = [
     "FileSurface",
@@ -48,116 +63,11 @@ __all__ = [
     "load_scene",
     "make_scene",
     "run_scene",
+    "scene_cuts",
+    "scene_ledger",
 ]
 
 _VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}|\$([A-Za-z_][A-Za-z0-9_]*)")
-
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
-Vertex = Annotated[int, Field(ge=0)]
-PointOrVertex = Annotated[
-    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
-    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
-]
-Component = Annotated[
-    Annotated[Literal["largest"], Tag("word")] | Annotated[int, Field(ge=0), Tag("number")],
-    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
-]
-
-
-def _text_or_table(value: Any) -> str:
-    return "text" if isinstance(value, str) else "table"
-
-
-class FileSurface(Table):
-    """A mesh file; `file` starts in the scene's folder and may name environment variables, ${WARPFLAT_DATA}/x.obj."""
-
-    file: str = Field(min_length=1)
-    units: str | None = None
-    component: Component | None = None
-    prim: str | None = None
-
-
-class ShapeSurface(Table):
-    """A surface by formula; its other keys are the parameters of that function of `warpflat.shapes`."""
-
-    model_config = ConfigDict(extra="allow")
-    shape: str
-
-
-def _kind_of_surface(value: Any) -> str:
-    given = value if isinstance(value, dict) else getattr(value, "__dict__", {})
-    return "by-formula" if "shape" in given and "file" not in given else "from-file"
-
-
-class PlaneTable(Table):
-    """A plane by a point on it [m] and its normal (any length)."""
-
-    point: Point
-    normal: Point
-
-
-class BorderTable(Table):
-    """A stretch of the border between two of its vertices, or the ones nearest to two points [m]."""
-
-    start: PointOrVertex
-    end: PointOrVertex
-    direction: Literal["shortest", "with", "against"] = "shortest"
-
-
-class LineTable(Table):
-    """A feature line, given in one of five ways. Vertices count those of the file, from 0; points are in metres.
-
-    `vertices` lists every vertex, `from` and `to` are the ends of a shortest path, `plane` cuts the piece, `border` is
-    a side (bottom, left, right, top) or a stretch, `curve` the points of a polyline or the prim path of a USD curve.
-    """
-
-    vertices: Annotated[list[Vertex], Field(min_length=2)] | None = None
-    from_: PointOrVertex | None = Field(default=None, alias="from")
-    to: PointOrVertex | None = None
-    plane: PlaneTable | None = None
-    border: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[BorderTable, Tag("table")],
-            Discriminator(_text_or_table),
-        ]
-        | None
-    ) = None
-    curve: (
-        Annotated[
-            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
-            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
-        ]
-        | None
-    ) = None
-
-    @model_validator(mode="after")
-    def _one_way(self) -> LineTable:
-        if (self.from_ is None) != (self.to is None):
-            raise ValueError("a shortest path needs both from and to")
-        ways = [self.vertices, self.from_, self.plane, self.border, self.curve]
-        if sum(way is not None for way in ways) != 1:
-            raise ValueError("give the line in one way: vertices, from and to, plane, border, or curve")
-        return self
-
-
-class OutputTable(Table):
-    """What is written besides `metrics.json` and `NAME.obj`."""
-
-    frames: Annotated[int, Field(ge=0, le=100_000)] = 60
-    """About how many frames, close together at first, when the pattern moves most; 0 for no `frames.usdc`."""
-    frame_every: Annotated[int, Field(ge=1)] | None = None
-    """A frame every so many steps instead."""
-    picture: bool = True
-
-
-_RELAX_FIELDS: dict[str, Any] = {
-    field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
-}
-if TYPE_CHECKING:
-    RelaxTable = Table
-else:
-    # The fields of RelaxOptions, each optional, so that the two cannot differ.
-    RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
 
 
 class SceneTable(Table):
@@ -166,13 +76,13 @@ class SceneTable(Table):
     name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]*$", max_length=100)] | None = None
     fabric: Annotated[
         Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
-        Discriminator(_text_or_table),
+        Discriminator(text_or_table),
     ] = DEFAULT_FABRIC
     fabric_files: list[str] = Field(default_factory=list)
     surface: (
         Annotated[
             Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],
-            Discriminator(_kind_of_surface),
+            Discriminator(kind_of_surface),
         ]
         | None
     ) = None
@@ -180,7 +90,7 @@ class SceneTable(Table):
     form: (
         Annotated[
             Annotated[str, Tag("text")] | Annotated[dict[str, Any], Tag("table")],
-            Discriminator(_text_or_table),
+            Discriminator(text_or_table),
         ]
         | None
     ) = None
@@ -188,11 +98,17 @@ class SceneTable(Table):
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
+    cuts: list[CutTable] = Field(default_factory=list)
+    auto_cut: AutoCutTable | None = None
     datum: str | None = None
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    model: Literal["springs", "membrane"] = "springs"
+    wear: WearTable | None = None
     device: str | None = None
     relax: RelaxTable = Field(default_factory=RelaxTable)
     output: OutputTable = Field(default_factory=OutputTable)
+    pattern: PatternTable = Field(default_factory=PatternTable)
+    marker: MarkerTable | None = None
 
     @model_validator(mode="after")
     def _one_source(self) -> SceneTable:
@@ -202,6 +118,10 @@ class SceneTable(Table):
             raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
         if self.mannequin is not None and (self.lines or self.datum):
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+        if self.mannequin is not None and (self.cuts or self.auto_cut):
+            raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
+            raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
         return self
 
 
@@ -275,70 +195,135 @@ def run_scene(
     *,
     on_progress: Callable[[Progress], None] | None = None,
     device: str | None = None,
+    cuts: CutStory | None = None,
 ) -> SceneResult:
-    """Flatten the scene's surface, or the pieces of its form, and write `metrics.json`, `NAME.obj`, `frames.usdc` and `picture.png`.
+    """Flatten the scene's surface, or the pieces of its form, and write the result.
+
+    Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see `warpflat.pattern_files`).
 
     Args:
         scene: what to do.
         out: folder for the files, made if need be.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
+        cuts: to be made instead of the scene's own (see `warpflat.scene_cuts.story_of_entry`).
 
     Raises:
-        InputError: the surface, a line, the fabric or a setting is wrong, or `out` cannot be written.
+        InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
+    from warpflat.cutting import cut, separate
     from warpflat.export import FrameWriter, prepare_folder
-    from warpflat.flattening import flatten
+    from warpflat.film import Film
+    from warpflat.pattern_files import pattern_options, surface_files
+    from warpflat.result_files import metrics_of, write_results
 
     settings = scene.settings
     relax = scene_relax_options(scene)
-    fabric = scene_fabric(scene)
     folder = prepare_folder(out)
     if settings.mannequin is not None:
         from warpflat.scene_garment import run_garment
 
         return run_garment(scene, folder, on_progress=on_progress, device=device)
-    surface = scene_surface(scene)
-    schedule = FrameSchedule(settings.output)
+    with told_by(scene.where):
+        drawing = pattern_options(settings.pattern, settings.marker)
+    story = cuts or scene_cuts(scene, device=device)
+    wanted = FrameSchedule(settings.output).wanted
     with ExitStack() as stack:
-        writer: FrameWriter | None = None
-        if schedule.wanted:
-            writer = stack.enter_context(FrameWriter(folder / "frames.usdc"))
-            writer.add_piece(scene.name, surface)
+        writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
+        film = Film(writer, story.surface, lambda: FrameSchedule(settings.output))
 
         def each_step(progress: Progress) -> None:
-            if writer is not None and schedule.is_due(progress.step, progress.max_steps):
-                writer.write(
-                    scene.name,
-                    positions=progress.positions(),
-                    face_energy_density=progress.face_energy_density(),
-                    measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
-                )
+            film(progress)
             if on_progress is not None:
                 on_progress(progress)
 
         with told_by(scene.where):
-            result = flatten(
-                surface,
-                fabric=fabric,
-                datum=settings.datum,
-                grain_angle=settings.grain_angle,
-                relax=relax,
-                callback=each_step,
-                device=device or settings.device,
-            )
-        if writer is not None:
-            numbers = {key: value for key, value in result.measures.items() if isinstance(value, (int, float))}
-            writer.write(
-                scene.name,
-                positions=result.positions,
-                face_energy_density=result.face_energy_density,
-                measures={"step": result.stages[-1].steps, **numbers},
-            )
-    files = result.save(folder, picture=settings.output.picture, frames=False)
-    if schedule.wanted:
+            result = _flatten(scene, story.surface, relax, callback=each_step, device=device)
+            film.last(result)
+            for number, plan in enumerate(story.plans):
+                if story.goes_on(result, number):
+                    film.mark(result, plan)
+                    result = cut(result, plan, relax=relax, callback=each_step)
+                    film.last(result)
+    pieces = separate(result)
+    files = write_results(pieces, folder, picture=settings.output.picture, frames=False)
+    if settings.wear is not None and settings.output.picture:
+        from warpflat.wear_report import write_wear_picture
+
+        for piece in pieces:
+            files.append(f"{piece.surface.name}.wear.png")
+            write_wear_picture(folder / files[-1], piece)
+    if wanted:
         files.append("frames.usdc")
-    return SceneResult(metrics=result.metrics(), files=tuple(files), notes=result.notes)
+    pattern = surface_files(pieces, folder, name=scene.name, options=drawing)
+    notes = (*result.notes, *story.notes, *pattern.notes)
+    return SceneResult(metrics=metrics_of(pieces), files=(*files, *pattern.files), notes=notes)
+
+
+def _flatten(
+    scene: Scene,
+    surface: Surface,
+    relax: RelaxOptions,
+    *,
+    callback: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> Flattening:
+    from warpflat.flattening import flatten
+
+    settings = scene.settings
+    return flatten(
+        surface,
+        fabric=scene_fabric(scene),
+        datum=settings.datum,
+        grain_angle=settings.grain_angle,
+        model=settings.model,
+        wear=scene_wear(scene),
+        relax=relax,
+        callback=callback,
+        device=device or settings.device,
+    )
+
+
+def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
+    """The scene's surface with the paths of its cuts worked in, and the cuts; looks for those of `auto_cut`.
+
+    Raises:
+        InputError: the surface, a line or a cut is wrong.
+    """
+    from warpflat.scene_cuts import plan_automatic_cuts, plan_cuts
+
+    settings = scene.settings
+    surface = scene_surface(scene)
+    with told_by(scene.where):
+        story = plan_cuts(surface, settings.cuts)
+        if settings.auto_cut is not None:
+            story, _ = plan_automatic_cuts(
+                story,
+                settings.auto_cut,
+                flatten=lambda piece, options: _flatten(scene, piece, options, device=device),
+                relax=scene_relax_options(scene),
+            )
+    return story
+
+
+def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", device: str | None = None) -> Ledger:
+    """Candidates for the next cut of the scene's piece, after those that the scene makes, each tried and ranked.
+
+    Raises:
+        InputError: as :func:`scene_cuts`, or there is no candidate.
+    """
+    from warpflat.ledger import make_ledger
+    from warpflat.scene_cuts import flatten_and_cut
+
+    if scene.settings.mannequin is not None:
+        raise InputError(f"{scene.where}: cuts are compared on a [surface], not on the pieces of a form")
+    relax = scene_relax_options(scene)
+    story = scene_cuts(scene, device=device)
+    with told_by(scene.where):
+        result = flatten_and_cut(
+            story, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
+        )
+        return make_ledger(result, relax=relax, by=by)
 
 
 def scene_surface(scene: Scene) -> Surface:
@@ -406,6 +391,20 @@ def scene_fabric(scene: Scene) -> Fabric:
         return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
     with told_by(f"{scene.where}: fabric"):
         return find_fabric(settings.fabric, library)
+
+
+def scene_wear(scene: Scene) -> Wear | None:
+    """How the scene's garment is meant to be worn, if it says so.
+
+    Raises:
+        InputError: a value out of its bounds.
+    """
+    from warpflat.tightness import Wear
+
+    if scene.settings.wear is None:
+        return None
+    with told_by(scene.where):
+        return Wear(**scene.settings.wear.model_dump())
 
 
 def scene_relax_options(scene: Scene) -> RelaxOptions:

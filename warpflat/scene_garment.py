@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,8 @@ from warpflat.flattening import Progress
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
+from warpflat.pattern.from_garment import plan_form
+from warpflat.pattern_files import garment_files, pattern_options
 from warpflat.scene import (
     FrameSchedule,
     Scene,
@@ -18,22 +20,26 @@ from warpflat.scene import (
     expand_variables,
     scene_fabric,
     scene_relax_options,
+    scene_wear,
     told_by,
 )
 
 __all__ = ["run_garment", "scene_form"]
 
 
-def scene_form(scene: Scene) -> tuple[Mannequin, FormResult]:
-    """The scene's mannequin and the pieces of its form.
+def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
+    """The scene's mannequin, or another one, and the pieces of its form.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
     """
     settings = scene.settings
     assert settings.mannequin is not None  # the schema sees to it
-    with told_by(f"{scene.where}: mannequin"):
-        mannequin = mannequin_from_table(settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file))
+    if mannequin is None:
+        with told_by(f"{scene.where}: mannequin"):
+            mannequin = mannequin_from_table(
+                settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file)
+            )
     with told_by(f"{scene.where}: form"):
         if isinstance(settings.form, str):
             form = shipped_form(settings.form)
@@ -56,6 +62,10 @@ def run_garment(
     relax = scene_relax_options(scene)
     fabric = scene_fabric(scene)
     mannequin, form = scene_form(scene)
+    with told_by(f"{scene.where}: pattern"):
+        drawing = pattern_options(settings.pattern, settings.marker)
+        plan_form(form, drawing.rules)
+    others = _other_sizes(scene)
     schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
     wanted = next(iter(schedules.values())).wanted
     with ExitStack() as stack:
@@ -76,22 +86,66 @@ def run_garment(
             if on_progress is not None:
                 on_progress(progress)
 
-        with told_by(scene.where):
-            garment = flatten_form(
-                mannequin,
+        def flattened(body: Mannequin, form: FormResult, each_step: Callable[[str, Progress], None]) -> Garment:
+            return flatten_form(
+                body,
                 form,
                 fabric=fabric,
                 grain_angle=settings.grain_angle,
+                model=settings.model,
+                wear=scene_wear(scene),
                 relax=relax,
                 callback=each_step,
                 device=device or settings.device,
             )
+
+        with told_by(scene.where):
+            garment = flattened(mannequin, form, each_step)
+            told = on_progress or (lambda progress: None)
+            graded = {size: flattened(*other, lambda name, progress: told(progress)) for size, other in others.items()}
         if writer is not None:
             _last_frames(writer, garment)
     files = garment.save(out, picture=settings.output.picture)
     if wanted:
         files.append("frames.usdc")
-    return SceneResult(metrics=garment.metrics(), files=tuple(files), notes=garment.notes)
+    own = settings.mannequin.size if settings.mannequin is not None else None
+    sizes = {**graded, own or "": garment}
+    pattern = garment_files(
+        {size: sizes[size] for size in _in_order(sizes, settings.pattern.sizes)},
+        out,
+        name=scene.name,
+        options=drawing,
+        sample_size=own or "",
+    )
+    odd = [
+        f"size {size}: {name} did not converge"
+        for size, other in graded.items()
+        for name, piece in other.pieces.items()
+        if not piece.converged
+    ]
+    return SceneResult(
+        metrics=garment.metrics(), files=(*files, *pattern.files), notes=(*garment.notes, *odd, *pattern.notes)
+    )
+
+
+def _in_order(sizes: Iterable[str], wanted: Sequence[str]) -> list[str]:
+    """As the scene lists them; where it leaves out the mannequin's own, by their numbers."""
+    if set(sizes) == set(wanted):
+        return list(dict.fromkeys(wanted))
+    return sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
+
+
+def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
+    """The bodies and forms of the sizes that the pattern has besides the mannequin's own."""
+    table = scene.settings.mannequin
+    found = {}
+    for size in scene.settings.pattern.sizes:
+        if table is not None and size != table.size:
+            with told_by(f"{scene.where}: pattern.sizes"):
+                found[size] = scene_form(
+                    scene, mannequin_from_table(table.model_copy(update={"size": size}), path_of=Path)
+                )
+    return found
 
 
 def _last_frames(writer: Any, garment: Garment) -> None:

@@ -45,7 +45,9 @@ def grid(columns: int, rows: int, place: Place = plane) -> tuple[NDArray[np.floa
     return place(u.ravel(), v.ravel()), quads
 
 
-def scattered(count: int, place: Place, seed: int = 0) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
+def scattered(
+    count: int, place: Place, seed: int = 0
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
     """Irregular triangles with a straight column of edges at u = 0.5; the last array is that column from below."""
     from scipy.spatial import Delaunay
 

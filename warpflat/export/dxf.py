@@ -8,6 +8,7 @@ adds validation curves, 84 of the boundary and 87 of the sewing line.
 
 from __future__ import annotations
 
+import logging
 import os
 import re
 import unicodedata
@@ -26,6 +27,7 @@ from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 
 if TYPE_CHECKING:
+    from ezdxf.document import Drawing
     from ezdxf.layouts import BlockLayout, Modelspace
 
 __all__ = ["block_name", "write_dxf"]
@@ -61,7 +63,6 @@ def write_dxf(
     Raises:
         InputError: unknown dialect, units or size.
     """
-    import ezdxf
     from ezdxf.addons import gerber_D6673
 
     if dialect not in DIALECTS:
@@ -72,7 +73,7 @@ def write_dxf(
     for size in chosen:
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
     scale = UNITS[units]
-    document = ezdxf.new("R12", units=0)
+    document = _new_document()
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
@@ -85,6 +86,19 @@ def write_dxf(
     _write_style(space, garment, units, scale, created or datetime.now().astimezone())
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
         gerber_D6673.export_stream(document, stream)
+
+
+def _new_document() -> Drawing:
+    """An empty R12 document, without ezdxf's warning that R12 says nothing of units: the style text does."""
+    import ezdxf
+
+    logger = logging.getLogger("ezdxf")
+    level = logger.level
+    logger.setLevel(logging.ERROR)
+    try:
+        return ezdxf.new("R12", units=0)
+    finally:
+        logger.setLevel(level)
 
 
 def block_name(piece: DraftedPiece, taken: set[str]) -> str:

@@ -121,7 +121,11 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         "cutouts": _lists(piece.cutouts),
         "fisheye_darts": _lists(piece.fisheyes),
         "grain": piece.grain.tolist(),
-        "label": {"at": piece.label.at.tolist(), "lines": [text for text, _ in piece.label.lines]},
+        "label": {
+            "at": piece.label.at.tolist(),
+            "lines": [text for text, _ in piece.label.lines],
+            "heights": [height for _, height in piece.label.lines],
+        },
         "notes": list(piece.notes),
     }
 
@@ -133,6 +137,7 @@ def _edge(edge: DraftedEdge) -> dict[str, Any]:
         "allowance": edge.width,
         "length": edge.length,
         "bezier": edge.curve.bezier.tolist(),
+        "straight": edge.curve.straight.tolist(),
         "line": edge.line.tolist(),
         "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
     }

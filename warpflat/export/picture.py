@@ -33,6 +33,7 @@ class PicturePiece:
         lines: feature lines in the pattern's numbering; each a vertex-index array or a list of them.
         surface_lines: feature lines in the surface's numbering; the surface's own if not given.
         datum: the name of the line from which the piece was developed, which is the grain; None if it is not known.
+        grain_angle: of the grain against the datum, degrees, anticlockwise.
         captions: key measures to print under the name, such as ``{"strain energy": "12.3 mJ", "fabric": "poplin"}``.
     """
 
@@ -44,6 +45,7 @@ class PicturePiece:
     lines: Mapping[str, Any] = field(default_factory=dict)
     surface_lines: Mapping[str, Any] | None = None
     datum: str | None = None
+    grain_angle: float = 0.0
     captions: Mapping[str, str] = field(default_factory=dict)
 
 
@@ -103,4 +105,5 @@ def _prepared(piece: PicturePiece) -> Row:
         on_body=surface_view(surface, on_body, polylines_of(in_space)),
         pattern=pattern_view(positions, in_plane, polylines_of(piece.lines)),
         datum=piece.datum,
+        grain_angle=piece.grain_angle,
     )

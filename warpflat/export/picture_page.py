@@ -40,6 +40,7 @@ class Row:
     on_body: View
     pattern: View
     datum: str | None
+    grain_angle: float = 0.0
     caption_lines: list[str] = field(default_factory=list)
     inches_per_metre: float = 1.0
     band: float = 0.0
@@ -180,14 +181,14 @@ def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
     _dimensions(pen, room, pattern)
     _scale_bar(pen, room, on_body, size)
     datum = row.pattern.lines.get(row.datum, [None])[0] if row.datum is not None else None
-    has_grain = datum is None or _grain(pen, room, pattern, datum, inside=True)
+    has_grain = datum is None or _grain(pen, room, pattern, datum, row.grain_angle, inside=True)
     floor = top - row.height + 0.02
     between = 0.5 * (on_body.box[2] + pattern.box[0])
     unnamed: dict[str, None] = {}
     for drawn, left, right in ((on_body, 0.1, between), (pattern, between, PAGE_WIDTH - _RIGHT + 0.1)):
         page = (left, floor, right, top - row.head + 0.2)
         unnamed |= dict.fromkeys(_feature_lines(pen, room, drawn, row.datum, page))
-    if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, inside=False):
+    if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, row.grain_angle, inside=False):
         unnamed["grain"] = None
     if unnamed:
         text = f"not labelled for want of room: {', '.join(unnamed)}"
@@ -247,14 +248,18 @@ def _longest_visible(drawn: DrawnView, parts: Sequence[NDArray[np.int32]]) -> ND
     )
 
 
-def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: NDArray[np.int32], *, inside: bool) -> bool:
-    """A grain arrow parallel to the datum line, on the pattern or right of it; False where there is no room."""
+def _grain(
+    pen: Pen, room: LabelRoom, drawn: DrawnView, datum: NDArray[np.int32], grain_angle: float, *, inside: bool
+) -> bool:
+    """A grain arrow, turned from the datum line by so many degrees, on the pattern or right of it; False if no room."""
     line = drawn.to_page(drawn.view.points[datum])
     along = line[-1] - line[0]
     length = float(np.linalg.norm(along))
     if not length > 0.0:
         return True
-    along = along / length * (1.0 if along[1] >= 0 else -1.0)
+    turn = np.radians(grain_angle)
+    along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ (along / length)
+    along *= 1.0 if along[1] >= 0 else -1.0
     across = np.array([along[1], -along[0]])
     text_width, text_height = pen.measure("grain", _LABEL_SIZE)
     if inside:

@@ -167,7 +167,9 @@ class SvgPage:
         if colour:
             attributes["fill"] = colour
         if words.tag:
-            attributes |= {"stroke": "#ffffff", "stroke-width": "1.2", "paint-order": "stroke"}
+            # A white ground under the letters, as a text of its own: many programs do not know paint-order.
+            ground = attributes | {"fill": "#ffffff", "stroke": "#ffffff", "stroke-width": "1.2"}
+            ET.SubElement(parent, "text", ground).text = words.text
         ET.SubElement(parent, "text", attributes).text = words.text
 
     def marker_copy(self, copy: Copy, index: int) -> None:

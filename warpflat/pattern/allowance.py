@@ -232,7 +232,10 @@ def _corner_parts(
         else:
             hem, inwards, seam, beyond = after, b, index, a
             width, hem_width = side.width, follows.width
-        if width > 0 and hem_width > 0:
+        # Beside a seam that is shorter than the hem is deep there is nothing to mirror.
+        beside = (follows if hem == index else side).points
+        room = float(np.linalg.norm(np.diff(beside, axis=0), axis=1).sum())
+        if width > 0 and 0 < hem_width <= room:
             return _folded_hem(corner, inwards, beyond, hem, seam, width, hem_width, strips, body)
     fill = _corner_fill(corner, a, b, side.width, follows.width)
     return [] if fill is None else [fill]
@@ -265,10 +268,11 @@ def _folded_hem(
     # A slightly curved hem leaves the mirror line; the first millimetres below it are hem in any case.
     core = _common(_box(corner, inwards, (0, reach), down, (0, 0.003)), strips[hem])
     turned = _union([_reflect(worn, corner, inwards), core])
-    turned = _common(turned, _box(corner, inwards, (-reach, reach), down, (0, hem_width)))
     end = _box(corner, inwards, (-reach, hem_width), down, (0, 2 * hem_width))
+    # Along the hem its own strip says how deep it is, curved or not; only what reaches past the corner is added.
     strips[hem] = _minus(strips[hem], _minus(end, turned))
-    return [run_on, _common(turned, end)]
+    past = _common(turned, _box(corner, inwards, (-reach, 1e-5), down, (0, hem_width)))
+    return [run_on, past]
 
 
 def _dart_parts(

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,6 +20,8 @@ Vector = NDArray[np.float64]
 ARROW, BARB = 0.006, 0.002
 #: The bracket that says "on fold" stands this far [m] inside the fold.
 BRACKET = 0.014
+#: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
+NAME, NAME_GAP = 0.0022, 0.0024
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -75,7 +78,7 @@ def draw_piece(piece: DraftedPiece) -> Drawing:
         *grain_strokes(piece.grain),
         *_internal(piece),
     ]
-    words = _label(piece, piece.size)
+    words = [*_label(piece, piece.size), *_line_names(piece)]
     for edge in piece.fold_edges:
         fold_strokes, fold_words = _bracket(edge)
         strokes += fold_strokes
@@ -99,7 +102,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
         words: list[Words] = []
         if index == middle:
             strokes += [*grain_strokes(piece.grain), *_internal(piece)]
-            words += _label(piece, ", ".join(p.size for p in pieces))
+            words += [*_label(piece, ", ".join(p.size for p in pieces)), *_line_names(piece)]
             for fold in piece.fold_edges:
                 fold_strokes, fold_words = _bracket(fold)
                 strokes += fold_strokes
@@ -149,9 +152,46 @@ def _slits(notch: Notch, index: int) -> list[Stroke]:
 
 def _internal(piece: DraftedPiece) -> list[Stroke]:
     return [
-        Stroke(role="internal", name=name, points=line, curve=fit_curve(line))
+        Stroke(role="internal", name=name, points=line, curve=_fitted(line.tobytes()))
         for name, line in piece.internal_lines.items()
     ]
+
+
+@lru_cache(maxsize=1024)
+def _fitted(line: bytes) -> Curve:
+    """The curve through an internal line: every file asks for it anew."""
+    return fit_curve(np.frombuffer(line).reshape(-1, 2))
+
+
+def _line_names(piece: DraftedPiece) -> list[Words]:
+    """The name of every internal line that has room for it, where it keeps clear of the other lines and the label."""
+    import shapely
+
+    words = []
+    lines = {name: shapely.LineString(line) for name, line in piece.internal_lines.items()}
+    rows = np.array([[0.0, 0.5], [0.0, -0.5]]) * piece.label.height
+    label = shapely.LineString(piece.label.at + rows).buffer(0.03)
+    for name, line in piece.internal_lines.items():
+        arc, half = arc_lengths(line), len(name) * NAME * 0.4
+        if arc[-1] < 2 * half + 0.02:
+            continue
+        others = shapely.union_all([label, *(other for key, other in lines.items() if key != name)])
+        clear, share = -1.0, 0.5
+        for tried in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
+            distance = float(others.distance(shapely.Point(_at_share(line, tried))))
+            if distance > clear:
+                clear, share = distance, tried
+            if clear > half + 0.006:
+                break
+        step = half / max(float(arc[-1]), 1e-12)
+        near, far = _at_share(line, share - step), _at_share(line, share + step)
+        x, y = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        if x < -1e-9 or (abs(x) <= 1e-9 and y < 0):
+            x, y = -x, -y
+        middle = (near + far + 2 * _at_share(line, share)) / 4
+        angle = float(np.arctan2(y, x))
+        words.append(Words(text=name, at=middle + NAME_GAP * np.array([-y, x]), height=NAME, angle=angle))
+    return words
 
 
 def grain_strokes(grain: Vector) -> list[Stroke]:

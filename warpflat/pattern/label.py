@@ -49,7 +49,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
         cut = f"Cut {piece.quantity} ({pairs} pair{'s' if pairs > 1 else ''})"
     else:
         cut = f"Cut {piece.quantity}"
-    lines = [piece.name.upper()]
+    lines = [piece.name.replace("_", " ").upper()]
     if piece.size:
         lines.append(f"Size {piece.size}")
     lines.append(cut + (f" - {piece.fabric}" if piece.fabric else ""))

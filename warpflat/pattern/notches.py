@@ -162,7 +162,9 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     for seam in seams:
         first, second = (_Chain(side, pieces) for side in seam.sides)
         for fraction in _fractions(seam, first, second):
-            places = [(chain, fraction * chain.length) for chain in (first, second)]
+            # A piece that is sewn to its own mirror image has one edge for both sides.
+            chains = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
+            places = [(chain, fraction * chain.length) for chain in chains]
             names = [chain.piece_name(length).lower() for chain, length in places]
             back = any("back" in name for name in names) and not any("front" in name for name in names)
             for chain, length in places:

@@ -1,0 +1,145 @@
+"""From a flattened surface, whole or parted by cuts, to a pattern: its border as edges, its cuts as darts and seams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.darts import seam_kind
+from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
+from warpflat.pattern.from_mesh import piece_from_mesh
+from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.surface.topology import border_loops
+
+if TYPE_CHECKING:
+    from warpflat.flattening import Flattening
+    from warpflat.surface.cut import Seam as Cut
+
+__all__ = ["pattern_of_surface"]
+
+Vector = NDArray[np.float64]
+Ids = NDArray[np.int32]
+
+#: The legs of a dart that is folded stray from straight by no more than this [m].
+FOLDED = 2e-3
+
+
+def pattern_of_surface(
+    results: Sequence[Flattening], *, name: str, rules: EdgeRules | None = None, size: str = ""
+) -> tuple[Garment, tuple[str, ...]]:
+    """The pattern of one flattened surface, or of the pieces that cuts have left of it.
+
+    Cuts with a tip inside become darts of their names, those with two fish-eye darts; what parted the surface is a seam
+    between the two pieces.
+
+    Args:
+        results: pieces of different names.
+        name: of the pattern.
+        rules: kinds and allowances of edges; an edge along a feature line has the line's name, others are called
+            "edge_1" and so on, counter-clockwise.
+        size: for the label.
+
+    Returns:
+        The pattern, and what was chosen on the way, one sentence each.
+
+    Raises:
+        InputError: the rules name an edge that does not exist, or a border crosses itself.
+    """
+    rules = rules or EdgeRules()
+    pieces = [_piece(result, size) for result in results]
+    rules.check({piece.name: [edge.name for edge in piece.edges] for piece in pieces})
+    pieces = [replace(piece, edges=[_ruled(piece.name, edge, rules) for edge in piece.edges]) for piece in pieces]
+    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules)), ()
+
+
+def _piece(result: Flattening, size: str) -> Piece:
+    darts: dict[str, tuple[int, int, int]] = {}
+    eyes: dict[str, Vector] = {}
+    loops = border_loops(result.faces)
+    for cut in result.cuts:
+        for number, seam in enumerate(cut.seams, start=1):
+            title = cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}"
+            kind = seam_kind(seam)
+            if kind == "fish-eye":
+                eyes[title] = result.positions[np.union1d(seam.left, seam.right)]
+            elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
+                darts[title] = places
+    piece = piece_from_mesh(
+        result.faces,
+        result.positions,
+        name=result.surface.name,
+        lines=result.network.surface.lines,
+        darts=darts,
+        size=size,
+        fabric=result.fabric.name,
+    )
+    holes = [_as_fish_eye(hole, eyes) for hole in piece.holes]
+    drawn = [replace(dart, cut=_bent(piece, dart)) for dart in piece.darts]
+    on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
+    datum = None if on_border else result.positions[result.datum]
+    return replace(piece, holes=holes, darts=drawn, grain=grain_of(piece.outline, result, datum))
+
+
+def _bent(piece: Piece, dart: Dart) -> bool:
+    """Whether a leg leaves its chord so far that the wedge cannot be folded: it is cut out, with allowances."""
+    import shapely
+
+    legs = [piece.edge(name).points for name in (dart.left, dart.right)]
+    strays = [shapely.distance(shapely.LineString(leg[[0, -1]]), shapely.points(leg)).max() for leg in legs]
+    return bool(max(strays) > FOLDED)
+
+
+def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:
+    """Left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
+    at_end = cut.left[-1] == cut.right[-1]
+    tip = int(cut.left[-1] if at_end else cut.left[0])
+    mouths = [int(side[0] if at_end else side[-1]) for side in (cut.left, cut.right)]
+    for loop in loops:
+        where = {vertex: place for place, vertex in enumerate(loop.tolist())}
+        if all(vertex in where for vertex in (tip, *mouths)):
+            first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
+            return first, tip, second
+    return None
+
+
+def _as_fish_eye(hole: Hole, eyes: Mapping[str, Vector]) -> Hole:
+    """A hole that a cut has opened is a dart of the cut's name, any other one stays what it is."""
+    for name, points in eyes.items():
+        if len(points) == len(hole.points) and np.allclose(np.sort(points, axis=0), np.sort(hole.points, axis=0)):
+            return replace(hole, name=name, kind="dart")
+    return hole
+
+
+def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
+    if edge.kind == "dart":
+        return edge
+    kind = rules.kind(piece, edge.name, edge.kind)
+    return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
+
+
+def _seams(results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules) -> tuple[Seam, ...]:
+    """Edges that are one curve in space are sewn together."""
+    ends: dict[tuple[bytes, ...], list[tuple[SeamSide, Vector]]] = {}
+    for result, piece in zip(results, pieces, strict=True):
+        vertices = result.network.surface.vertices
+        for edge in piece.edges:
+            if edge.kind not in ("seam", "cut") or edge.vertices is None:
+                continue
+            curve = vertices[edge.vertices]
+            key = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
+            ends.setdefault(key, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
+    seams: list[Seam] = []
+    for edges in ends.values():
+        for i, (first, curve) in enumerate(edges):
+            for second, other in edges[i + 1 :]:
+                against = not np.array_equal(curve, other)
+                if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
+                    name = first.edge.removesuffix(".left").removesuffix(".right")
+                    name = unused(name, {seam.name for seam in seams})
+                    sides = ((first,), (replace(second, reversed=against),))
+                    seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+    return tuple(seams)

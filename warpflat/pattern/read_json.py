@@ -1,0 +1,186 @@
+"""A drafted pattern read back from `pattern.json`, to write its other files again without drafting anew."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.errors import InputError
+from warpflat.export.pattern_json import SCHEMA
+from warpflat.pattern.curves import Curve
+from warpflat.pattern.draft import DraftedDart, DraftedEdge, DraftedGarment, DraftedPiece, DrillHole
+from warpflat.pattern.label import Label
+from warpflat.pattern.notches import Notch, SeamReport
+from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+
+__all__ = ["pattern_from_json", "read_pattern_json"]
+
+Vector = NDArray[np.float64]
+
+
+def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
+    """The pattern of a file that :func:`warpflat.export.pattern_json.write_pattern_json` wrote.
+
+    Raises:
+        InputError: the file is missing, no JSON, of another schema, or does not hold together.
+    """
+    path = Path(path)
+    try:
+        data = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file; a run leaves a pattern.json in its folder") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({' '.join(str(error).split())})") from None
+    try:
+        return pattern_from_json(data)
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from None
+
+
+def pattern_from_json(data: Any) -> DraftedGarment:
+    """The pattern of what :func:`warpflat.export.pattern_json.pattern_json` gave.
+
+    Raises:
+        InputError: another schema, a missing key, a value of the wrong kind.
+    """
+    if not isinstance(data, Mapping) or "sizes" not in data:
+        raise InputError('is no pattern of warpflat: it has no "sizes"')
+    if data.get("schema") != SCHEMA:
+        raise InputError(f"has schema {data.get('schema')!r}; this version reads {SCHEMA}: run the scene again")
+    try:
+        return _garment(data)
+    except KeyError as error:
+        raise InputError(f"key {error} is missing; run the scene again") from None
+    except (TypeError, ValueError, AttributeError, IndexError) as error:
+        raise InputError(f"does not hold together ({' '.join(str(error).split())}); run the scene again") from None
+
+
+def _garment(data: Mapping[str, Any]) -> DraftedGarment:
+    drafted = {
+        size: tuple(_piece(name, size, piece) for name, piece in pieces.items())
+        for size, pieces in data["sizes"].items()
+    }
+    seams = [
+        Seam(
+            name=stitch["name"],
+            sides=(_side(stitch["sides"][0]), _side(stitch["sides"][1])),
+            ease=stitch["ease"],
+        )
+        for stitch in data["stitches"]
+        if stitch["kind"] == "seam"
+    ]
+    garment = Garment(
+        name=data["name"],
+        pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
+        seams=seams,
+        sample_size=data["sample_size"],
+    )
+    reports = tuple(
+        SeamReport(
+            name=seam["name"],
+            size=seam["size"],
+            sides=(seam["sides"][0], seam["sides"][1]),
+            length_mm=(seam["length_mm"][0], seam["length_mm"][1]),
+            ease=seam["ease"],
+            difference_mm=seam["difference_mm"],
+        )
+        for seam in data["seams"]
+    )
+    return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
+
+
+def _side(parts: Sequence[Mapping[str, Any]]) -> tuple[SeamSide, ...]:
+    return tuple(SeamSide(piece=p["piece"], edge=p["edge"], reversed=p["reversed"]) for p in parts)
+
+
+def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
+    frame = np.array(data["frame"], dtype=np.float64)
+    darts = [
+        Dart(name=d["name"], left=d["left"], right=d["right"], fold_to=d["fold_to"] or None) for d in data["darts"]
+    ]
+    holes = [
+        Hole(name=key, points=_back(_points(line), frame), kind=kind)
+        for group, kind in (("cutouts", "cutout"), ("fisheye_darts", "dart"))
+        for key, line in data[group].items()
+    ]
+    piece = Piece(
+        name=name,
+        size=size,
+        fabric=data["fabric"],
+        quantity=data["quantity"],
+        paired=data["paired"],
+        edges=[_edge(edge, frame) for edge in data["edges"]],
+        darts=darts,
+        internal_lines={key: _back(_points(line), frame) for key, line in data["internal_lines"].items()},
+        grain=_back(_points(data["grain"]), frame),
+        holes=holes,
+    )
+    label = data["label"]
+    return DraftedPiece(
+        piece=piece,
+        frame=frame,
+        edges=tuple(
+            DraftedEdge(edge=edge, curve=_curve(d), line=_points(d["line"]), width=d["allowance"])
+            for edge, d in zip(piece.edges, data["edges"], strict=True)
+        ),
+        cut_line=_points(data["cut_line"]),
+        darts=tuple(_dart(dart, d) for dart, d in zip(darts, data["darts"], strict=True)),
+        drill_holes=tuple(DrillHole(name=hole["name"], at=np.array(hole["at"])) for hole in data["drill_holes"]),
+        notches=tuple(_notch(notch) for notch in data["notches"]),
+        internal_lines={key: _points(line) for key, line in data["internal_lines"].items()},
+        cutouts={key: _points(line) for key, line in data["cutouts"].items()},
+        fisheyes={key: _points(line) for key, line in data["fisheye_darts"].items()},
+        grain=_points(data["grain"]),
+        label=Label(at=np.array(label["at"]), lines=tuple(zip(label["lines"], label["heights"], strict=True))),
+        notes=tuple(data["notes"]),
+    )
+
+
+def _edge(data: Mapping[str, Any], frame: Vector) -> Edge:
+    vertices = data["mesh_vertices"]
+    return Edge(
+        name=data["name"],
+        points=_back(_points(data["line"]), frame),
+        kind=data["kind"],
+        allowance=None if data["kind"] == "fold" else data["allowance"],
+        vertices=None if vertices is None else np.array(vertices, dtype=np.int32),
+    )
+
+
+def _curve(data: Mapping[str, Any]) -> Curve:
+    return Curve(bezier=np.array(data["bezier"], dtype=np.float64), straight=np.array(data["straight"], dtype=bool))
+
+
+def _dart(dart: Dart, data: Mapping[str, Any]) -> DraftedDart:
+    fold = None if data["fold"] is None else _points(data["fold"])
+    return DraftedDart(
+        dart=dart, tip=np.array(data["tip"]), fold=fold, fold_to=data["fold_to"], opening=data["opening"]
+    )
+
+
+def _notch(data: Mapping[str, Any]) -> Notch:
+    return Notch(
+        seam=data["seam"],
+        edge=data["edge"],
+        length=data["length"],
+        at=np.array(data["at"]),
+        base=tuple(np.array(base) for base in data["base"]),
+        direction=np.array(data["direction"]),
+        depth=data["depth"],
+    )
+
+
+def _points(rows: Any) -> Vector:
+    return np.array(rows, dtype=np.float64).reshape(-1, 2)
+
+
+def _back(points: Vector, frame: Vector) -> Vector:
+    """From the drafted piece's coordinates to those of the flat mesh."""
+    turn = frame[:, :2]
+    return (points - frame[:, 2]) @ turn

@@ -1,0 +1,271 @@
+"""The pattern files of a run: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`, and the marker if it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat.errors import InputError, nearest
+from warpflat.pattern.from_garment import EdgeRules
+
+if TYPE_CHECKING:
+    from warpflat.flattening import Flattening
+    from warpflat.garment import Garment
+    from warpflat.pattern import Cloth, DraftedGarment
+    from warpflat.pattern import Garment as Pattern
+    from warpflat.scene_types import MarkerTable, PatternTable
+
+__all__ = [
+    "FORMATS",
+    "PatternOptions",
+    "WrittenPattern",
+    "export_pattern",
+    "garment_files",
+    "pattern_options",
+    "surface_files",
+]
+
+FORMATS = ("dxf", "svg", "pdf", "json")
+#: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
+TOLERANCES = (1e-4, 3e-4, 1e-3, 2e-3)
+#: A clean border has no more than one curve for so much of its length [m], in the mean.
+CURVE = 0.010
+
+
+@dataclass(frozen=True, kw_only=True)
+class PatternOptions:
+    """What is written of a pattern, and how.
+
+    Attributes:
+        formats: some of "dxf", "svg", "pdf", "json".
+        dialect: of the DXF, "aama" or "astm".
+        paper: of the PDF, "A4", "Letter" or "A0".
+        tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
+            border is so ragged that its curves would be all wiggles, as on scans.
+        rules: kinds and allowances of edges.
+        cloth: what the marker is laid on; None makes no marker.
+        marker_seconds: time for the nesting.
+    """
+
+    formats: Sequence[str] = FORMATS
+    dialect: str = "aama"
+    paper: str = "A4"
+    tolerance: float | None = None
+    rules: EdgeRules = field(default_factory=EdgeRules)
+    cloth: Cloth | None = None
+    marker_seconds: int = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenPattern:
+    """Names of the files, and what the maker should know, one sentence each."""
+
+    files: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+
+
+def garment_files(
+    garments: Mapping[str, Garment],
+    folder: Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    sample_size: str | None = None,
+) -> WrittenPattern:
+    """Write the pattern of a garment in one or more sizes; several lie upon each other as a nest.
+
+    A pattern that cannot be drawn is a note, not a mistake: by then the garment has been flattened and its other files
+    are good.
+
+    Args:
+        garments: flattened, by size; "" where there is none.
+        folder: exists.
+        name: of the files.
+        options: see the class.
+        sample_size: the one that the files show first.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.pattern.from_garment import pattern_of_garment
+
+    options = options or PatternOptions()
+    return _drawn(
+        lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
+        folder, name, options,
+    )  # fmt: skip
+
+
+def surface_files(
+    results: Sequence[Flattening], folder: Path, *, name: str, options: PatternOptions | None = None
+) -> WrittenPattern:
+    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it; else as above."""
+    from warpflat.pattern.from_surface import pattern_of_surface
+
+    options = options or PatternOptions()
+    return _drawn(lambda: pattern_of_surface(results, name=name, rules=options.rules), folder, name, options)
+
+
+def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternOptions:
+    """What the tables `pattern` and `marker` of a scene ask for.
+
+    Raises:
+        InputError: a gap that is wide against the cloth.
+    """
+    from warpflat.pattern import Cloth
+
+    cloth = None
+    if marker is not None:
+        cloth = Cloth(width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap)
+    return PatternOptions(
+        formats=tuple(table.formats),
+        dialect=table.dialect,
+        paper=table.paper,
+        tolerance=None if table.tolerance_mm is None else table.tolerance_mm / 1000,
+        rules=EdgeRules(
+            seam=table.allowance_mm / 1000,
+            hem=table.hem_mm / 1000,
+            kinds=table.kinds,
+            allowances={edge: width / 1000 for edge, width in table.allowances_mm.items()},
+        ),
+        cloth=cloth,
+        marker_seconds=5 if marker is None else marker.seconds,
+    )
+
+
+def export_pattern(
+    folder: Path, format: str, *, dialect: str = "aama", paper: str = "A4", sizes: Sequence[str] | None = None
+) -> str:
+    """Write one file of a run's pattern again, from its `pattern.json`, and return its name.
+
+    Args:
+        folder: of the run.
+        format: "dxf", "svg", "pdf" or "json".
+        dialect: of a DXF.
+        paper: of a PDF.
+        sizes: only these; None takes all.
+
+    Raises:
+        InputError: there is no pattern, an unknown format, dialect, paper or size, or the folder cannot be written.
+    """
+    from warpflat.pattern.read_json import read_pattern_json
+
+    if format not in FORMATS:
+        raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+    drafted = read_pattern_json(folder / "pattern.json")
+    return _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+
+
+def _drawn(
+    make: Callable[[], tuple[Pattern, tuple[str, ...]]], folder: Path, name: str, options: PatternOptions
+) -> WrittenPattern:
+    """Make, draft and write a pattern; geometry that defeats it becomes a note."""
+    from shapely.errors import ShapelyError
+
+    if not options.formats and options.cloth is None:
+        return WrittenPattern()
+    try:
+        pattern, notes = make()
+        drafted, told = _drafted(pattern, options.tolerance)
+    except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
+        return WrittenPattern(notes=(f"no pattern was drawn: {' '.join(str(error).split())}",))
+    notes = (*notes, *told)
+    files = [
+        _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+        for kind in FORMATS
+        if kind in options.formats
+    ]
+    notes = (
+        *notes,
+        *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
+    )
+    if options.cloth is not None:
+        marked, told = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+        files += marked
+        notes = (*notes, *told)
+    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)))
+
+
+def _drafted(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
+    """The pattern drafted; without a tolerance given, with the least that makes clean curves of its borders."""
+    from warpflat.pattern import draft_garment
+
+    if tolerance is not None:
+        return draft_garment(pattern, tolerance=tolerance), ()
+    for tried in TOLERANCES:
+        drafted = draft_garment(pattern, tolerance=tried)
+        edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
+        if sum(len(edge.curve.bezier) - 1 for edge in edges) <= sum(edge.length for edge in edges) / CURVE:
+            break
+    if tried == TOLERANCES[0]:
+        return drafted, ()
+    return drafted, (f"the border is ragged: the pattern's curves keep within {tried * 1000:g} mm of it",)
+
+
+def _write(
+    drafted: DraftedGarment,
+    folder: Path,
+    kind: str,
+    *,
+    name: str,
+    dialect: str,
+    paper: str,
+    sizes: Sequence[str] | None = None,
+) -> str:
+    from warpflat.export.dxf import write_dxf
+    from warpflat.export.pattern_json import write_pattern_json
+    from warpflat.export.pdf import write_pdf
+    from warpflat.export.svg import write_svg
+
+    if kind == "dxf":
+        write_dxf(drafted, folder / f"{name}.dxf", dialect=dialect, sizes=sizes)
+        return f"{name}.dxf"
+    if kind == "svg":
+        write_svg(drafted, folder / f"{name}.svg", sizes=sizes, nested=True)
+        return f"{name}.svg"
+    if kind == "pdf":
+        write_pdf(drafted, folder / "pattern.pdf", paper=paper, sizes=sizes)
+        return "pattern.pdf"
+    write_pattern_json(drafted, folder / "pattern.json")
+    return "pattern.json"
+
+
+def _marker(
+    drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
+) -> tuple[list[str], tuple[str, ...]]:
+    """Write `NAME.marker.svg` and `NAME.marker.json`, for one garment of each size."""
+    from warpflat.export import write_json
+    from warpflat.export.svg import write_marker_svg
+    from warpflat.pattern import make_marker
+
+    try:
+        marker = make_marker(drafted, cloth, seconds=seconds)
+    except InputError as error:
+        return [], (f"no marker was made: {error}",)
+    files = [f"{name}.marker.svg", f"{name}.marker.json"]
+    write_marker_svg(marker, folder / files[0])
+    placements: list[dict[str, Any]] = [
+        {
+            "piece": copy.piece.name,
+            "size": copy.piece.size,
+            "mirrored": copy.mirrored,
+            "turned": copy.turned,
+            "matrix": copy.matrix.tolist(),
+        }
+        for copy in marker.placements
+    ]
+    write_json(
+        folder / files[1],
+        {
+            "schema": 1,
+            "width_m": marker.width,
+            "length_m": marker.length,
+            "utilisation": marker.utilisation,
+            "placements": placements,
+        },
+    )
+    return files, (
+        f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used",
+    )

@@ -1,0 +1,174 @@
+"""The tables of a scene file that say what is flattened and what is written."""
+
+from __future__ import annotations
+
+import dataclasses
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
+
+from pydantic import ConfigDict, Discriminator, Field, Tag, create_model, model_validator
+
+from warpflat.relax import RelaxOptions
+from warpflat.toml_file import Table
+
+__all__ = [
+    "BorderTable",
+    "FileSurface",
+    "LineTable",
+    "MarkerTable",
+    "OutputTable",
+    "PatternTable",
+    "PlaneTable",
+    "Point",
+    "PointOrVertex",
+    "RelaxTable",
+    "ShapeSurface",
+    "Vertex",
+    "kind_of_surface",
+    "text_or_table",
+]
+
+Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+Vertex = Annotated[int, Field(ge=0)]
+PointOrVertex = Annotated[
+    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
+    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
+]
+
+
+class PlaneTable(Table):
+    """A plane by a point on it [m] and its normal (any length)."""
+
+    point: Point
+    normal: Point
+
+
+Component = Annotated[
+    Annotated[Literal["largest"], Tag("word")] | Annotated[int, Field(ge=0), Tag("number")],
+    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+]
+
+
+def text_or_table(value: Any) -> str:
+    return "text" if isinstance(value, str) else "table"
+
+
+class FileSurface(Table):
+    """A mesh file; `file` starts in the scene's folder and may name environment variables, ${WARPFLAT_DATA}/x.obj."""
+
+    file: str = Field(min_length=1)
+    units: str | None = None
+    component: Component | None = None
+    prim: str | None = None
+
+
+class ShapeSurface(Table):
+    """A surface by formula; its other keys are the parameters of that function of `warpflat.shapes`."""
+
+    model_config = ConfigDict(extra="allow")
+    shape: str
+
+
+def kind_of_surface(value: Any) -> str:
+    given = value if isinstance(value, dict) else getattr(value, "__dict__", {})
+    return "by-formula" if "shape" in given and "file" not in given else "from-file"
+
+
+class BorderTable(Table):
+    """A stretch of the border between two of its vertices, or the ones nearest to two points [m]."""
+
+    start: PointOrVertex
+    end: PointOrVertex
+    direction: Literal["shortest", "with", "against"] = "shortest"
+
+
+class LineTable(Table):
+    """A feature line, given in one of five ways. Vertices count those of the file, from 0; points are in metres.
+
+    `vertices` lists every vertex, `from` and `to` are the ends of a shortest path, `plane` cuts the piece, `border` is
+    a side (bottom, left, right, top) or a stretch, `curve` the points of a polyline or the prim path of a USD curve.
+    """
+
+    vertices: Annotated[list[Vertex], Field(min_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    plane: PlaneTable | None = None
+    border: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[BorderTable, Tag("table")],
+            Discriminator(text_or_table),
+        ]
+        | None
+    ) = None
+    curve: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> LineTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a shortest path needs both from and to")
+        ways = [self.vertices, self.from_, self.plane, self.border, self.curve]
+        if sum(way is not None for way in ways) != 1:
+            raise ValueError("give the line in one way: vertices, from and to, plane, border, or curve")
+        return self
+
+
+class WearTable(Table):
+    """How the garment is meant to be worn (see `warpflat.tightness.Wear`); an empty table asks how it sits, no more."""
+
+    stretch_warp: float = 0.0
+    stretch_weft: float = 0.0
+    pressure: float | None = None
+
+
+class OutputTable(Table):
+    """What is written besides `metrics.json` and `NAME.obj`."""
+
+    frames: Annotated[int, Field(ge=0, le=100_000)] = 60
+    """About how many frames, close together at first, when the pattern moves most; 0 for no `frames.usdc`."""
+    frame_every: Annotated[int, Field(ge=1)] | None = None
+    """A frame every so many steps instead."""
+    picture: bool = True
+
+
+class PatternTable(Table):
+    """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
+
+    formats: list[Literal["dxf", "svg", "pdf", "json"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
+    """Which of them; an empty list writes none."""
+    dialect: Literal["aama", "astm"] = "aama"
+    paper: Literal["A4", "Letter", "A0"] = "A4"
+    allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
+    hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
+    kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)
+    """By edge, "front.neck", or "neck" for every piece that has one."""
+    allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
+    """Likewise."""
+    tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
+    """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
+    sizes: list[str] = Field(default_factory=list)
+    """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
+
+
+class MarkerTable(Table):
+    """The lay plan on a cloth (see `warpflat.pattern.Cloth`); one garment of each size. Lengths in metres."""
+
+    width: Annotated[float, Field(ge=0.1, le=10)]
+    one_way: bool = False
+    reversible: bool = False
+    gap: Annotated[float, Field(ge=0, le=0.1)] = 0.002
+    seconds: Annotated[int, Field(ge=1, le=600)] = 5
+
+
+_RELAX_FIELDS: dict[str, Any] = {
+    field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
+}
+if TYPE_CHECKING:
+    RelaxTable = Table
+else:
+    # The fields of RelaxOptions, each optional, so that the two cannot differ.
+    RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
