@@ -76,6 +76,16 @@ def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
     assert 2 * half.sewn.energy_after == pytest.approx(block.sewn.energy_after, rel=0.02)
 
 
+@pytest.mark.parametrize("size", ["EU 36", "EU 44"])
+def test_seams_of_every_size_match_at_the_usual_resolution(size: str):
+    mannequin = Mannequin.from_size(size)
+    garment = flatten_form(mannequin, mannequin.form("basic_block", half=True), fabric="woven")
+    assert garment.sewn is not None
+    assert garment.sewn.converged
+    assert max(abs(seam.difference) for seam in garment.seams) < 5e-4
+    assert all(piece.flipped_faces == 0 for piece in garment.pieces.values())
+
+
 def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
     names = {seam.name for seam in block.seams}
     assert {"side left", "side right", "shoulder left", "waist"} <= names

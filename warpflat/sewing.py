@@ -17,11 +17,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.errors import InputError
 from warpflat.flattening import Flattening, Stage
 from warpflat.kernels.seams import compute_seam_misses
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
-from warpflat.strain import worn_strain
+from warpflat.strain import signed_cell_areas, worn_strain
 from warpflat.surface.mesh import Surface
 
 __all__ = ["SeamPair", "Sewn", "sew"]
@@ -34,6 +35,8 @@ _STIFFNESS = 4.0
 _ROUNDS = 30
 _EDGE_TOLERANCE = 2e-5
 _SEAM_TOLERANCE = 1e-4
+# While seams do not agree yet, the pieces need not come to rest as well as at the end.
+_COARSE = 10.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -106,15 +109,16 @@ def sew(
         seams: what is sewn to what.
         straight: by piece, vertices that must lie on one line along the grain, as on a fold or a straight centre front.
         options: of the relaxation.
+
+    Raises:
+        InputError: a piece cannot be laid with its fold straight.
     """
     begun = time.perf_counter()
     options = options or RelaxOptions()
     union = _Union(pieces)
     straight = straight or {}
     guided = union.numbers(straight)
-    start = union.positions.copy()
-    for vertices in guided:
-        start[vertices, 0] = start[vertices, 0].mean()
+    start = np.concatenate([_straightened(piece, straight.get(name)) for name, piece in pieces.items()])
     first = next(iter(pieces.values()))
     stretches = [piece.network.stretch for piece in pieces.values()]
     network = SpringNetwork.build(
@@ -135,18 +139,25 @@ def sew(
         network, options, start=start, upright=[u for name, u in union.upright.items() if name not in straight]
     )
     before = sum(_energy(piece.network, piece.positions) for piece in pieces.values())
-    converged, difference = False, np.inf
+    converged, difference, coarse = False, np.inf, bool(len(ends))
     for _ in range(_ROUNDS):
-        state.options = replace(options, max_steps=state.steps + options.max_steps)
+        looser = _COARSE if coarse else 1.0
+        state.options = replace(
+            options,
+            energy_tolerance=min(1.0, looser * options.energy_tolerance),
+            residual_tolerance=looser * options.residual_tolerance,
+        )
         outcome = relax(state)
         if not len(ends):
             converged, difference = outcome.converged, 0.0
             break
         miss = _misses(network, state)
         difference = float(np.abs(np.bincount(seam_of, miss)).max())
-        converged = outcome.converged and difference < _SEAM_TOLERANCE and float(np.abs(miss).max()) < _EDGE_TOLERANCE
-        if converged:
+        agreed = difference < _SEAM_TOLERANCE and float(np.abs(miss).max()) < _EDGE_TOLERANCE
+        converged = outcome.converged and agreed and not coarse
+        if converged or state.steps >= options.max_steps:
             break
+        coarse = coarse and not agreed
         assert network.seams is not None
         network.seams.offset.assign(network.seams.offset.numpy() + miss)
     seconds = time.perf_counter() - begun
@@ -159,6 +170,26 @@ def sew(
         energy_after=sum(_energy(piece.network, piece.positions) for piece in sewn.values()),
         largest_difference=difference,
         seconds=seconds,
+    )
+
+
+def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
+    """The piece's layout with these vertices on one line along the grain and no face mirrored.
+
+    Raises:
+        InputError: neither its pattern nor its development can be laid so.
+    """
+    if vertices is None:
+        return piece.positions
+    cells = piece.network.cell_arrays
+    for layout in (piece.positions, piece.development.positions):
+        start = layout.copy()
+        start[vertices, 0] = start[vertices, 0].mean()
+        if (signed_cell_areas(cells.corner, start) > 0.01 * cells.area / cells.weight).all():
+            return start
+    raise InputError(
+        f"piece {piece.surface.name!r} cannot be laid with a straight fold: its fold line bends too much on the body; "
+        "cut the whole piece (half = false), or ease the form there"
     )
 
 
