@@ -1,0 +1,207 @@
+"""The pattern files of runs, and the same files written again from `pattern.json`."""
+
+from __future__ import annotations
+
+import json
+import shutil
+from datetime import datetime
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+import shapely
+
+from warpflat.cli import main
+from warpflat.errors import InputError
+from warpflat.export.dxf import write_dxf
+from warpflat.export.pattern_json import pattern_json
+from warpflat.export.svg import write_svg
+from warpflat.flattening import flatten
+from warpflat.pattern import draft_garment
+from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.read_json import pattern_from_json, read_pattern_json
+from warpflat.pattern.sample import sample_dress
+from warpflat.pattern_files import PatternOptions, export_pattern, surface_files
+from warpflat.scene import load_scene, run_scene
+from warpflat.shapes import make_shape
+
+NEST = """
+name = "skirt"
+form = "a_line_skirt"
+half = true
+[mannequin]
+size = "EU 38"
+resolution_mm = 40
+[pattern]
+sizes = ["EU 44", "EU 36"]
+hem_mm = 40
+allowances_mm = { "front.waist" = 6 }
+[output]
+frames = 0
+picture = false
+"""
+
+
+@pytest.fixture(scope="module")
+def nest(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("nest")
+    (folder / "scene.toml").write_text(NEST)
+    result = run_scene(load_scene(folder / "scene.toml"), folder / "out")
+    assert {"skirt.dxf", "skirt.svg", "pattern.pdf", "pattern.json"} <= set(result.files)
+    return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def dress() -> DraftedGarment:
+    return draft_garment(sample_dress(("38", "40")))
+
+
+# --- runs
+
+
+def test_sizes_lie_in_one_file(nest: Path):
+    blocks = {block.name for block in ezdxf.readfile(nest / "skirt.dxf").blocks if not block.name.startswith("$")}
+    names = {f"{piece}_EU_{size}" for piece in ("FRONT", "BACK") for size in (36, 38, 44)}
+    assert names <= blocks
+    data = json.loads((nest / "pattern.json").read_text())
+    assert list(data["sizes"]) == ["EU 36", "EU 38", "EU 44"]
+    assert data["sample_size"] == "EU 38"
+    widths = [np.ptp(np.array(pieces["front"]["cut_line"])[:, 0]) for pieces in data["sizes"].values()]
+    assert widths == sorted(widths)
+    assert widths[2] - widths[0] > 0.02
+    svg = (nest / "skirt.svg").read_text()
+    assert all(f'data-size="{size}"' in svg for size in data["sizes"])
+
+
+def test_the_scene_sets_allowances(nest: Path):
+    pieces = json.loads((nest / "pattern.json").read_text())["sizes"]["EU 38"]
+    widths = {(name, e["name"]): e["allowance"] for name, piece in pieces.items() for e in piece["edges"]}
+    assert widths["front", "waist"] == 0.006
+    assert widths["back", "waist"] == 0.010
+    assert widths["front", "knee"] == widths["back", "knee"] == 0.040
+    assert widths["front", "centre front"] == 0.0
+
+
+def test_boundaries_in_the_dxf_are_those_of_the_pattern(nest: Path):
+    data = json.loads((nest / "pattern.json").read_text())["sizes"]["EU 36"]["front"]
+    block = ezdxf.readfile(nest / "skirt.dxf").blocks.get("FRONT_EU_36")
+    (boundary,) = block.query('POLYLINE[layer=="1"]')
+    read = shapely.Polygon([(p[0], p[1]) for p in boundary.points()])
+    assert read.hausdorff_distance(shapely.Polygon(np.array(data["cut_line"]) * 1000)) < 0.01
+    assert len(block.query('POINT[layer=="4"]')) == sum(len(notch["base"]) for notch in data["notches"]) > 0
+    assert len(block.query('LINE[layer=="6"]')) == 1, "the fold"
+
+
+def test_a_surface_is_a_pattern_of_one_piece_and_formats_are_chosen(tmp_path: Path):
+    (tmp_path / "cap.toml").write_text(
+        "[surface]\nshape = 'dome'\nresolution = 9\n[pattern]\nformats = ['svg', 'json']\n"
+        "kinds = { bottom = 'hem' }\n[output]\nframes = 0\npicture = false\n"
+    )
+    result = run_scene(load_scene(tmp_path / "cap.toml"), tmp_path / "out")
+    assert {"cap.svg", "pattern.json"} <= set(result.files)
+    assert not {"cap.dxf", "pattern.pdf"} & set(result.files)
+    (piece,) = json.loads((tmp_path / "out" / "pattern.json").read_text())["sizes"][""].values()
+    assert {e["name"]: e["allowance"] for e in piece["edges"]} == {
+        "bottom": 0.03, "right": 0.01, "top": 0.01, "left": 0.01
+    }  # fmt: skip
+    assert "centre" in piece["internal_lines"]
+
+
+def test_a_marker_is_made_when_asked_for(tmp_path: Path):
+    (tmp_path / "cap.toml").write_text(
+        "[surface]\nshape = 'dome'\nresolution = 9\n[pattern]\nformats = []\n"
+        "[marker]\nwidth = 0.9\nseconds = 1\n[output]\nframes = 0\npicture = false\n"
+    )
+    result = run_scene(load_scene(tmp_path / "cap.toml"), tmp_path / "out")
+    assert {"cap.marker.svg", "cap.marker.json"} <= set(result.files)
+    marker = json.loads((tmp_path / "out" / "cap.marker.json").read_text())
+    assert marker["width_m"] == 0.9
+    assert 0.5 < marker["length_m"] < 0.6
+    assert len(marker["placements"]) == 1
+    assert any(note.startswith("marker: 0.") and "0.90 m wide" in note for note in result.notes)
+
+
+def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
+    def told(text: str) -> str:
+        (tmp_path / "bad.toml").write_text(text)
+        with pytest.raises(InputError) as caught:
+            run_scene(load_scene(tmp_path / "bad.toml"), tmp_path / "out", on_progress=pytest.fail)
+        return str(caught.value)
+
+    assert "'wasit'" in told(NEST.replace('"front.waist"', "wasit"))
+    assert "EU 37" in told(NEST.replace("EU 44", "EU 37"))
+    assert "pattern.sizes needs" in told("[surface]\nshape = 'dome'\n[pattern]\nsizes = ['EU 38']\n")
+    assert "A4" in told("[surface]\nshape = 'dome'\n[pattern]\npaper = 'A5'\n")
+
+
+def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):
+    flat = flatten(make_shape("dome", resolution=7))
+    flat.positions[0] = flat.positions[-1] + [0.1, 0.1]
+    written = surface_files([flat], tmp_path, name="cap")
+    assert written.files == ()
+    assert len(written.notes) == 1
+    assert "no pattern was drawn" in written.notes[0]
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_ragged_border_gets_a_wider_tolerance_and_says_so(tmp_path: Path):
+    flat = flatten(make_shape("dome", size=0.2, resolution=41))
+    rim = np.unique(np.concatenate([flat.surface.lines[side] for side in ("left", "right", "top", "bottom")]))
+    flat.positions[rim] += np.random.default_rng(1).normal(0, 4e-4, (len(rim), 2))
+    written = surface_files([flat], tmp_path, name="cap", options=PatternOptions(formats=("json",)))
+    assert any("border is ragged" in note for note in written.notes)
+    (piece,) = read_pattern_json(tmp_path / "pattern.json").pieces[""]
+    assert sum(len(edge.curve.bezier) for edge in piece.edges) < 60
+
+
+# --- once more, from pattern.json
+
+
+def test_a_pattern_read_back_makes_the_same_files(dress: DraftedGarment, tmp_path: Path):
+    read = pattern_from_json(json.loads(json.dumps(pattern_json(dress))))
+    assert pattern_json(read) == pattern_json(dress)
+    for number, pattern in enumerate((dress, read)):
+        write_svg(pattern, tmp_path / f"{number}.svg", nested=True)
+        write_dxf(pattern, tmp_path / f"{number}.dxf", dialect="astm", created=datetime(2026, 1, 1))
+    assert (tmp_path / "0.svg").read_text() == (tmp_path / "1.svg").read_text()
+    assert (tmp_path / "0.dxf").read_text() == (tmp_path / "1.dxf").read_text()
+
+
+def test_export_redoes_one_file(nest: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    folder = tmp_path / "run"
+    shutil.copytree(nest, folder)
+    (folder / "skirt.dxf").unlink()
+    assert main(["export", str(folder), "--format", "dxf", "--dialect", "astm", "--size", "EU 36"]) == 0
+    assert "skirt.dxf" in capsys.readouterr().out
+    document = ezdxf.readfile(folder / "skirt.dxf")
+    assert document.blocks.get("FRONT_EU_36").query('POLYLINE[layer=="84"]'), "ASTM's validation curves"
+    assert "FRONT_EU_44" not in document.blocks
+    before = (folder / "pattern.pdf").read_bytes()
+    assert main(["export", str(folder), "--format", "pdf", "--paper", "Letter", "-q"]) == 0
+    assert capsys.readouterr().out == ""
+    assert (folder / "pattern.pdf").read_bytes() != before
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("{", "cannot be read as JSON"),
+        ("[]", "no pattern of warpflat"),
+        ('{"sizes": {}, "schema": 99}', "has schema 99"),
+        ('{"sizes": {}, "schema": 1}', "key 'stitches' is missing"),
+    ],
+)
+def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):
+    (tmp_path / "pattern.json").write_text(text)
+    with pytest.raises(InputError, match=said) as caught:
+        export_pattern(tmp_path, "svg")
+    assert "pattern.json" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_folder_without_a_pattern_and_unknown_formats(tmp_path: Path):
+    with pytest.raises(InputError, match="no such file"):
+        export_pattern(tmp_path, "svg")
+    with pytest.raises(InputError, match="unknown format 'dwg'"):
+        export_pattern(tmp_path, "dwg")
