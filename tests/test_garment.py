@@ -125,6 +125,11 @@ def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
     metrics = json.loads((tmp_path / "metrics.json").read_text())
     assert set(metrics["pieces"]) == set(block.pieces)
     assert metrics["mannequin"]["levels"]["bust"]["girth_m"] == pytest.approx(0.88, abs=0.001)
+    for name, piece in block.pieces.items():
+        energy = metrics["pieces"][name]["energy"]
+        assert sum(energy["bricks"].values()) == pytest.approx(piece.stages[-1].strain_energy_j, rel=1e-9)
+        assert energy["lines"].keys() == piece.surface.lines.keys()
+        assert any(line in energy["peak"] for line in piece.surface.lines), energy["peak"]
     seam = metrics["seams"][0]
     assert {"name", "sides", "length_mm", "ease"} <= set(seam)
     assert all("." in side for side in seam["sides"])

@@ -21,6 +21,7 @@ from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, Upright, relax
 from warpflat.strain import WornStrain, layout_errors, worn_strain
+from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, components, line_from_indices, read_surface
 from warpflat.tightness import Wear, WornFit, assess_fit, meant_stretch
 
@@ -190,6 +191,7 @@ class Flattening:
             "converged": self.converged,
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
+            "energy": energy_report(self.network.surface, self.worn.energy),
             "notes": list(self.notes),
         }
 

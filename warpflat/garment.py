@@ -16,6 +16,7 @@ from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.mannequin import Carrier, FormResult, FormSeam, Mannequin
 from warpflat.relax import RelaxOptions
 from warpflat.sewing import SeamPair, Sewn, sew
+from warpflat.strain_map import energy_report
 
 __all__ = ["Garment", "SeamLengths", "flatten_form"]
 
@@ -109,12 +110,18 @@ class Garment:
         flat = self.pieces[piece]
         return Carrier(flat.surface.vertices, flat.positions, flat.faces)
 
+    def _measures(self, name: str) -> dict[str, Any]:
+        """The piece's measures, its energy also brick by brick."""
+        piece, brick = self.pieces[name], np.array(self.form.pieces[name].face_brick)
+        bricks = {each: brick == each for each in dict.fromkeys(brick.tolist())}
+        return {**piece.measures, "energy": energy_report(piece.network.surface, piece.worn.energy, regions=bricks)}
+
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
         first = next(iter(self.pieces.values()))
         return {
             **first.metrics(),
-            "pieces": {name: piece.measures for name, piece in self.pieces.items()},
+            "pieces": {name: self._measures(name) for name in self.pieces},
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             **({} if self.sewn is None else {"sewing": self.sewn.as_dict()}),

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -18,6 +19,7 @@ __all__ = [
     "LineEnergy",
     "energy_map",
     "energy_peak",
+    "energy_report",
     "integrate_along",
     "integrate_faces",
     "smooth_to_vertices",
@@ -117,6 +119,35 @@ def energy_map(
         lines={name: integrate_along(surface, at_vertices, line) for name, line in surface.lines.items()},
         peak=energy_peak(surface, at_vertices, landmarks=landmarks, up=up),
     )
+
+
+def energy_report(
+    surface: Surface, face_energy: ArrayLike, *, regions: Mapping[str, ArrayLike] | None = None
+) -> dict[str, Any]:
+    """Where the energy of a piece lies, as in `metrics.json`.
+
+    Args:
+        surface: the surface the energies belong to.
+        face_energy: #F, strain energy of each face [J].
+        regions: face sets by name, bricks say.
+
+    Returns:
+        "peak" in words, per line its length and its mean and highest density, per region its joules.
+    """
+    areas = _face_areas(surface)
+    density = np.asarray(face_energy, dtype=np.float64) / np.where(areas > 0.0, areas, np.inf)
+    found = energy_map(surface, density, regions=regions)
+    report: dict[str, Any] = {
+        "peak": found.peak.words,
+        "peak_j_per_m2": found.peak.density,
+        "lines": {
+            name: {"length_m": line.length, "mean_j_per_m2": line.mean, "peak_j_per_m2": line.peak}
+            for name, line in found.lines.items()
+        },
+    }
+    if regions:
+        report["bricks"] = dict(found.regions)
+    return report
 
 
 def smooth_to_vertices(
