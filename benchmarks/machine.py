@@ -1,0 +1,95 @@
+"""What the machine can do and what a run takes of it: the speed of a copy, bytes of a step, peak memory."""
+
+from __future__ import annotations
+
+import os
+import pickle
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warpflat.network import SpringNetwork
+
+if TYPE_CHECKING:
+    from meshes import Mesh
+
+
+def copy_speed(threads: int, *, size: int = 64 * 2**20) -> float:
+    """Bytes per second, read and written, of copies of `size` bytes on so many threads at once; the best of several."""
+    pairs = [(np.ones(size // 8), np.zeros(size // 8)) for _ in range(threads)]
+    best = 0.0
+    for _ in range(5):
+        workers = [threading.Thread(target=np.copyto, args=(to, source)) for source, to in pairs]
+        begun = time.perf_counter()
+        for worker in workers:
+            worker.start()
+        for worker in workers:
+            worker.join()
+        best = max(best, 2.0 * threads * size / (time.perf_counter() - begun))
+    return best
+
+
+def _arrays(value: Any) -> list[wp.array]:
+    """Warp arrays in the fields of an object and of the Warp structs among them."""
+    found = []
+    for entry in vars(value).values():
+        if isinstance(entry, wp.array):
+            found.append(entry)
+        elif hasattr(type(entry), "vars") or hasattr(entry, "_cls"):
+            names = entry._cls.vars if hasattr(entry, "_cls") else type(entry).vars
+            found += [a for a in (getattr(entry, key, None) for key in names) if isinstance(a, wp.array)]
+    return found
+
+
+def buffer_bytes(network: SpringNetwork) -> float:
+    """Bytes of a network's arrays on its device."""
+    return float(sum(array.size * wp.types.type_size_in_bytes(array.dtype) for array in _arrays(network)))
+
+
+def step_bytes(network: SpringNetwork) -> float:
+    """Bytes that one approximate implicit step has to move if every array it reads or writes is moved once.
+
+    (Places and velocities of neighbours are gathered several times; what the caches do not hold of that comes on top.)
+    """
+    v, c, s = network.vertex_count, network.cell_count, 2 * network.spring_count
+    evaluate = (
+        c * (12 + 32 + 8 + 16 + 4 + 8) + v * 32
+    )  # corners, edges, weight, slack; acting, clearance; places, velocities
+    gather = v * (32 + 8 + 8 + 4 + 4 + 16 + 16) + s * (4 + 8 + 8) + 3 * c * 4 + c * 12
+    gather += v * (16 + 8 + 16 + 16 + 8 + 8)
+    advance = v * (8 + 4 + 16 + 16 + 16 + 8 + 8) + s * (4 + 8) + v * 2 * 32
+    return float(evaluate + gather + advance)
+
+
+_CHILD = """
+import pickle, sys, threading, time
+sys.path.insert(0, sys.argv[1])
+import speed, meshes, warpflat
+surface, datum, name = pickle.load(sys.stdin.buffer)
+def status(key):
+    for line in open("/proc/self/status"):
+        if line.startswith(key):
+            return 1024 * int(line.split()[1])
+warm = meshes.KINDS["irregular"]("dome", 200)
+warpflat.flatten(warm.surface, fabric=speed.CLOTH, datum=warm.datum, device="cpu", **speed.OURS[name])
+before = status("VmRSS")
+open("/proc/self/clear_refs", "w").write("5")
+warpflat.flatten(surface, fabric=speed.CLOTH, datum=datum, device="cpu", **speed.OURS[name])
+print(status("VmHWM") - before)
+"""
+
+
+def memory_of_flatten(mesh: Mesh, solver: str) -> float:
+    """Bytes by which `warpflat.flatten` raises the peak memory of a fresh process (Linux), kernels already loaded."""
+    given = pickle.dumps((mesh.surface, mesh.datum, solver))
+    here = str(Path(__file__).parent)
+    done = subprocess.run([sys.executable, "-c", _CHILD, here], input=given, capture_output=True, env=os.environ.copy())
+    if done.returncode:
+        raise RuntimeError(done.stderr.decode().strip().splitlines()[-1])
+    return float(done.stdout.decode().split()[-1])

@@ -1,0 +1,270 @@
+"""Launches over ranges: the same bits for any number of threads, and errors that come out where they were caused."""
+
+from __future__ import annotations
+
+import os
+import threading
+import time
+
+import numpy as np
+import pytest
+import warp as wp
+from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
+from warpflat.kernels.implicit import advance, gather_forces
+
+from warpflat.develop import develop
+from warpflat.errors import InputError
+from warpflat.fabric import find_fabric
+from warpflat.launching import Launch, Sequence, record, split_range, thread_count
+from warpflat.network import SpringNetwork
+from warpflat.relax import Relaxation, RelaxOptions
+from warpflat.shapes import bodice
+
+
+@pytest.mark.parametrize("size", [0, 1, 63, 512, 1000, 1024, 5000, 100_003])
+@pytest.mark.parametrize("parts", [1, 2, 3, 16])
+def test_ranges_cover_everything_once(size: int, parts: int) -> None:
+    ranges = split_range(size, parts, least=512)
+    assert [i for begin, end in ranges for i in range(begin, end)] == list(range(size))
+    assert len(ranges) <= parts
+    assert all(begin % 64 == 0 for begin, _ in ranges)
+    assert all(end - begin >= 512 for begin, end in ranges[:-1])
+
+
+def test_number_of_threads(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("WARPFLAT_THREADS", raising=False)
+    assert 1 <= thread_count() <= (os.cpu_count() or 1)
+    monkeypatch.setenv("WARPFLAT_THREADS", "3")
+    assert thread_count() == 3
+    for wrong in ("0", "two", "-1", "1.5"):
+        monkeypatch.setenv("WARPFLAT_THREADS", wrong)
+        with pytest.raises(InputError, match="WARPFLAT_THREADS"):
+            thread_count()
+
+
+def steps_of(threads: int | None, *, triangles: bool) -> dict[str, np.ndarray]:
+    """Twenty steps of a bodice: by Warp's own launches where `threads` is None, else over ranges."""
+    surface = bodice(resolution=24, triangles=triangles)
+    start = develop(surface, surface.lines["centre"]).positions
+    network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
+    state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
+    n, c, h = network.vertex_count, network.cell_count, 0.01
+    energy = wp.zeros(c, dtype=wp.float64, device="cpu")
+    if threads is None:
+        for _ in range(20):
+            state.step()
+        inputs = [state.position, network.cells, network.guard, 0]
+        wp.launch(compute_guard_energy, dim=c, inputs=inputs, outputs=[energy], device="cpu")
+    else:
+        share = {"device": "cpu", "threads": threads, "least": 64}
+        evaluate = record(
+            evaluate_guard,
+            dim=c,
+            inputs=[state.position, state.velocity, network.cells, network.guard, h],
+            outputs=[
+                state._cell_acting,
+                state._cell_clearance,
+                state._cell_force,
+                state._cell_viscosity,
+                state._cell_stiffness,
+            ],
+            **share,
+        )
+        gather = record(
+            gather_forces,
+            dim=n,
+            inputs=[
+                state.position,
+                state.velocity,
+                network.mass,
+                network.spring_stiffness,
+                network.springs,
+                network.cells,
+                state._cell_acting,
+                state._cell_clearance,
+                state._cell_force,
+                state._cell_viscosity,
+                state._cell_stiffness,
+                network.bonds,
+                state._seam_force,
+                state._seam_viscosity,
+                state._seam_stiffness,
+                state._load,
+                h,
+            ],
+            outputs=[
+                state.force,
+                state._power,
+                state._driving_force,
+                state._first_guess,
+                state._stiffness,
+                state._reach,
+            ],
+            **share,
+        )
+        move = record(
+            advance,
+            dim=n,
+            inputs=[
+                network.mass,
+                network.springs,
+                network.bonds,
+                state._driving_force,
+                state._first_guess,
+                state._stiffness,
+                state._reach,
+                h,
+            ],
+            outputs=[state.position, state.velocity],
+            **share,
+        )
+        assert len(gather.commands) == threads
+        step = Sequence([evaluate, gather, move])
+        for _ in range(20):
+            step.launch()
+        inputs = [state.position, network.cells, network.guard]
+        record(compute_guard_energy, dim=c, inputs=inputs, outputs=[energy], **share).launch()
+    arrays = {
+        "position": state.position,
+        "velocity": state.velocity,
+        "force": state.force,
+        "cell force": state._cell_force,
+        "energy": energy,
+    }
+    return {name: array.numpy().copy() for name, array in arrays.items()}
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_results_are_those_of_one_thread_bit_for_bit(triangles: bool) -> None:
+    expected = steps_of(None, triangles=triangles)
+    assert np.ptp(expected["position"]) > 0.1
+    assert np.abs(expected["cell force"]).max() > 0
+    for threads in (1, 2, 3, 5):
+        for name, values in steps_of(threads, triangles=triangles).items():
+            np.testing.assert_array_equal(values, expected[name], err_msg=f"{name}, {threads} threads")
+
+
+def test_ranges_run_on_threads_of_their_own() -> None:
+    seen: dict[int, int] = {}
+    together = threading.Barrier(3, timeout=30)  # passes only if three are inside at once
+
+    def note(k: int) -> None:
+        together.wait()
+        seen[k] = threading.get_ident()
+
+    Launch([lambda k=k: note(k) for k in range(3)]).launch()
+    assert len(set(seen.values())) == 3
+    assert seen[0] == threading.get_ident()
+
+
+def test_a_launch_begins_when_the_one_before_is_done() -> None:
+    begun_early: list[int] = []
+    done = [0] * 6
+
+    def work(phase: int, k: int) -> None:
+        if phase and done[phase - 1] != len(launches[phase - 1].commands):
+            begun_early.append(phase)
+        time.sleep(0.002 * ((phase + k) % 3))
+        with lock:
+            done[phase] += 1
+
+    lock = threading.Lock()
+    # Of one range and of several, as they occur in one step of a hierarchy.
+    launches = [
+        Launch([lambda p=phase, k=k: work(p, k) for k in range(size)]) for phase, size in enumerate((3, 2, 1, 4, 1, 3))
+    ]
+    for _ in range(5):
+        done[:] = [0] * 6
+        Sequence(launches).launch()
+        assert done == [3, 2, 1, 4, 1, 3]
+    assert begun_early == []
+
+
+@pytest.mark.parametrize("where", [0, 1, 2])
+@pytest.mark.parametrize("kind", [ValueError, KeyboardInterrupt])
+def test_an_error_in_a_thread_is_raised_in_the_caller(where: int, kind: type[BaseException]) -> None:
+    after: list[int] = []
+
+    def work(k: int) -> None:
+        if k == where:
+            raise kind("in thread")
+
+    failing = Launch([lambda k=k: work(k) for k in range(3)])
+    following = Launch([lambda: after.append(1)] * 3)
+    with pytest.raises(kind, match="in thread"):
+        Sequence([failing, following]).launch()
+    assert after == []  # what follows is not run on half a result
+    following.launch()
+    assert after == [1, 1, 1]
+
+
+def test_an_interrupt_while_waiting_leaves_later_launches_sound(monkeypatch: pytest.MonkeyPatch) -> None:
+    from warpflat import launching
+
+    wait = launching._Barrier.wait
+
+    def interrupted(self: launching._Barrier, i: int) -> None:
+        if i == 0:
+            raise KeyboardInterrupt
+        wait(self, i)
+
+    ran: list[int] = []
+    launch = Launch([lambda k=k: ran.append(k) for k in range(3)])
+    monkeypatch.setattr(launching._Barrier, "wait", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        launch.launch()
+    monkeypatch.undo()
+    time.sleep(0.01)
+    ran.clear()
+    for _ in range(10):
+        launch.launch()
+    assert sorted(ran) == sorted([0, 1, 2] * 10)
+
+
+def test_a_launch_within_a_launch_and_from_two_threads() -> None:
+    count = [0, 0]
+    inner = Launch([lambda: count.__setitem__(0, count[0] + 1)] * 2)
+
+    def outer_work() -> None:
+        with lock:
+            inner.launch()
+            count[1] += 1
+
+    lock = threading.Lock()
+    outer = Launch([outer_work] * 2)
+    threads = [threading.Thread(target=outer.launch) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    assert count == [16, 8]
+
+
+def test_nothing_to_do() -> None:
+    n = wp.zeros(0, dtype=wp.float64, device="cpu")
+    x = wp.zeros(0, dtype=wp.vec2d, device="cpu")
+    network_free = record(compute_guard_energy, dim=0, inputs=[x, None, None], outputs=[n], device="cpu")
+    assert network_free.commands == ()
+    Sequence([network_free]).launch()
+    network_free.launch()
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+@pytest.mark.filterwarnings("ignore::DeprecationWarning")
+def test_a_forked_process_has_threads_of_its_own() -> None:
+    ran: list[int] = []
+    launch = Launch([lambda k=k: ran.append(k) for k in range(3)])
+    launch.launch()
+    child = os.fork()
+    if child == 0:
+        launch.launch()
+        os._exit(0 if sorted(ran) == [0, 0, 1, 1, 2, 2] else 1)
+    for _ in range(3000):
+        gone, status = os.waitpid(child, os.WNOHANG)
+        if gone:
+            break
+        time.sleep(0.01)
+    else:
+        os.kill(child, 9)
+        pytest.fail("the forked process waits for its parent's threads")
+    assert os.waitstatus_to_exitcode(status) == 0
