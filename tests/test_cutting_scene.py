@@ -34,8 +34,15 @@ def test_a_scene_cuts_along_lines_points_and_planes(tmp_path: Path):
     coarse = {"residual_tolerance": 0.03, "energy_tolerance": 1e-5}
     result = run_scene(scene(cuts=cuts, relax=coarse, **QUIET), tmp_path)
     piece = result.metrics["pieces"]["trial"]
-    assert [stage["name"] for stage in piece["stages"]] == ["develop", "relax", "cut:bust", "cut:slant", "cut:down"]
-    energy = [stage["spring_energy_j"] + stage["guard_energy_j"] for stage in piece["stages"][1:]]
+    assert [stage["name"] for stage in piece["stages"]] == [
+        "develop",
+        "relax",
+        "cut:bust",
+        "cut:slant",
+        "cut:down",
+        "sew",
+    ]
+    energy = [stage["spring_energy_j"] + stage["guard_energy_j"] for stage in piece["stages"][1:-1]]
     assert energy == sorted(energy, reverse=True)
     assert piece["flipped_faces"] == 0
     # The slanted path begins a little inside the border: a fish-eye dart.
@@ -80,7 +87,7 @@ def test_a_cut_from_border_to_border_gives_two_pieces_with_files_of_their_own(tm
 def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
     found = run_scene(scene(auto_cut={"max_cuts": 1, "by": "per_cm"}, **QUIET), tmp_path / "one")
     stages = found.metrics["pieces"]["trial"]["stages"]
-    assert len(stages) == 3
+    assert len(stages) == 4
     assert any(note.startswith("cuts found: ") for note in found.notes)
     enough = stages[1]["spring_energy_j"] + stages[1]["guard_energy_j"] + 0.01
     none = run_scene(scene(auto_cut={"max_cuts": 1, "stop_below": enough}, **QUIET), tmp_path / "none")
@@ -135,6 +142,6 @@ def test_the_command_compares_cuts_and_applies_one(
     assert not Path("out/b/metrics.json").exists()
     assert main(["cuts", "b.toml", "--apply", "1", "--quiet"]) == 0
     piece = json.loads(Path("out/b/metrics.json").read_text())["pieces"]["b"]
-    assert piece["stages"][-1]["name"] == f"cut:{ledger['entries'][0]['name']}"
+    assert piece["stages"][-2]["name"] == f"cut:{ledger['entries'][0]['name']}"
     assert main(["cuts", "b.toml", "--apply", "99"]) == 2
     assert "there is no candidate 99; valid: 1 to" in capfd.readouterr().err

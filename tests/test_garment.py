@@ -12,6 +12,7 @@ from warpflat.errors import InputError
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import Mannequin
 from warpflat.scene import load_scene, run_scene
+from warpflat.seam_wishes import SeamWish
 
 
 @pytest.fixture(scope="module")
@@ -58,9 +59,24 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
         # 0.2 mm per 5 cm, edge by edge
         assert np.abs(sides[0] - sides[1]).max() < 2e-4 * 0.025 / 0.05, seam.name
     assert 0.0 < block.sewn.price < 0.2 * block.sewn.energy_before
+    prices = {seam.name: seam.price for seam in block.seams}
+    assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.price, rel=0.05)
+    assert prices["side left"] == pytest.approx(prices["side right"], rel=1e-3)
+    assert all(seam.price is None for seam in alone.seams)
     assert block.sewn.energy_before == pytest.approx(
         sum(p.stages[-1].spring_energy_j + p.stages[-1].guard_energy_j for p in alone.pieces.values())
     )
+
+
+def test_mirrored_pieces_are_recognised_as_pairs(mannequin: Mannequin, block: Garment):
+    assert block.pairs == ()
+    shirt = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock")
+    assert shirt.pairs == (("sleeve_left", "sleeve_right"),)
+    assert shirt.metrics()["pairs"] == [["sleeve_left", "sleeve_right"]]
+    # Ease on one side only, and they are two patterns.
+    wishes = [SeamWish(name="armhole left", factor=1.05)]
+    odd = flatten_form(mannequin, mannequin.form("tshirt"), fabric="interlock", wishes=wishes)
+    assert odd.pairs == ()
 
 
 def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
@@ -72,6 +88,10 @@ def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
     assert max(abs(seam.difference) for seam in half.seams) < 5e-4
     assert half.sewn is not None
     assert block.sewn is not None
+    # The folds have their price too, and all prices together are what all of it costs.
+    assert [held.name for held in half.sewn.constraints] == [f"{name} fold" for name in half.form.pieces]
+    assert all(held.price > 0.0 for held in half.sewn.constraints)
+    assert sum(held.price for held in half.sewn.held) == pytest.approx(half.sewn.price, rel=0.05)
     # two halves are the whole
     assert 2 * half.sewn.energy_after == pytest.approx(block.sewn.energy_after, rel=0.02)
 
@@ -95,8 +115,8 @@ def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
         flat = [block.pieces[n].positions[v] for n, v in zip(seam.pieces, seam.vertices, strict=True)]
         lengths = [np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for p in flat]
         np.testing.assert_allclose(measured.lengths, lengths)
-        assert measured.as_dict()["difference_mm"] == pytest.approx(1e3 * (lengths[0] - lengths[1]))
-        assert abs(measured.ease) < 0.002
+        assert measured.as_dict()["difference_mm"] == pytest.approx(1e3 * (lengths[1] - lengths[0]))
+        assert measured.ease == 0.0
 
 
 def test_the_skirt_block_measures_what_the_table_says(block: Garment):
@@ -131,11 +151,15 @@ def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
         assert energy["lines"].keys() == piece.surface.lines.keys()
         assert any(line in energy["peak"] for line in piece.surface.lines), energy["peak"]
     seam = metrics["seams"][0]
-    assert {"name", "sides", "length_mm", "ease"} <= set(seam)
+    assert {"name", "sides", "length_mm", "ease", "difference_mm", "price_j"} <= set(seam)
+    assert metrics["sewing"]["price_j"] == pytest.approx(sum(seam["price_j"] for seam in metrics["seams"]), rel=0.05)
     assert all("." in side for side in seam["sides"])
     for name in block.pieces:
         assert f"{name}.obj" in files
         assert (tmp_path / f"{name}.obj").read_text().count("\nvt ") == len(block.pieces[name].positions)
+
+
+DRESS = "form = 'dress'\n[mannequin]\nsize = 'EU 38'\n"
 
 
 @pytest.mark.parametrize(
@@ -149,6 +173,26 @@ def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):
         ),
         ("[mannequin]\nsize = 'EU 38'\n[form.pieces]\nx = { bricks = ['wast-hip/front-*'] }\n", r"form: .*wast-hip"),
         ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: no such file"),
+        (
+            DRESS + "[[seams]]\nname = 'sid left'\nease = 0.02\n",
+            r"seams: there is no seam 'sid left'; did you mean 'side left'",
+        ),
+        (
+            DRESS + "[[constraints]]\nline = 'kne'\nstraight = 'weft'\n",
+            r"constraints\[0\]: no piece has a line 'kne'.*'knee'",
+        ),
+        (
+            DRESS + "[[constraints]]\npiece = 'frnt'\nline = 'knee'\nstraight = 'weft'\n",
+            r"constraints\[0\]: no piece 'frnt'; did you mean 'front'",
+        ),
+        (
+            DRESS + "[[constraints]]\npiece = 'front'\nline = 'centre back'\nlength_mm = 'body'\n",
+            r"constraints\[0\]: piece 'front' has no line 'centre back'",
+        ),
+        (
+            "half = true\n" + DRESS + "[[constraints]]\npiece = 'front'\nline = 'centre front'\nsymmetric = true\n",
+            r"constraints\[0\]: piece 'front' is a half on the fold",
+        ),
     ],
 )
 def test_a_wrong_body_or_form_is_one_line(tmp_path: Path, text: str, message: str):

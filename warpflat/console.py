@@ -28,6 +28,7 @@ __all__ = [
 ]
 
 _REFRESH = 0.1  # [s]
+_AMISS = 0.2  # [mm] of a seam or constraint that is told
 
 
 class ProgressBar:
@@ -99,21 +100,34 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
     tables = [_aligned(head, rows)]
     if metrics.get("seams"):
         tables.append(_seam_table(metrics["seams"]))
+    if metrics.get("constraints"):
+        tables.append(_constraint_table(metrics["constraints"]))
     return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
 
 
 def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
-    head = ("seam", "sides", "mm", "mm", "difference")
+    head = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
     rows = [
         (
             seam["name"],
             " = ".join(seam["sides"]),
             *(f"{length:.1f}" for length in seam["length_mm"]),
-            f"{seam['length_mm'][0] - seam['length_mm'][1]:+.1f} mm",
+            f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
+            f"{seam['difference_mm']:+.2f} mm",
+            _price(seam["price_j"]),
         )
         for seam in seams
     ]
     return _aligned(head, rows, left=(0, 1))
+
+
+def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
+    rows = [(held["name"], f"{held['amiss_mm']:.2f} mm", _price(held["price_j"])) for held in constraints]
+    return _aligned(("constraint", "amiss", "price"), rows)
+
+
+def _price(joules: float | None) -> str:
+    return "" if joules is None else f"{1e3 * joules:.3g} mJ"
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
@@ -128,6 +142,14 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
             )
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+    if not metrics.get("sewing", {}).get("converged", True):
+        amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
+        amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
+        lines += [
+            f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
+            for name, by in amiss
+            if by > _AMISS
+        ]
     return lines
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,55 +10,23 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.constraints import Constraint
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening import Flattening, Progress, flatten
-from warpflat.mannequin import Carrier, FormResult, FormSeam, Mannequin
+from warpflat.fullness import FullEdge, give_fullness
+from warpflat.mannequin import Carrier, FormPiece, FormResult, FormSeam, Mannequin
 from warpflat.relax import RelaxOptions
+from warpflat.seam_lengths import SeamLengths, polyline_length
+from warpflat.seam_wishes import SeamWish, wished_seams
 from warpflat.sewing import SeamPair, Sewn, sew
 from warpflat.strain_map import energy_report
+from warpflat.wear_report import garment_wear
 
 __all__ = ["Garment", "SeamLengths", "flatten_form"]
 
-
-@dataclass(frozen=True, kw_only=True)
-class SeamLengths:
-    """A seam, measured.
-
-    Attributes:
-        name: after the feature line.
-        sides: "piece.edge" twice.
-        length_3d: of the one curve in space that both sides come from [m].
-        lengths: of its two sides in the pattern [m].
-        difference: first minus second [m].
-        ease: first over second, minus 1.
-    """
-
-    name: str
-    sides: tuple[str, str]
-    length_3d: float
-    lengths: tuple[float, float]
-
-    @property
-    def difference(self) -> float:
-        """First side minus second [m]."""
-        return self.lengths[0] - self.lengths[1]
-
-    @property
-    def ease(self) -> float:
-        """How much longer the first side is, as a share of the second."""
-        return self.lengths[0] / self.lengths[1] - 1.0
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
-        return {
-            "name": self.name,
-            "sides": list(self.sides),
-            "length_mm": [1e3 * length for length in self.lengths],
-            "length_3d_mm": 1e3 * self.length_3d,
-            "difference_mm": 1e3 * self.difference,
-            "ease": self.ease,
-        }
+# By how much the mirror image of a piece may differ from its partner to be cut by the same pattern [m].
+_SAME_PIECE = 5e-4
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,7 +38,8 @@ class Garment:
         mannequin: whose form it is.
         form: the pieces in space, with their edges and seams.
         pieces: the flat pieces by name, in the form's order.
-        sewn: how they were relaxed together under their seams, and what equal seams cost; None if they were not.
+        sewn: how they were relaxed together under their seams and constraints, and what these cost; None if they were not.
+        ratios: for each of the form's seams the wished length of its first side over its second.
     """
 
     name: str
@@ -78,11 +47,35 @@ class Garment:
     form: FormResult
     pieces: Mapping[str, Flattening]
     sewn: Sewn | None = None
+    ratios: tuple[float, ...] = ()
 
     @property
     def seams(self) -> tuple[SeamLengths, ...]:
         """Every seam with the lengths of its two sides."""
-        return tuple(self._measured(seam) for seam in self.form.seams)
+        ratios = self.ratios or (1.0,) * len(self.form.seams)
+        prices = {} if self.sewn is None else {held.name: held.price for held in self.sewn.held if held.kind == "seam"}
+        return tuple(
+            self._measured(seam, ratio, prices.get(seam.name))
+            for seam, ratio in zip(self.form.seams, ratios, strict=True)
+        )
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pieces that are each other's mirror images, in the body's grid and, within 0.5 mm, in the pattern.
+
+        One of the two is enough for the table: cut it twice, the second time turned over.
+        """
+        image, found = self.mannequin.layout.mirror, []
+        names = list(self.pieces)
+        for number, first in enumerate(names):
+            for second in names[number + 1 :]:
+                partners = _partners(self.form.pieces[first], self.form.pieces[second], image)
+                if partners is None:
+                    continue
+                a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
+                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < _SAME_PIECE:
+                    found.append((first, second))
+        return tuple(found)
 
     @property
     def notes(self) -> tuple[str, ...]:
@@ -90,13 +83,18 @@ class Garment:
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.notes)
         return (*self.mannequin.notes, *of_pieces)
 
-    def _measured(self, seam: FormSeam) -> SeamLengths:
+    def _measured(self, seam: FormSeam, ratio: float, price: float | None) -> SeamLengths:
         first, second = (self.pieces[piece] for piece in seam.pieces)
         return SeamLengths(
             name=seam.name,
             sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
-            length_3d=_length(first.surface.vertices[seam.vertices[0]]),
-            lengths=(_length(first.positions[seam.vertices[0]]), _length(second.positions[seam.vertices[1]])),
+            length_3d=polyline_length(first.surface.vertices[seam.vertices[0]]),
+            lengths=(
+                polyline_length(first.positions[seam.vertices[0]]),
+                polyline_length(second.positions[seam.vertices[1]]),
+            ),
+            ease=1.0 / ratio - 1.0,
+            price=price,
         )
 
     def carrier(self, piece: str) -> Carrier:
@@ -119,12 +117,22 @@ class Garment:
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
         first = next(iter(self.pieces.values()))
+        pieces = {name: self._measures(name) for name in self.pieces}
         return {
             **first.metrics(),
-            "pieces": {name: self._measures(name) for name in self.pieces},
+            "pieces": pieces,
+            "wear": garment_wear(pieces),
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
-            **({} if self.sewn is None else {"sewing": self.sewn.as_dict()}),
+            "pairs": [list(pair) for pair in self.pairs],
+            **({} if self.sewn is None else self._sewing()),
+        }
+
+    def _sewing(self) -> dict[str, Any]:
+        assert self.sewn is not None
+        return {
+            "constraints": [held.as_dict() for held in self.sewn.constraints],
+            "sewing": self.sewn.as_dict(),
         }
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
@@ -155,6 +163,8 @@ def flatten_form(
     callback: Callable[[str, Progress], None] | None = None,
     device: str | None = None,
     sewn: bool = True,
+    wishes: Sequence[SeamWish] = (),
+    constraints: Sequence[Constraint] = (),
     **options: Any,
 ) -> Garment:
     """Flatten every piece of a form, each from its own datum line, then all together, so that their seams match.
@@ -166,10 +176,13 @@ def flatten_form(
         callback: called with the piece's name and its `Progress` after every step of its own.
         sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
             keeps its own minimum.
+        wishes: ease and gathers of seams.
+        constraints: on edges and lines of pieces.
 
     Raises:
-        InputError: a piece cannot be flattened; one line says which and why.
+        InputError: a piece cannot be flattened, or a wish or constraint names what there is not; one line says which and why.
     """
+    wished = wished_seams(form, wishes)
     pieces = {}
     for name, piece in form.pieces.items():
 
@@ -189,11 +202,42 @@ def flatten_form(
         )
     if not sewn:
         return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
-    pairs = [SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices) for seam in form.seams]
+    for name, edges in wished.full.items():
+        pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
+    pairs = [
+        SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices, ratio=ratio)
+        for seam, ratio in zip(form.seams, wished.ratios, strict=True)
+    ]
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    together = sew(pieces, pairs, straight=folds, options=relax)
-    return Garment(name=form.name, mannequin=mannequin, form=form, pieces=together.pieces, sewn=together)
+    together = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
+    return Garment(
+        name=form.name, mannequin=mannequin, form=form, pieces=together.pieces, sewn=together, ratios=wished.ratios
+    )
 
 
-def _length(points: NDArray[np.float64]) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[NDArray[np.int32]]:
+    """Vertices along each side of a seam of the piece that has no fullness."""
+    sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
+    return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
+
+
+def _partners(first: FormPiece, second: FormPiece, image: NDArray[np.int32]) -> NDArray[np.int32] | None:
+    """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair.
+
+    Told face by face: along a line that a piece is cut open at, a vertex of the mannequin is two of the piece.
+    """
+    if len(first.grid_vertices) != len(second.grid_vertices) or len(first.face_brick) != len(second.face_brick):
+        return None
+    faces = {
+        frozenset(row): dict(zip(row, face, strict=True))
+        for row, face in zip(
+            second.grid_vertices[second.surface.faces].tolist(), second.surface.faces.tolist(), strict=True
+        )
+    }
+    partners = np.full(len(first.grid_vertices), -1, dtype=np.int32)
+    for row, face in zip(image[first.grid_vertices[first.surface.faces]].tolist(), first.surface.faces, strict=True):
+        other = faces.get(frozenset(row))
+        if other is None:
+            return None
+        partners[face] = [other[vertex] for vertex in row]
+    return partners

@@ -37,6 +37,7 @@ from warpflat.kernels.springs import Springs
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges, unfold_quad_diagonals
+from warpflat.surface.unfold import lay_quads_flat, quad_creases
 
 __all__ = ["SpringNetwork", "cells_of", "grain_axes", "springs_of", "vertex_masses"]
 
@@ -114,9 +115,13 @@ class CellArrays:
 
 
 def cells_of(surface: Surface) -> CellArrays:
-    """The surface's cells, each laid flat."""
+    """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
     corner, face, weight = corner_triangles(surface.faces)
     p = surface.vertices[corner]
+    flat, creased, _ = lay_quads_flat(surface.vertices, surface.faces)
+    around = np.flatnonzero(np.isin(face, creased))
+    p[around, :, :2] = flat[:, [[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]].reshape(-1, 3, 2)
+    p[around, :, 2] = 0.0
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
     length = np.linalg.norm(a, axis=1)
     twice = np.linalg.norm(np.cross(a, b), axis=1)
@@ -176,6 +181,11 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         share = np.where(he.slot[of_quad] % 2 == 0, half_a[row[he.face[of_quad]]], half_b[row[he.face[of_quad]]])
         stiffness += np.bincount(he.edge[of_quad], share, minlength=len(edges))
         diagonal, _ = unfold_quad_diagonals(vertices, surface.faces)
+        creased, _ = quad_creases(vertices, surface.faces)
+        for k in (0, 1):
+            # A crease is straight itself.
+            along = corner[creased == k][:, [k, k + 2]]
+            diagonal[creased == k, k] = np.linalg.norm(vertices[along[:, 1]] - vertices[along[:, 0]], axis=1)
         k = shear * (ha**2 + hb**2) / (2.0 * ha * hb)
         ends += [corner[:, [0, 2]], corner[:, [1, 3]]]
         rest += [diagonal[:, 0], diagonal[:, 1]]
@@ -231,21 +241,59 @@ def _shortened(
     return replace(springs, rest_length=springs.rest_length / np.where(worn > 0.0, worn, 1.0))
 
 
-def _with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
-    """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
+def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> NDArray[np.int64]:
+    """3 #C, the spring along each cell's edges 0-1, 1-2, 2-0."""
     size = np.int64(springs.ends.max()) + 1
     keys = np.sort(springs.ends, axis=1).astype(np.int64) @ np.array([size, 1])
     order = np.argsort(keys)
     sides = np.sort(np.stack([cells.corner, np.roll(cells.corner, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
-    spring = order[np.searchsorted(keys[order], (sides @ np.array([size, 1])).ravel())]
-    stiffness = np.bincount(spring, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
+    return np.asarray(order[np.searchsorted(keys[order], (sides @ np.array([size, 1])).ravel())])
+
+
+def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
+    """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
+    side = springs_of_sides(springs, cells)
+    stiffness = np.bincount(side, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
     return replace(springs, stiffness=stiffness, clamped_cells=0)
+
+
+def stiffness_around(ends: IntArray, stiffness: FloatArray, count: int) -> FloatArray:
+    """#V, the sum of the k_ij around each vertex, and a half of the stiffest [N/m]; of springs `ends` (#S by 2)."""
+    at, twice = ends.T.ravel(), np.tile(stiffness, 2)
+    stiffest = np.zeros(count)
+    np.maximum.at(stiffest, at, twice)
+    return np.asarray(np.bincount(at, twice, minlength=count) + _PAIR_SHARE * stiffest)
 
 
 def vertex_masses(cells: CellArrays, fabric: Fabric, vertex_count: int) -> FloatArray:
     """#V [kg], a third of each cell's share of the cloth at each of its corners."""
     share = np.repeat(fabric.areal_density * cells.area / 3.0, 3)
     return np.bincount(cells.corner.ravel(), share, minlength=vertex_count).astype(np.float64)
+
+
+def shear_hold(
+    surface: Surface, springs: SpringArrays, cells: CellArrays, positions: FloatArray, warp: FloatArray
+) -> float:
+    """Shear stiffness [N/m] that the springs between triangles really have against warp and weft.
+
+    They shear as their directions happen to lie: split squares have K(45 degrees)/4, and threads between them kink at
+    that over K, not at G/K. Taken per vertex, sum of 1/2 k L^2 cos^2 sin^2 over its share of the area, infinite beside a quad,
+    and of these the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
+
+    Args:
+        surface, springs, cells: of the piece.
+        positions: #V by 2, a layout [m].
+        warp: unit vector in the plane.
+    """
+    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
+    along, across = d @ warp, d @ np.array([warp[1], -warp[0]])
+    length2 = np.maximum(along**2 + across**2, np.finfo(np.float64).tiny)
+    half = 0.5 * springs.stiffness * springs.rest_length**2 * (along * across / length2) ** 2
+    count = len(surface.vertices)
+    held = np.bincount(springs.ends[:, 0], half, count) + np.bincount(springs.ends[:, 1], half, count)
+    hold = held / np.bincount(cells.corner.ravel(), np.repeat(cells.area / 3.0, 3), count)
+    hold[surface.faces[surface.is_quad].ravel()] = np.inf
+    return float(np.sort(hold)[count // 4])
 
 
 @dataclass(kw_only=True)
@@ -258,6 +306,7 @@ class SpringNetwork:
         model: "springs", with their guard, or "membrane".
         stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
         held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
+        shear_hold: shear stiffness of the springs that keeps threads straight [N/m]; the fabric's where that is less.
         springs, cells, guard, cloth: what the kernels take.
         mass: #V [kg]. spring_stiffness: #V, sum of k_ij around each vertex, and a half of the stiffest [N/m].
         device: Warp device.
@@ -272,6 +321,7 @@ class SpringNetwork:
     model: Model = "springs"
     stretch: FloatArray | None = None
     held: FloatArray | None = None
+    shear_hold: float = np.inf
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
     guard: ThreadGuard = field(init=False)
@@ -311,13 +361,15 @@ class SpringNetwork:
         springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), cells_of(surface)
         if stretch is not None:
             springs = _shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
-        held = None
-        if model == "membrane":
+        held, hold = None, np.inf
+        if model == "springs":
+            hold = shear_hold(surface, springs, cells, positions, grain_axes(grain_angle)[0])
+        else:
             meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
             weights, held = step_matrix(
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, meant
             )
-            springs = _with_stiffness(springs, cells, weights)
+            springs = with_stiffness(springs, cells, weights)
         return cls(
             surface=surface,
             fabric=fabric,
@@ -328,6 +380,7 @@ class SpringNetwork:
             model=model,
             stretch=stretch,
             held=held,
+            shear_hold=hold,
         )
 
     def __post_init__(self) -> None:
@@ -344,10 +397,8 @@ class SpringNetwork:
         springs.stiffness = wp.array(s.stiffness[both], dtype=wp.float64, device=device)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
-        sums = np.bincount(here, np.tile(s.stiffness, 2), minlength=count)
-        stiffest = np.zeros(count)
-        np.maximum.at(stiffest, here, np.tile(s.stiffness, 2))
-        self.spring_stiffness = wp.array(sums + _PAIR_SHARE * stiffest, dtype=wp.float64, device=device)
+        around = stiffness_around(s.ends, s.stiffness, count)
+        self.spring_stiffness = wp.array(around, dtype=wp.float64, device=device)
         self.mass = wp.array(vertex_masses(c, self.fabric, count), dtype=wp.float64, device=device)
 
         slot, cell_offset = _by_vertex(c.corner.ravel(), np.zeros(c.corner.size, dtype=np.int32), count)
@@ -370,8 +421,8 @@ class SpringNetwork:
         guard = ThreadGuard()
         guard.warp, guard.weft = wp.vec2d(*warp), wp.vec2d(*weft)
         guard.stiffness_warp, guard.stiffness_weft = fabric.stiffness_warp, fabric.stiffness_weft
-        guard.onset_warp = fabric.shear_stiffness / fabric.stiffness_warp
-        guard.onset_weft = fabric.shear_stiffness / fabric.stiffness_weft
+        hold = min(fabric.shear_stiffness, self.shear_hold)
+        guard.onset_warp, guard.onset_weft = hold / fabric.stiffness_warp, hold / fabric.stiffness_weft
         self.guard = guard
         if self.held is not None:
             # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
@@ -399,23 +450,40 @@ class SpringNetwork:
         """#P, pairs of edges that are sewn together."""
         return 0 if self.seams is None else len(self.seams.ends)
 
-    def sew(self, ends: IntArray, ratio: FloatArray, stiffness: FloatArray) -> None:
-        """Sew pairs of edges together.
+    def sew(
+        self,
+        ends: IntArray,
+        ratio: FloatArray,
+        stiffness: FloatArray,
+        *,
+        kind: IntArray | None = None,
+        target: FloatArray | None = None,
+        lever: FloatArray | None = None,
+    ) -> None:
+        """Hold lengths and places to one another (see `kernels.seams`); by default, sew pairs of edges together.
 
         Args:
             ends: #P by 4, vertices of the first edge, then of the second.
             ratio: #P, wished length of the first over the second.
             stiffness: #P [N/m].
+            kind: #P, of `kernels.seams`.
+            target: #P [m].
+            lever: #P by 4 by 2.
         """
+        count, device = len(ends), self.device
         seams = Seams()
-        seams.ends = wp.array(ends, dtype=wp.vec4i, device=self.device)
-        seams.ratio = wp.array(ratio, dtype=wp.float64, device=self.device)
-        seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=self.device)
-        seams.offset = wp.zeros(len(ends), dtype=wp.float64, device=self.device)
+        seams.ends = wp.array(ends, dtype=wp.vec4i, device=device)
+        seams.kind = wp.array(np.zeros(count, dtype=np.int32) if kind is None else kind, dtype=wp.int32, device=device)
+        seams.ratio = wp.array(ratio, dtype=wp.float64, device=device)
+        seams.target = wp.array(np.zeros(count) if target is None else target, dtype=wp.float64, device=device)
+        levers = np.zeros((4 * count, 2)) if lever is None else lever.reshape(-1, 2)
+        seams.lever = wp.array(levers, dtype=wp.vec2d, device=device)
+        seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=device)
+        seams.offset = wp.zeros(count, dtype=wp.float64, device=device)
         self.seams = seams
         slot, offset = _by_vertex(ends.ravel(), np.zeros(ends.size, dtype=np.int32), self.vertex_count)
-        self.bonds.offset = wp.array(offset, dtype=wp.int32, device=self.device)
-        self.bonds.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=self.device)
+        self.bonds.offset = wp.array(offset, dtype=wp.int32, device=device)
+        self.bonds.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=device)
 
     def guide(self, vertices: IntArray) -> None:
         """Let these vertices move up and down only, as on a fold or a straight centre front."""

@@ -21,8 +21,12 @@ from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_fo
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
 from warpflat.network import SpringNetwork
+from warpflat.tangent import TangentMatrix
 
 __all__ = ["Energies", "Outcome", "RelaxOptions", "Relaxation", "Upright", "relax"]
+
+# Steps between two looks at the stiffness that a membrane has where it is.
+_FOLLOW_EVERY = 100
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,6 +167,7 @@ class Relaxation:
         springs = self.network.spring_arrays
         # What a strain of 1e-9 everywhere stores: below it a layout counts as free of strain.
         self.negligible_energy = 0.5e-18 * float(np.sum(springs.stiffness * springs.rest_length**2))
+        self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
         self.restarts = 0
         self._record()
@@ -323,6 +328,12 @@ class Relaxation:
         self.velocity.assign(velocity)
         self._load.assign(load)
 
+    def forces(self) -> NDArray[np.float64]:
+        """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
+        self.velocity.zero_()
+        self._evaluate()
+        return self._cloth_force()
+
     def _cloth_force(self) -> NDArray[np.float64]:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
         return np.array(self.force.numpy()) - self._load.numpy()
@@ -385,6 +396,8 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
         now = state.energies()
         residual = state.residual()
         state.hold_upright()
+        if state.matrix is not None and state.steps % _FOLLOW_EVERY < chunk:
+            state.matrix.follow(state.position)
         at_rest = now.potential <= state.negligible_energy
         change = 0.0 if at_rest else abs(now.potential - before.potential) / (chunk * now.potential)
         converged = change <= options.energy_tolerance and residual <= options.residual_tolerance

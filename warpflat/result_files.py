@@ -19,8 +19,8 @@ if TYPE_CHECKING:
 __all__ = ["metrics_of", "picture_piece", "write_results"]
 
 
-def metrics_of(results: Sequence[Flattening]) -> dict[str, Any]:
-    """All of `metrics.json` for pieces of different names."""
+def metrics_of(results: Sequence[Flattening], more: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """All of `metrics.json` for pieces of different names, and what more there is to say of them together."""
     device = results[0].network.device
     return {
         "schema": 1,
@@ -28,11 +28,17 @@ def metrics_of(results: Sequence[Flattening]) -> dict[str, Any]:
         "warp": wp.config.version,
         "device": platform.machine() + " cpu" if device.is_cpu else str(device.name),
         "pieces": {result.surface.name: result.measures for result in results},
+        **(more or {}),
     }
 
 
 def write_results(
-    results: Sequence[Flattening], folder: str | Path, *, picture: bool = True, frames: bool = True
+    results: Sequence[Flattening],
+    folder: str | Path,
+    *,
+    picture: bool = True,
+    frames: bool = True,
+    more: Mapping[str, Any] | None = None,
 ) -> list[str]:
     """Write the files of all pieces, each atomically, and return their names.
 
@@ -41,6 +47,7 @@ def write_results(
         folder: made if need be.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
+        more: entries of `metrics.json` besides the pieces.
 
     Raises:
         InputError: the folder cannot be written.
@@ -58,7 +65,7 @@ def write_results(
         files.append("picture.png")
         write_picture(to / files[-1], [result.picture_piece() for result in results])
     files.append("metrics.json")
-    write_json(to / files[-1], metrics_of(results))
+    write_json(to / files[-1], metrics_of(results, more))
     return files
 
 

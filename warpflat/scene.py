@@ -23,12 +23,14 @@ from warpflat.relax import RelaxOptions
 from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
 from warpflat.scene_types import (
     BorderTable,
+    ConstraintTable,
     FileSurface,
     LineTable,
     MarkerTable,
     OutputTable,
     PatternTable,
     RelaxTable,
+    SeamTable,
     ShapeSurface,
     WearTable,
     kind_of_surface,
@@ -100,6 +102,8 @@ class SceneTable(Table):
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
+    seams: list[SeamTable] = Field(default_factory=list)
+    constraints: list[ConstraintTable] = Field(default_factory=list)
     datum: str | None = None
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
     model: Literal["springs", "membrane"] = "springs"
@@ -120,6 +124,10 @@ class SceneTable(Table):
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
         if self.mannequin is not None and (self.cuts or self.auto_cut):
             raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.seams and self.mannequin is None:
+            raise ValueError(
+                "seams belong to a form's pieces; both sides of a [surface]'s cuts are equally long anyway"
+            )
         if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
             raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
         return self
@@ -214,8 +222,10 @@ def run_scene(
     from warpflat.cutting import cut, separate
     from warpflat.export import FrameWriter, prepare_folder
     from warpflat.film import Film
-    from warpflat.pattern_files import pattern_options, surface_files
+    from warpflat.pattern_files import add_metrics, pattern_options, surface_files
     from warpflat.result_files import metrics_of, write_results
+    from warpflat.scene_seams import scene_constraints
+    from warpflat.sew_surface import sew_surface
 
     settings = scene.settings
     relax = scene_relax_options(scene)
@@ -245,10 +255,16 @@ def run_scene(
                     film.mark(result, plan)
                     result = cut(result, plan, relax=relax, callback=each_step)
                     film.last(result)
+            lines = {result.surface.name: result.network.surface.lines}
+            sewn = sew_surface(result, scene_constraints(settings.constraints, lines), options=relax)
+            if sewn is not None:
+                result = sewn.result
+                film.last(result)
     pieces = separate(result)
-    files = write_results(pieces, folder, picture=settings.output.picture, frames=False)
+    told = {} if sewn is None else sewn.metrics()
+    files = write_results(pieces, folder, picture=settings.output.picture, frames=False, more=told)
     if settings.wear is not None and settings.output.picture:
-        from warpflat.wear_report import write_wear_picture
+        from warpflat.wear_picture import write_wear_picture
 
         for piece in pieces:
             files.append(f"{piece.surface.name}.wear.png")
@@ -257,7 +273,8 @@ def run_scene(
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing)
     notes = (*result.notes, *story.notes, *pattern.notes)
-    return SceneResult(metrics=metrics_of(pieces), files=(*files, *pattern.files), notes=notes)
+    metrics = add_metrics(folder, pattern, metrics_of(pieces, told))
+    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 
 def _flatten(
@@ -348,12 +365,14 @@ def scene_surface(scene: Scene) -> Surface:
     for name, line in scene.settings.lines.items():
         with told_by(f"{scene.where}: lines.{name}"):
             surface = with_lines(surface, {name: _line(surface, line)})
-    datum = scene.settings.datum
-    if datum is not None and datum not in surface.lines:
-        with told_by(f"{scene.where}: datum"):
-            if datum not in SIDES:
-                raise InputError(f"unknown line {datum!r}; {nearest(datum, {*surface.lines, *SIDES})}")
-            surface = with_lines(surface, {datum: line_on_border(surface, datum)})
+    wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
+    wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
+    for key, name in wanted.items():
+        if name not in surface.lines:
+            with told_by(f"{scene.where}: {key}"):
+                if name not in SIDES:
+                    raise InputError(f"unknown line {name!r}; {nearest(name, {*surface.lines, *SIDES})}")
+                surface = with_lines(surface, {name: line_on_border(surface, name)})
     return surface
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.pattern.from_garment import plan_form
-from warpflat.pattern_files import garment_files, pattern_options
+from warpflat.pattern_files import add_metrics, garment_files, pattern_options
 from warpflat.scene import (
     FrameSchedule,
     Scene,
@@ -23,6 +24,8 @@ from warpflat.scene import (
     scene_wear,
     told_by,
 )
+from warpflat.scene_seams import scene_constraints, scene_wishes
+from warpflat.seam_wishes import wished_seams
 
 __all__ = ["run_garment", "scene_form"]
 
@@ -65,6 +68,15 @@ def run_garment(
     with told_by(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
         plan_form(form, drawing.rules)
+    wishes = scene_wishes(settings.seams)
+    with told_by(f"{scene.where}: seams"):
+        drawing = replace(drawing, rules=replace(drawing.rules, ease=wished_seams(form, wishes).ease))
+    with told_by(scene.where):
+        constraints = scene_constraints(
+            settings.constraints,
+            {name: piece.surface.lines for name, piece in form.pieces.items()},
+            {name: piece.fold for name, piece in form.pieces.items() if piece.fold},
+        )
     others = _other_sizes(scene)
     schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
     wanted = next(iter(schedules.values())).wanted
@@ -97,6 +109,8 @@ def run_garment(
                 relax=relax,
                 callback=each_step,
                 device=device or settings.device,
+                wishes=wishes,
+                constraints=constraints,
             )
 
         with told_by(scene.where):
@@ -106,6 +120,11 @@ def run_garment(
         if writer is not None:
             _last_frames(writer, garment)
     files = garment.save(out, picture=settings.output.picture)
+    if settings.wear is not None and settings.output.picture:
+        from warpflat.wear_picture import write_wear_sheet
+
+        files.append("wear.png")
+        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
     if wanted:
         files.append("frames.usdc")
     own = settings.mannequin.size if settings.mannequin is not None else None
@@ -124,7 +143,9 @@ def run_garment(
         if not piece.converged
     ]
     return SceneResult(
-        metrics=garment.metrics(), files=(*files, *pattern.files), notes=(*garment.notes, *odd, *pattern.notes)
+        metrics=add_metrics(out, pattern, garment.metrics()),
+        files=(*files, *pattern.files),
+        notes=(*garment.notes, *odd, *pattern.notes),
     )
 
 

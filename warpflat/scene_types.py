@@ -12,6 +12,7 @@ from warpflat.toml_file import Table
 
 __all__ = [
     "BorderTable",
+    "ConstraintTable",
     "FileSurface",
     "LineTable",
     "MarkerTable",
@@ -21,6 +22,7 @@ __all__ = [
     "Point",
     "PointOrVertex",
     "RelaxTable",
+    "SeamTable",
     "ShapeSurface",
     "Vertex",
     "kind_of_surface",
@@ -114,6 +116,52 @@ class LineTable(Table):
         ways = [self.vertices, self.from_, self.plane, self.border, self.curve]
         if sum(way is not None for way in ways) != 1:
             raise ValueError("give the line in one way: vertices, from and to, plane, border, or curve")
+        return self
+
+
+class SeamTable(Table):
+    """That one side of a seam of a form is longer than the other, by the seam's name in the pattern.
+
+    `ease` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
+    piece. `longer` names the piece (or "piece.edge") that is longer; the seam's second side if not given.
+    """
+
+    name: str = Field(min_length=1)
+    ease: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    gather: Annotated[float, Field(ge=1, le=5)] | None = None
+    longer: str | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamTable:
+        if (self.ease is None) == (self.gather is None):
+            raise ValueError("give either ease = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
+        return self
+
+
+class ConstraintTable(Table):
+    """What is asked of an edge or a feature line, in one piece or in all that have it.
+
+    `straight` lays it on a straight line: of any direction ("free"), parallel to the grain ("warp") or at right angles to it
+    ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length.
+    `symmetric` makes the piece, cut whole, its own mirror image about the line.
+    """
+
+    line: str = Field(min_length=1)
+    piece: str | None = None
+    straight: Literal["free", "warp", "weft"] | None = None
+    length_mm: (
+        Annotated[
+            Annotated[Literal["body"], Tag("word")] | Annotated[float, Field(ge=1, le=20_000), Tag("number")],
+            Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+        ]
+        | None
+    ) = None
+    symmetric: bool = False
+
+    @model_validator(mode="after")
+    def _something(self) -> ConstraintTable:
+        if self.straight is None and self.length_mm is None and not self.symmetric:
+            raise ValueError('ask for something: straight = "free", length_mm = "body", or symmetric = true')
         return self
 
 

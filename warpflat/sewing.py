@@ -1,9 +1,13 @@
 """Sewing: all pieces of a garment are relaxed together, so that both sides of every seam become equally long.
 
-Each edge of a seam has its partner on the other side, the same edge of the body: 1/2 k (l_1 - r l_2 + o)^2 with r the
-wished ratio (1, or with ease). The stiffness is finite, so that the steps stay cheap; the offset o grows by what is
-still amiss after each round (augmented Lagrangian), until the lengths agree. The minimum is that of the pieces' own
-energy under the constraint, and what it costs, in joules, is reported.
+Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0 with r the wished ratio
+(1, or with ease). Constraints on borders and lines (`warpflat.constraints`) are equations of the same kind. All are held by
+1/2 k (c + o)^2 with a finite stiffness, so that the steps stay cheap; the offset o grows by what is still amiss after each
+round (augmented Lagrangian), until nothing is. The minimum is that of the pieces' own energy under the constraints.
+
+**Prices.** What each seam and each constraint costs, in joules: half the work of its forces on the way from where the pieces
+lay on their own, 1/2 sum k (c + o) c_alone. Were the energy quadratic and the equations linear, these would add up to the
+energy that the constraints together have cost; `Sewn.price` is that energy itself.
 """
 
 from __future__ import annotations
@@ -17,25 +21,27 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.constraints import Constraint, constraint_ties, piece_of
 from warpflat.errors import InputError
-from warpflat.flattening import Flattening, Stage
+from warpflat.flattening import Flattening
 from warpflat.kernels.seams import compute_seam_misses
 from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
-from warpflat.strain import signed_cell_areas, worn_strain
-from warpflat.surface.mesh import Surface
+from warpflat.relax import Outcome, Relaxation, RelaxOptions, relax
+from warpflat.strain import signed_cell_areas
+from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties
+from warpflat.together import Together
 
-__all__ = ["SeamPair", "Sewn", "sew"]
+__all__ = ["Held", "SeamPair", "Sewn", "sew"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# Of a seam's springs over the stiffest structural springs of its edges, the rounds it is given, and what may be amiss [m].
+# Of a tie's spring over the median spring of the cloth; the same of those that only keep lines smooth; the rounds that
+# the ties are given.
 _STIFFNESS = 4.0
-_ROUNDS = 30
-_EDGE_TOLERANCE = 2e-5
-_SEAM_TOLERANCE = 1e-4
-# While seams do not agree yet, the pieces need not come to rest as well as at the end.
+_SOFT = 0.3
+_ROUNDS = 60
+# While the ties do not agree yet, the pieces need not come to rest as well as at the end.
 _COARSE = 10.0
 
 
@@ -57,15 +63,36 @@ class SeamPair:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Held:
+    """A seam or a constraint, as it came out.
+
+    Attributes:
+        name: the seam's or the constraint's; "PIECE fold" of a fold.
+        kind: "seam", "fold", "straight", "length" or "symmetric".
+        price: half the work of its forces: what it costs [J].
+        amiss: largest miss of a seam's two lengths, of a line's whole length, of a place [m].
+    """
+
+    name: str
+    kind: str
+    price: float
+    amiss: float
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `metrics.json`."""
+        return {"name": self.name, "kind": self.kind, "price_j": self.price, "amiss_mm": 1e3 * self.amiss}
+
+
+@dataclass(frozen=True, kw_only=True)
 class Sewn:
     """What sewing gave.
 
     Attributes:
         pieces: by name, relaxed together.
-        converged: whether all came to rest with the seams' sides equal.
+        converged: whether all came to rest with the seams' sides equal and the constraints kept.
         steps: approximate implicit steps over all pieces.
         energy_before, energy_after: of all pieces, springs and guard [J].
-        largest_difference: of a seam's two sides [m], ease taken out.
+        held: every seam, fold and constraint with its price, in the order in which they were given.
         seconds: wall clock.
     """
 
@@ -74,7 +101,7 @@ class Sewn:
     steps: int
     energy_before: float
     energy_after: float
-    largest_difference: float
+    held: tuple[Held, ...]
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
@@ -91,55 +118,94 @@ class Sewn:
 
     @property
     def price(self) -> float:
-        """What equal seams cost [J]."""
+        """What all seams, folds and constraints cost together [J]."""
         return self.energy_after - self.energy_before
+
+    @property
+    def largest_difference(self) -> float:
+        """Of a seam's two sides [m], ease taken out."""
+        return max((held.amiss for held in self.held if held.kind == "seam"), default=0.0)
+
+    @property
+    def constraints(self) -> tuple[Held, ...]:
+        """What is held besides seams."""
+        return tuple(held for held in self.held if held.kind != "seam")
 
 
 def sew(
     pieces: Mapping[str, Flattening],
-    seams: Sequence[SeamPair],
+    seams: Sequence[SeamPair] = (),
     *,
-    straight: Mapping[str, IntArray] | None = None,
+    constraints: Sequence[Constraint] = (),
+    folds: Mapping[str, IntArray] | None = None,
     options: RelaxOptions | None = None,
 ) -> Sewn:
-    """Relax pieces together under their seams.
+    """Relax pieces together under their seams and constraints.
 
     Args:
         pieces: relaxed one by one, of one fabric.
         seams: what is sewn to what.
-        straight: by piece, vertices that must lie on one line along the grain, as on a fold or a straight centre front.
+        constraints: on borders and lines.
+        folds: by piece, vertices that must lie on one upright line, exactly.
         options: of the relaxation.
 
     Raises:
-        InputError: a piece cannot be laid with its fold straight.
+        InputError: a constraint names what there is not, or a piece cannot be laid with its fold straight.
     """
     begun = time.perf_counter()
     options = options or RelaxOptions()
-    union = _Union(pieces)
-    straight = straight or {}
-    guided = union.numbers(straight)
-    start = np.concatenate([_straightened(piece, straight.get(name)) for name, piece in pieces.items()])
-    first = next(iter(pieces.values()))
-    stretches = [piece.network.stretch for piece in pieces.values()]
-    network = SpringNetwork.build(
-        union.surface,
-        first.fabric,
-        start,
-        grain_angle=first.grain_angle,
-        device=first.network.device,
-        model=first.network.model,
-        stretch=np.concatenate([s for s in stretches if s is not None]) if stretches[0] is not None else None,
+    whole = Together(pieces)
+    folds = folds or {}
+    alone = np.concatenate([piece.positions for piece in pieces.values()])
+    ties, kinds, laid = _ties(whole, alone, seams, constraints)
+    start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
+    network = whole.network(start)
+    if folds:
+        network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
+    if len(ties):
+        hold = np.where(ties.soft, _SOFT, _STIFFNESS) * float(np.median(network.spring_arrays.stiffness))
+        network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
+    # A piece with a guided line needs no other hold: the line cannot turn.
+    upright = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
+    state = Relaxation(network, options, start=start, upright=upright)
+    outcome, misses, kept = _relax_in_rounds(state, ties, options)
+    seconds = time.perf_counter() - begun
+    converged = outcome.converged and kept
+    sewn = whole.split(state, converged=converged, seconds=seconds, residual=outcome.residual)
+    return Sewn(
+        pieces=sewn,
+        converged=converged,
+        steps=state.steps,
+        energy_before=sum(_energy(piece.network, piece.positions) for piece in pieces.values()),
+        energy_after=sum(_energy(piece.network, piece.positions) for piece in sewn.values()),
+        held=(*_held(state, ties, kinds, misses, alone), *_held_folds(state, whole, folds, alone)),
+        seconds=seconds,
     )
-    ends, ratio, seam_of = union.pairs(seams)
-    if guided:
-        network.guide(np.concatenate(guided))
-    if len(ends):
-        network.sew(ends, ratio, np.full(len(ends), _STIFFNESS * float(np.median(network.spring_arrays.stiffness))))
-    state = Relaxation(
-        network, options, start=start, upright=[u for name, u in union.upright.items() if name not in straight]
-    )
-    before = sum(_energy(piece.network, piece.positions) for piece in pieces.values())
-    converged, difference, coarse = False, np.inf, bool(len(ends))
+
+
+def _ties(
+    whole: Together, alone: FloatArray, seams: Sequence[SeamPair], constraints: Sequence[Constraint]
+) -> tuple[Ties, list[tuple[str, str]], set[str]]:
+    """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth."""
+    ties, kinds, laid = [], [], set()
+    for seam in seams:
+        first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
+        smooth = [smooth_ties(side, alone) for side in (first, second)]
+        ties.append(one_group(seam_ties(first, second, seam.ratio), *smooth))
+        kinds.append((seam.name, "seam"))
+    for constraint in constraints:
+        own, lays = constraint_ties(constraint, piece_of(constraint, whole.pieces))
+        ties.append(replace(own, ends=whole.numbers(constraint.piece, own.ends)))
+        kinds.append((constraint.name, constraint.kind))
+        if lays:
+            laid.add(constraint.piece)
+    return join_ties(ties), kinds, laid
+
+
+def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tuple[Outcome, FloatArray, bool]:
+    """Relax, let the offsets grow, and again until the ties agree; the outcome, the misses (#P [m]), and whether they do."""
+    coarse = bool(len(ties))
+    misses, agreed = np.zeros(0), True
     for _ in range(_ROUNDS):
         looser = _COARSE if coarse else 1.0
         state.options = replace(
@@ -148,29 +214,54 @@ def sew(
             residual_tolerance=looser * options.residual_tolerance,
         )
         outcome = relax(state)
-        if not len(ends):
-            converged, difference = outcome.converged, 0.0
+        if state.network.seams is None:
             break
-        miss = _misses(network, state)
-        difference = float(np.abs(np.bincount(seam_of, miss)).max())
-        agreed = difference < _SEAM_TOLERANCE and float(np.abs(miss).max()) < _EDGE_TOLERANCE
-        converged = outcome.converged and agreed and not coarse
-        if converged or state.steps >= options.max_steps:
+        misses = _misses(state)
+        agreed = ties.agree(misses)
+        if (outcome.converged and agreed and not coarse) or state.steps >= options.max_steps:
             break
         coarse = coarse and not agreed
-        assert network.seams is not None
-        network.seams.offset.assign(network.seams.offset.numpy() + miss)
-    seconds = time.perf_counter() - begun
-    sewn = union.split(pieces, state, converged=converged, seconds=seconds, residual=outcome.residual)
-    return Sewn(
-        pieces=sewn,
-        converged=converged,
-        steps=state.steps,
-        energy_before=before,
-        energy_after=sum(_energy(piece.network, piece.positions) for piece in sewn.values()),
-        largest_difference=difference,
-        seconds=seconds,
-    )
+        offset = state.network.seams.offset
+        offset.assign(offset.numpy() + np.where(ties.soft, 0.0, misses))
+    return outcome, misses, agreed and not coarse
+
+
+def _held(
+    state: Relaxation, ties: Ties, kinds: Sequence[tuple[str, str]], misses: FloatArray, alone: FloatArray
+) -> list[Held]:
+    """Seams and constraints with their prices: half the work of each one's forces since the pieces lay alone."""
+    seams = state.network.seams
+    if seams is None:
+        return []
+    pull = seams.stiffness.numpy() * (seams.offset.numpy() + misses)
+    price = ties.sums(0.5 * pull * _misses(state, alone))
+    largest = np.zeros(len(kinds))
+    np.maximum.at(largest, ties.group, np.where(ties.soft, 0.0, np.abs(misses)))
+    summed = np.isfinite(ties.sum_tolerance)
+    amiss = np.where(summed, np.abs(ties.sums(misses)), largest)
+    return [
+        Held(name=name, kind=kind, price=float(price[number]), amiss=float(amiss[number]))
+        for number, (name, kind) in enumerate(kinds)
+    ]
+
+
+def _held_folds(state: Relaxation, whole: Together, folds: Mapping[str, IntArray], alone: FloatArray) -> list[Held]:
+    """Folds with their prices, by the forces with which the lines that hold them push."""
+    if not folds:
+        return []
+    position = state.positions()
+    freedom = state.network.bonds.freedom
+    kept = freedom.numpy().copy()
+    freedom.fill_(wp.vec2d(1.0, 1.0))
+    force = state.forces()
+    freedom.assign(kept)
+    held = []
+    for name, ids in folds.items():
+        line = whole.numbers(name, ids)
+        moved = position[line, 0] - alone[line, 0]
+        price = -0.5 * float(force[line, 0] @ (moved - moved.mean()))
+        held.append(Held(name=f"{name} fold", kind="fold", price=price, amiss=float(np.ptp(position[line, 0]))))
+    return held
 
 
 def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
@@ -193,95 +284,19 @@ def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     )
 
 
-class _Union:
-    """Several pieces as one mesh, each with its own range of vertices."""
-
-    def __init__(self, pieces: Mapping[str, Flattening]) -> None:
-        self.first: dict[str, int] = {}
-        total = 0
-        for name, piece in pieces.items():
-            self.first[name] = total
-            total += len(piece.positions)
-        self.positions = np.concatenate([piece.positions for piece in pieces.values()])
-        vertices = np.concatenate([piece.surface.vertices for piece in pieces.values()])
-        faces = np.concatenate(
-            [
-                np.where(piece.surface.faces >= 0, piece.surface.faces + self.first[name], -1)
-                for name, piece in pieces.items()
-            ]
-        ).astype(np.int32)
-        self.surface = Surface(
-            vertices=vertices,
-            faces=faces,
-            name=" + ".join(pieces),
-            input_vertices=vertices,
-            input_index=np.arange(total, dtype=np.int32),
-        )
-        # A piece with a guided line needs no other hold: the line cannot turn.
-        self.upright = {
-            name: Upright(
-                lower=int(piece.datum[0]) + self.first[name],
-                upper=int(piece.datum[-1]) + self.first[name],
-                vertices=slice(self.first[name], self.first[name] + len(piece.positions)),
-            )
-            for name, piece in pieces.items()
-        }
-
-    def numbers(self, vertices: Mapping[str, IntArray]) -> list[IntArray]:
-        return [np.asarray(ids, dtype=np.int32) + np.int32(self.first[name]) for name, ids in vertices.items()]
-
-    def pairs(self, seams: Sequence[SeamPair]) -> tuple[IntArray, FloatArray, IntArray]:
-        """#P by 4 ends, #P wished ratios, #P the seam of each pair of edges."""
-        ends, ratio, seam_of = [], [], []
-        for number, seam in enumerate(seams):
-            a, b = (np.asarray(ids) + self.first[name] for name, ids in zip(seam.pieces, seam.vertices, strict=True))
-            ends.append(np.column_stack([a[:-1], a[1:], b[:-1], b[1:]]))
-            ratio.append(np.full(len(a) - 1, seam.ratio))
-            seam_of.append(np.full(len(a) - 1, number, dtype=np.int32))
-        if not ends:
-            return np.zeros((0, 4), dtype=np.int32), np.zeros(0), np.zeros(0, dtype=np.int32)
-        return np.concatenate(ends).astype(np.int32), np.concatenate(ratio), np.concatenate(seam_of)
-
-    def split(
-        self,
-        pieces: Mapping[str, Flattening],
-        state: Relaxation,
-        *,
-        converged: bool,
-        seconds: float,
-        residual: float,
-    ) -> dict[str, Flattening]:
-        """Each piece with its share of the layout, and a stage "sew" in its history."""
-        layout, sewn = state.positions(), {}
-        for name, piece in pieces.items():
-            own = layout[self.first[name] : self.first[name] + len(piece.positions)]
-            energies = Relaxation(piece.network, state.options, start=own).energies()
-            stage = Stage(
-                name="sew",
-                spring_energy_j=energies.spring,
-                guard_energy_j=energies.guard,
-                strain_energy_j=float(worn_strain(piece.network, own).energy.sum()),
-                steps=state.steps,
-                work_units=float(state.steps),
-                seconds=seconds,
-                converged=converged,
-                residual=residual,
-            )
-            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage))
-        return sewn
-
-
 def _energy(network: SpringNetwork, positions: FloatArray) -> float:
     return Relaxation(network, RelaxOptions(), start=positions).energies().potential
 
 
-def _misses(network: SpringNetwork, state: Relaxation) -> FloatArray:
-    """#P, l_1 - r l_2 of each pair of edges [m]."""
+def _misses(state: Relaxation, positions: FloatArray | None = None) -> FloatArray:
+    """#P, c of each tie [m], in the present layout or another one."""
+    network = state.network
+    at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
     miss = wp.zeros(network.seam_count, dtype=wp.float64, device=network.device)
     wp.launch(
         compute_seam_misses,
         dim=network.seam_count,
-        inputs=[state.position, network.seams, 0],
+        inputs=[at, network.seams, 0],
         outputs=[miss],
         device=network.device,
     )

@@ -1,4 +1,4 @@
-"""Seams: forces against the energy's finite difference, viscosity against the force's change along the velocity."""
+"""Ties: forces against the energy's finite difference, viscosity against the force's change along the velocity."""
 
 from __future__ import annotations
 
@@ -6,25 +6,42 @@ import numpy as np
 import pytest
 import warp as wp
 from numpy.typing import NDArray
-from warpflat.kernels.seams import Seams, compute_seam_misses, evaluate_seams
+from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_misses, evaluate_seams
 
 POSITIONS = np.array([[0.0, 0.0], [0.11, 0.02], [0.5, 0.1], [0.52, 0.19], [0.1, 0.12]])
-ENDS = np.array([[0, 1, 2, 3], [1, 4, 2, 3]], dtype=np.int32)
-RATIO, STIFFNESS, OFFSET = np.array([1.0, 1.2]), np.array([300.0, 500.0]), np.array([0.0, 0.004])
+# Two seams, one with ease; an edge of a fixed length; a vertex on a line through two others; a mirror image; one vertex alone.
+ENDS = np.array([[0, 1, 2, 3], [1, 4, 2, 3], [2, 4, 2, 4], [4, 0, 3, 4], [1, 3, 1, 1], [2, 2, 2, 2]], dtype=np.int32)
+KIND = np.array([LENGTHS, LENGTHS, LENGTHS, STRAIGHT, LINEAR, LINEAR], dtype=np.int32)
+RATIO = np.array([1.0, 1.2, 0.0, 0.0, 0.0, 0.0])
+TARGET = np.array([0.0, 0.0, 0.37, 0.001, 0.6, 0.45])
+STIFFNESS = np.array([300.0, 500.0, 200.0, 400.0, 250.0, 350.0])
+OFFSET = np.array([0.0, 0.004, -0.001, 0.002, 0.003, -0.002])
+LEVER = np.zeros((6, 4, 2))
+LEVER[4, :2] = [0.8, 0.6]
+LEVER[5, 0] = [0.6, -0.8]
+COUNT = len(ENDS)
 
 
 def seams() -> Seams:
     made = Seams()
     made.ends = wp.array(ENDS, dtype=wp.vec4i, device="cpu")
+    made.kind = wp.array(KIND, dtype=wp.int32, device="cpu")
     made.ratio = wp.array(RATIO, dtype=wp.float64, device="cpu")
+    made.target = wp.array(TARGET, dtype=wp.float64, device="cpu")
+    made.lever = wp.array(LEVER.reshape(-1, 2), dtype=wp.vec2d, device="cpu")
     made.stiffness = wp.array(STIFFNESS, dtype=wp.float64, device="cpu")
     made.offset = wp.array(OFFSET, dtype=wp.float64, device="cpu")
     return made
 
 
 def misses(positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    lengths = [np.linalg.norm(positions[ENDS[:, k + 1]] - positions[ENDS[:, k]], axis=1) for k in (0, 2)]
-    return lengths[0] - RATIO * lengths[1]
+    x = positions[ENDS]
+    lengths = [np.linalg.norm(x[:, k + 1] - x[:, k], axis=1) for k in (0, 2)]
+    chord, away = x[:, 2] - x[:, 1], x[:, 0] - x[:, 1]
+    cross = (chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]) / np.maximum(np.linalg.norm(chord, axis=1), 1e-300)
+    linear = np.einsum("pjk,pjk->p", LEVER, x)
+    of_kind = {LENGTHS: lengths[0] - RATIO * lengths[1], STRAIGHT: cross, LINEAR: linear}
+    return np.array([of_kind[kind][p] for p, kind in enumerate(KIND.tolist())]) - TARGET
 
 
 def energy(positions: NDArray[np.float64]) -> float:
@@ -32,12 +49,12 @@ def energy(positions: NDArray[np.float64]) -> float:
 
 
 def launch(positions: NDArray[np.float64], velocities: NDArray[np.float64], time_step: float = 0.01):
-    force, viscosity = (wp.zeros(8, dtype=wp.vec2d, device="cpu") for _ in range(2))
-    stiffness = wp.zeros(8, dtype=wp.float64, device="cpu")
+    force, viscosity = (wp.zeros(4 * COUNT, dtype=wp.vec2d, device="cpu") for _ in range(2))
+    stiffness = wp.zeros(4 * COUNT, dtype=wp.float64, device="cpu")
     at, moving = (wp.array(a, dtype=wp.vec2d, device="cpu") for a in (positions, velocities))
     wp.launch(
         evaluate_seams,
-        dim=2,
+        dim=COUNT,
         inputs=[at, moving, seams(), time_step, 0],
         outputs=[force, viscosity, stiffness],
         device="cpu",
@@ -70,15 +87,19 @@ def test_viscosity_is_h_times_k_times_the_rate_of_the_miss():
     assert power == pytest.approx(-0.5 * float((STIFFNESS * rate**2).sum()), rel=1e-6)
 
 
-def test_a_piece_that_moves_as_a_whole_feels_no_viscosity():
-    _, viscosity, _ = launch(POSITIONS, np.tile([3.0, -2.0], (len(POSITIONS), 1)))
-    np.testing.assert_allclose(viscosity, 0.0, atol=1e-12)
+def test_a_layout_that_moves_as_a_whole_feels_only_what_ties_it_to_a_place():
+    _, viscosity, _ = launch(POSITIONS, np.tile([3.0, -2.0], (len(POSITIONS), 1)), time_step=0.5)
+    pulled = 0.5 * STIFFNESS[4:] * np.array([2 * (0.8 * 3.0 - 0.6 * 2.0), 0.6 * 3.0 + 0.8 * 2.0])
+    expected = np.zeros_like(POSITIONS)
+    expected[[1, 3]] = -pulled[0] * np.array([0.8, 0.6])
+    expected[2] = -pulled[1] * np.array([0.6, -0.8])
+    np.testing.assert_allclose(viscosity, expected, atol=1e-12)
 
 
 def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
     """Gauss-Newton part of the energy's second derivative, against the diagonal of the step."""
     _, _, stiffness = launch(POSITIONS, np.zeros_like(POSITIONS))
-    rows = np.zeros((2, POSITIONS.size))
+    rows = np.zeros((COUNT, POSITIONS.size))
     for k in range(POSITIONS.size):
         moved = [POSITIONS.copy().ravel(), POSITIONS.copy().ravel()]
         moved[0][k] += 1e-7
@@ -89,10 +110,10 @@ def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
 
 
 def test_misses_and_edges_of_no_length():
-    found = wp.zeros(2, dtype=wp.float64, device="cpu")
+    found = wp.zeros(COUNT, dtype=wp.float64, device="cpu")
     wp.launch(
         compute_seam_misses,
-        dim=2,
+        dim=COUNT,
         inputs=[wp.array(POSITIONS, dtype=wp.vec2d, device="cpu"), seams(), 0],
         outputs=[found],
         device="cpu",

@@ -1,0 +1,115 @@
+"""Bent quads laid flat: along which diagonal they are creased, and what they unfold into."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpflat.fabric import find_fabric
+from warpflat.network import cells_of, springs_of
+from warpflat.shapes import make_shape
+from warpflat.surface import make_surface
+from warpflat.surface.unfold import lay_quads_flat, quad_creases
+
+FloatArray = NDArray[np.float64]
+
+
+def tilted_tube(angle: float, *, skew: float = 0.0) -> tuple[FloatArray, FloatArray, NDArray[np.int32]]:
+    """A grid of rectangles in the plane, turned and rolled up about x = const; points in the plane, on the tube, faces."""
+    x, y = np.meshgrid(0.01 * np.arange(12.0), 0.012 * np.arange(12.0))
+    flat = np.stack([x + skew * y, y], axis=-1).reshape(-1, 2)
+    c, s = np.cos(angle), np.sin(angle)
+    turned = flat @ np.array([[c, s], [-s, c]])
+    r = 0.05
+    body = np.column_stack([r * np.sin(turned[:, 0] / r), turned[:, 1], r * np.cos(turned[:, 0] / r)])
+    index = np.arange(144).reshape(12, 12)
+    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    return flat, body, faces.astype(np.int32)
+
+
+@pytest.mark.parametrize("turned_over", [False, True])
+def test_on_a_tube_the_ruling_is_the_crease(turned_over: bool):
+    ruling = np.arctan2(0.01, 0.012)
+    flat, body, faces = tilted_tube(-ruling if turned_over else ruling)
+    crease, face = quad_creases(body, faces)
+    np.testing.assert_array_equal(face, np.arange(len(faces)))
+    along = (0, 2) if crease[0] == 0 else (1, 3)
+    d = body[faces[0][along[1]]] - body[faces[0][along[0]]]
+    assert abs(d[1]) == pytest.approx(np.linalg.norm(d), rel=1e-9)
+    assert (crease == crease[0]).all()
+    # Sides across the tube are chords; with those, every quad unfolds into the same one, and no more is missing than chords do.
+    laid, _, _ = lay_quads_flat(body, faces)
+    np.testing.assert_allclose(laid, np.broadcast_to(laid[:1], laid.shape), atol=1e-12)
+    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)):
+        in_plane = np.linalg.norm(flat[faces[:, a]] - flat[faces[:, b]], axis=1)
+        np.testing.assert_allclose(np.linalg.norm(laid[:, a] - laid[:, b], axis=1), in_plane, rtol=1e-2)
+
+
+def test_creased_quads_keep_their_sides_and_cells_and_springs_agree():
+    _, body, faces = tilted_tube(0.6, skew=0.3)
+    surface = make_surface(body, faces)
+    laid, face, _ = lay_quads_flat(surface.vertices, surface.faces)
+    assert len(face) == len(faces)
+    corner = surface.faces[face]
+    for a in range(4):
+        b = (a + 1) % 4
+        space = np.linalg.norm(surface.vertices[corner[:, a]] - surface.vertices[corner[:, b]], axis=1)
+        np.testing.assert_allclose(np.linalg.norm(laid[:, a] - laid[:, b], axis=1), space, rtol=1e-12)
+    shoelace = 0.5 * np.linalg.det(np.stack([laid[:, 2] - laid[:, 0], laid[:, 3] - laid[:, 1]], axis=1))
+    assert (shoelace > 0.0).all()
+    springs = springs_of(surface, find_fabric("woven"), surface.vertices[:, :2])
+    diagonals = springs.rest_length[springs.edge_count :].reshape(2, -1)
+    for k in (0, 1):
+        np.testing.assert_allclose(diagonals[k], np.linalg.norm(laid[:, k] - laid[:, k + 2], axis=1), rtol=1e-12)
+    # The four cells of a quad at half weight are the quad.
+    area = np.bincount(cells_of(surface).face, cells_of(surface).area)
+    np.testing.assert_allclose(area, shoelace, rtol=1e-12)
+
+
+def test_a_lone_quad_is_creased_along_its_longer_diagonal_and_unfolds_into_what_it_was():
+    for angle in (0.3, 1.0, 1.5, -1.0):
+        for roll in range(4):
+            vertices = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], dtype=float)
+            middle, out = np.array([0.5, 0.5, 0]), np.array([-0.5, 0.5, 0])
+            # Fold corner 3 up about the diagonal 0-2.
+            vertices[3] = middle + out * np.cos(angle) + np.linalg.norm(out) * np.array([0, 0, np.sin(angle)])
+            faces = np.roll([[0, 1, 2, 3]], roll, axis=1).astype(np.int32)
+            laid, _, crease = lay_quads_flat(vertices, faces)
+            assert crease.tolist() == [roll % 2]
+            sides = np.linalg.norm(np.roll(laid[0], -1, axis=0) - laid[0], axis=1)
+            np.testing.assert_allclose(sides, 1.0, rtol=1e-14)
+            np.testing.assert_allclose(
+                np.linalg.norm(laid[0, [0, 1]] - laid[0, [2, 3]], axis=1), np.sqrt(2), rtol=1e-14
+            )
+
+
+def test_flat_twisted_and_reflex_quads_have_no_crease():
+    assert (
+        quad_creases(make_shape("cylinder", resolution=9).vertices, make_shape("cylinder", resolution=9).faces)[0] < 0
+    ).all()
+    saddle = make_shape("saddle", resolution=17)
+    middle = (np.abs(saddle.vertices[saddle.faces].mean(axis=1)[:, :2]) < 0.05).all(axis=1)
+    crease, face = quad_creases(saddle.vertices, saddle.faces)
+    assert middle.sum() > 4
+    assert (crease[np.isin(face, np.flatnonzero(middle))] < 0).all()
+    # Of a sphere every direction is as curved, however long the diagonals of a quad are.
+    dome = make_shape("hemisphere", resolution=17)
+    assert (quad_creases(dome.vertices, dome.faces)[0] < 0).mean() > 0.9
+    reflex = np.array([[0, 0, 0], [1, 0, 0], [0.2, 0.2, 0.05], [0, 1, 0]], dtype=float)
+    assert quad_creases(reflex, np.array([[0, 1, 2, 3]], dtype=np.int32))[0].tolist() == [-1]
+    triangle = np.array([[0, 1, 2, -1]], dtype=np.int32)
+    assert len(lay_quads_flat(reflex, triangle)[0]) == 0
+
+
+def test_a_cut_changes_no_crease():
+    """Its two sides lie at the same place in space."""
+    _, body, faces = tilted_tube(0.5)
+    before, _ = quad_creases(body, faces)
+    assert (before >= 0).all()
+    cut = faces.copy()
+    right = np.arange(len(faces)) % 11 >= 5
+    line = 5 + 12 * np.arange(12)
+    cut[right] = np.where(np.isin(faces[right], line), 144 + faces[right] // 12, faces[right])
+    after, _ = quad_creases(np.concatenate([body, body[line]]), cut)
+    np.testing.assert_array_equal(after, before)

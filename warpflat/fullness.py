@@ -1,0 +1,183 @@
+"""Fullness: more cloth than the body needs along an edge, to be eased or gathered into a shorter one.
+
+The longer side of such a seam must not be stretched to its length, nor the shorter one pressed: the piece is *meant* to be
+wider there. Its springs and cells are at rest at the body's lengths times a fullness s that is stated along the edge and
+fades into the piece (harmonically, log s being linear): near the edge only for ease; for gathers down to the next edge that
+is sewn plainly across the fullness, or through the whole piece if there is none, as in a gathered skirt. What a pattern
+maker does by slashing and spreading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.flattening import Flattening, Stage
+from warpflat.membrane import step_matrix
+from warpflat.network import CellArrays, SpringArrays, SpringNetwork, grain_axes, with_stiffness
+from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.strain import worn_strain
+from warpflat.surface.topology import border_loops, mesh_edges
+
+__all__ = ["FullEdge", "fullness_of", "give_fullness"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FullEdge:
+    """An edge with more cloth than the body needs.
+
+    Attributes:
+        vertices: of the piece, along the edge.
+        factor: length of the edge over its length on the body.
+        gathered: the fullness runs on into the piece, along warp or weft, whichever is nearer to the edge's direction;
+            otherwise it is eased in near the edge, alike in all directions.
+    """
+
+    vertices: IntArray
+    factor: float
+    gathered: bool
+
+
+def give_fullness(
+    piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray], *, options: RelaxOptions | None = None
+) -> Flattening:
+    """The piece with fullness along some edges, relaxed again on its own.
+
+    Args:
+        piece: flattened, uncut.
+        edges: which edges, and how much.
+        plain: vertices along each of its edges that are sewn without fullness.
+        options: of the relaxation.
+    """
+    options = options or RelaxOptions()
+    full = fullness_of(piece, edges, plain)
+    network = _widened(piece.network, piece.positions, full)
+    warp, weft = grain_axes(piece.grain_angle)
+    mean = full.mean(axis=0)
+    spread = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
+    upright = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    state = Relaxation(network, options, start=piece.positions @ spread, upright=[upright])
+    outcome = relax(state)
+    positions = state.positions()
+    stage = Stage(
+        name="fullness",
+        spring_energy_j=outcome.energies.spring,
+        guard_energy_j=outcome.energies.guard,
+        strain_energy_j=float(worn_strain(network, positions).energy.sum()),
+        steps=outcome.steps,
+        work_units=float(outcome.steps),
+        seconds=outcome.seconds,
+        converged=outcome.converged,
+        residual=outcome.residual,
+    )
+    most = max(edge.factor for edge in edges)
+    note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
+    return replace(
+        piece, network=network, positions=positions, stages=(*piece.stages, stage), notes=(*piece.notes, note)
+    )
+
+
+def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
+    """#V by 2, how much longer than on the body the cloth is meant to be along warp and weft."""
+    positions, faces = piece.positions, piece.faces
+    axes = grain_axes(piece.grain_angle)
+    log_full = np.zeros((len(positions), 2))
+    for axis in (0, 1):
+        along = [edge for edge in edges if edge.gathered and _runs_along(positions, edge.vertices, axes) == axis]
+        if along:
+            stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
+            logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
+            log_full[:, axis] += _faded(faces, logs, stops, len(positions))
+    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap, and all of what is eased in; and
+    # what a slanting side has got too much.
+    wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
+    lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
+    log_full += _faded(faces, lacks, border_loops(faces), len(positions))[:, None]
+    return np.asarray(np.exp(log_full))
+
+
+def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, FloatArray]) -> int:
+    """0 where the line's chord is nearer to the warp, 1 where to the weft."""
+    chord = positions[line[-1]] - positions[line[0]]
+    return int(abs(float(chord @ axes[1])) > abs(float(chord @ axes[0])))
+
+
+def _lack(
+    edge: IntArray, factor: float, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> FloatArray:
+    """At each vertex of an edge, log of what is still wanting of its factor."""
+    step = np.diff(positions[edge], axis=0)
+    along = np.stack([step @ axes[0], step @ axes[1]], axis=1)
+    here = 0.5 * (full[edge[1:]] + full[edge[:-1]])
+    length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
+    lack = np.log(factor * length / np.linalg.norm(along * here, axis=1))
+    return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
+
+
+def _faded(
+    faces: IntArray, logs: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
+) -> FloatArray:
+    """#V, the values given at vertices, 0 at `stops` besides, and harmonic in between."""
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import spsolve
+
+    value, known = np.zeros(count), np.zeros(count, dtype=bool)
+    for stop in stops:
+        known[stop] = True
+    for vertices, given in logs:
+        value[vertices], known[vertices] = given, True
+    free = np.flatnonzero(~known)
+    if len(free):
+        ends = mesh_edges(faces)
+        ones = np.ones(2 * len(ends))
+        rows, columns = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
+        joined = coo_matrix((ones, (rows, columns)), shape=(count, count)).tocsr()
+        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
+        value[free] = spsolve(laplacian[free][:, free].tocsc(), joined[free] @ value)
+    return value
+
+
+def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
+    axes = grain_axes(network.grain_angle)
+    springs = _wider_springs(network.spring_arrays, positions, axes, full)
+    cells = _wider_cells(network.cell_arrays, positions, axes, full)
+    if network.model == "springs":
+        return replace(network, spring_arrays=springs, cell_arrays=cells)
+    stretch = network.stretch
+    meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
+    weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, positions, meant)
+    return replace(network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held=held)
+
+
+def _wider_springs(
+    springs: SpringArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> SpringArrays:
+    """Longer springs, of the stiffness that cells of the new sides have: K b/a of a structural spring, G (a2 + b2)/2ab of a
+    diagonal, for a cell a by b."""
+    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
+    here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
+    before = np.stack([d @ axes[0], d @ axes[1]], axis=1)
+    length = np.maximum(np.linalg.norm(before, axis=1), np.finfo(np.float64).tiny)
+    longer = np.linalg.norm(before * here, axis=1) / length
+    wider = np.linalg.norm(before[:, ::-1] * here, axis=1) / length
+    diagonal = np.arange(len(springs.ends)) >= springs.edge_count
+    factor = np.where(diagonal, longer**2 / (here[:, 0] * here[:, 1]), wider / longer)
+    return replace(springs, rest_length=springs.rest_length * longer, stiffness=springs.stiffness * factor)
+
+
+def _wider_cells(
+    cells: CellArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> CellArrays:
+    """Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S."""
+    here = full[cells.corner].mean(axis=1)
+    widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
+    p = positions[cells.corner]
+    flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+    edges = cells.edges @ np.linalg.solve(flat, widen @ flat)
+    return replace(cells, edges=edges, area=cells.area * here[:, 0] * here[:, 1])

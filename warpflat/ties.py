@@ -1,0 +1,184 @@
+"""Ties: seams and constraints as equations on vertices, in the arrays that `kernels.seams` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
+
+__all__ = [
+    "Ties",
+    "join_ties",
+    "length_ties",
+    "level_ties",
+    "mirror_ties",
+    "one_group",
+    "seam_ties",
+    "smooth_ties",
+    "straight_ties",
+]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+# What may be amiss of an edge's length, and of the sum along a line [m].
+_EDGE_TOLERANCE = 2e-5
+_SUM_TOLERANCE = 1e-4
+# How far a vertex may lie from its line or from its mirror image [m].
+_PLACE_TOLERANCE = 5e-5
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ties:
+    """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.seams` for the first five).
+
+    Attributes:
+        ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.
+        tolerance: #P, by how much c may miss zero [m].
+        soft: #P, true for ties that are no equations, only springs: what they miss is neither made good nor counted.
+        group: #P, the seam or constraint that a tie belongs to.
+        sum_tolerance: #groups, by how much the sum of its c may miss zero [m]; infinite where sums mean nothing.
+    """
+
+    ends: IntArray
+    kind: IntArray
+    ratio: FloatArray
+    target: FloatArray
+    lever: FloatArray
+    tolerance: FloatArray
+    soft: NDArray[np.bool_]
+    group: IntArray
+    sum_tolerance: FloatArray = field(default_factory=lambda: np.array([np.inf]))
+
+    def __len__(self) -> int:
+        """#P."""
+        return len(self.ends)
+
+    def sums(self, misses: FloatArray) -> FloatArray:
+        """#groups, the sum of the misses (#P) of each."""
+        counted = np.where(self.soft, 0.0, misses)
+        return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
+
+    def agree(self, misses: FloatArray) -> bool:
+        """Whether no tie and no sum is amiss by more than its tolerance."""
+        sums = np.abs(self.sums(misses))
+        return bool((np.abs(misses) <= self.tolerance).all() and (sums <= self.sum_tolerance).all())
+
+
+def one_group(*ties: Ties) -> Ties:
+    """Ties of one seam or constraint."""
+    joined = join_ties(ties)
+    return replace(joined, group=np.zeros_like(joined.group), sum_tolerance=ties[0].sum_tolerance)
+
+
+def join_ties(ties: Sequence[Ties]) -> Ties:
+    """The ties of several seams and constraints, a group each."""
+    if not ties:
+        return _ties(np.zeros((0, 4)), LENGTHS, tolerance=_EDGE_TOLERANCE, sum_tolerance=None)
+    return Ties(
+        ends=np.concatenate([t.ends for t in ties]),
+        kind=np.concatenate([t.kind for t in ties]),
+        ratio=np.concatenate([t.ratio for t in ties]),
+        target=np.concatenate([t.target for t in ties]),
+        lever=np.concatenate([t.lever for t in ties]),
+        tolerance=np.concatenate([t.tolerance for t in ties]),
+        soft=np.concatenate([t.soft for t in ties]),
+        group=np.concatenate([np.full(len(t), number, dtype=np.int32) for number, t in enumerate(ties)]),
+        sum_tolerance=np.concatenate([t.sum_tolerance for t in ties]),
+    )
+
+
+def seam_ties(first: IntArray, second: IntArray, ratio: float = 1.0) -> Ties:
+    """Every edge of the first row of vertices `ratio` times as long as its partner of the second."""
+    ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
+    return _ties(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+
+
+def length_ties(line: IntArray, lengths: FloatArray) -> Ties:
+    """Every edge of a row of vertices so long [m]."""
+    ends = np.column_stack([line[:-1], line[1:], line[:-1], line[1:]])
+    return _ties(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+
+
+def straight_ties(line: IntArray) -> Ties:
+    """Every inner vertex of a row on the straight line between its ends."""
+    inner = line[1:-1]
+    ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
+    return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
+
+
+def smooth_ties(line: IntArray, positions: FloatArray) -> Ties:
+    """Every inner vertex of a row held, softly, at its present distance from the chord of its two neighbours.
+
+    Where ties ask for more length than the cloth gives, a row of vertices would find it in a zigzag as fine as the mesh, at
+    the price of a little shear. A zigzag changes these distances by its whole width, a curve that bends otherwise by a share
+    of the square of the mesh's step.
+
+    Args:
+        line: vertices.
+        positions: #V by 2, where the distances are taken [m].
+    """
+    here, before, after = line[1:-1], line[:-2], line[2:]
+    chord, away = positions[after] - positions[before], positions[here] - positions[before]
+    cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
+    distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
+    ties = _ties(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
+    return replace(ties, soft=np.ones(len(here), dtype=np.bool_))
+
+
+def level_ties(line: IntArray, across: FloatArray) -> Ties:
+    """The ends of a row of vertices at the same place across a direction: `across` is the unit vector at right angles."""
+    ends = np.array([[line[0], line[-1], line[0], line[0]]])
+    lever = np.zeros((1, 4, 2))
+    lever[0, 0], lever[0, 1] = -across, across
+    return _ties(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
+
+
+def mirror_ties(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> Ties:
+    """The first vertex of each pair (#Q by 2) the mirror image of the second, and those of the axis (#A) on it.
+
+    Args:
+        pairs, axis: vertices.
+        across: unit vector at right angles to the axis.
+        place: of the axis along `across` [m].
+    """
+    along = np.array([-across[1], across[0]])
+    first, second = pairs[:, 0], pairs[:, 1]
+    both = np.column_stack([first, second, first, first])
+    own = np.column_stack([axis, axis, axis, axis])
+    lever = np.zeros((2 * len(pairs) + len(axis), 4, 2))
+    count = len(pairs)
+    lever[:count, 0] = lever[:count, 1] = across
+    lever[count : 2 * count, 0], lever[count : 2 * count, 1] = along, -along
+    lever[2 * count :, 0] = across
+    target = np.concatenate([np.full(count, 2.0 * place), np.zeros(count), np.full(len(axis), place)])
+    return _ties(np.concatenate([both, both, own]), LINEAR, target=target, lever=lever, tolerance=_PLACE_TOLERANCE)
+
+
+def _ties(
+    ends: ArrayLike,
+    kind: int,
+    *,
+    ratio: float = 0.0,
+    target: FloatArray | float = 0.0,
+    lever: FloatArray | None = None,
+    tolerance: float,
+    sum_tolerance: float | None = np.inf,
+) -> Ties:
+    rows = np.asarray(ends, dtype=np.int32).reshape(-1, 4)
+    count = len(rows)
+    return Ties(
+        ends=rows,
+        kind=np.full(count, int(kind), dtype=np.int32),
+        ratio=np.full(count, ratio),
+        target=np.broadcast_to(np.asarray(target, dtype=np.float64), (count,)).copy(),
+        lever=np.zeros((count, 4, 2)) if lever is None else lever,
+        tolerance=np.full(count, tolerance),
+        soft=np.zeros(count, dtype=np.bool_),
+        group=np.zeros(count, dtype=np.int32),
+        sum_tolerance=np.zeros(0) if sum_tolerance is None else np.array([sum_tolerance]),
+    )
