@@ -25,12 +25,15 @@ def cloth(*, warp: float = 1000.0, weft: float = 1000.0, shear: float = 200.0, n
     )
 
 
-def sheet(columns: int, rows: int, hx: float, hy: float) -> Surface:
-    """A rectangle of quads in the plane z = 0."""
+def sheet(columns: int, rows: int, hx: float, hy: float, *, split: int = 0) -> Surface:
+    """A rectangle of quads in the plane z = 0, the first `split` of them cut into two triangles."""
     x, y = np.meshgrid(hx * np.arange(columns + 1), hy * np.arange(rows + 1))
     i = np.arange(x.size).reshape(x.shape)
     quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    return make_surface(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), quads)
+    none = np.full((split, 1), -1)
+    halves = [np.hstack([quads[:split][:, corners], none]) for corners in ([0, 1, 2], [0, 2, 3])]
+    faces = np.concatenate([quads[split:], *halves])
+    return make_surface(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
 
 
 def equilateral(rings: int, side: float) -> Surface:
@@ -188,6 +191,19 @@ def test_the_guard_begins_where_the_shear_springs_lose_their_hold():
     )
     assert network.guard.onset_warp == pytest.approx(100 / 1500)
     assert network.guard.onset_weft == pytest.approx(100 / 500)
+
+
+def test_between_triangles_the_guard_begins_where_their_springs_lose_their_hold():
+    """Split squares sheared by g: only the diagonal is strained, by g/2, and the cloth stores K(45)/8 g^2 per area."""
+    fabric, surface = cloth(shear=200.0), sheet(12, 12, 0.01, 0.01, split=144)
+    flat = surface.vertices[:, :2]
+    network = SpringNetwork.build(surface, fabric, flat, device="cpu")
+    shear = 1e-5
+    stored = spring_energy(network, flat + np.column_stack([shear * flat[:, 1], np.zeros(len(flat))]))
+    assert network.shear_hold == pytest.approx(2.0 * stored / shear**2 / 0.12**2, rel=1e-3)
+    assert network.guard.onset_warp == pytest.approx(network.shear_hold / 1000.0)
+    few = SpringNetwork.build(sheet(12, 12, 0.01, 0.01, split=12), fabric, flat, device="cpu")
+    assert few.guard.onset_warp == pytest.approx(0.2)
 
 
 def test_a_compressed_thread_kinks_beyond_the_onset_and_the_guard_holds_it():

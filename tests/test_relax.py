@@ -49,12 +49,15 @@ def springs_and_guard(network: SpringNetwork, positions: FloatArray) -> tuple[fl
     deformation = c.edges @ inverse
     area = 0.5 * det * c.weight
     stress, density = np.zeros_like(deformation), np.zeros(len(det))
-    for thread, stiffness in zip(
-        grain_axes(network.grain_angle), (fabric.stiffness_warp, fabric.stiffness_weft), strict=True
+    for thread, stiffness, onset in zip(
+        grain_axes(network.grain_angle),
+        (fabric.stiffness_warp, fabric.stiffness_weft),
+        (network.guard.onset_warp, network.guard.onset_weft),
+        strict=True,
     ):
         worn = deformation @ thread
         stretch = np.linalg.norm(worn, axis=1)
-        excess = np.maximum(stretch - 1.0 - fabric.shear_stiffness / stiffness, 0.0)
+        excess = np.maximum(stretch - 1.0 - onset, 0.0)
         density += 0.5 * stiffness * excess**2
         stress += (stiffness * excess / stretch)[:, None, None] * worn[:, :, None] * thread
     turned = np.swapaxes(inverse, 1, 2)
