@@ -19,6 +19,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork, grain_axes
+from warpflat.multilevel import relax_multilevel
 from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, Upright, relax
 from warpflat.strain import WornStrain, layout_errors, worn_strain
 from warpflat.strain_map import energy_report
@@ -414,6 +415,7 @@ class _Run:
         """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
         first = "develop" if self.stage_name == "relax" else self.stage_name
         self._tell(first, state, state.energies(), float("nan"))
+        self.work_units = 0.0
         begun = time.perf_counter()
         clamped = state.network.spring_arrays.clamped_cells
         if clamped:
@@ -432,10 +434,19 @@ class _Run:
             state = self.state_at(state.positions(), after=state)
         state.options = self.options
         outcome = self._relax(state)
-        return state, replace(outcome, steps=state.steps, seconds=time.perf_counter() - begun)
+        seconds = time.perf_counter() - begun
+        return state, replace(outcome, steps=state.steps, work_units=self.work_units, seconds=seconds)
 
     def _relax(self, state: Relaxation) -> Outcome:
-        return relax(state, watch=self._watch, each_step=None if self.callback is None else self._each_step)
+        each_step = None if self.callback is None else self._each_step
+        if self.options.solver == "plain":
+            outcome = relax(state, watch=self._watch, each_step=each_step)
+        else:
+            # After a cut the layout is near the minimum already.
+            nested = self.stage_name == "relax" and state.steps == 0
+            outcome = relax_multilevel(state, nested=nested, watch=self._watch, each_step=each_step)
+        self.work_units += outcome.work_units
+        return outcome
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
         self.history.append((float(state.steps), energies.spring, energies.guard, residual))
@@ -459,7 +470,7 @@ class _Run:
             guard_energy_j=energies.guard,
             strain_energy_j=float(worn_strain(state.network, state.positions()).energy.sum()),
             steps=steps,
-            work_units=float(steps),
+            work_units=0.0 if outcome is None else outcome.work_units,
             seconds=seconds,
             converged=True if outcome is None else outcome.converged,
             residual=None if outcome is None else outcome.residual,

@@ -50,6 +50,9 @@ _LEAST_STRUCTURAL_SHARE = 0.05
 # outweighs all others move against each other (the short side of a needle) without any correction; this share of the
 # stiffest spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
 _PAIR_SHARE = 0.5
+# Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
+# guard begins at this share of it.
+_HOLD_SHARE = 0.75
 # Quad cells that lie within this angle of the grain carry the threads along their edges.
 _ALIGNED = np.deg2rad(15.0)
 
@@ -278,7 +281,7 @@ def shear_hold(
 
     They shear as their directions happen to lie: split squares have K(45 degrees)/4, and threads between them kink at
     that over K, not at G/K. Taken per vertex, sum of 1/2 k L^2 cos^2 sin^2 over its share of the area, infinite beside a quad,
-    and of these the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
+    and of these three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
 
     Args:
         surface, springs, cells: of the piece.
@@ -293,7 +296,7 @@ def shear_hold(
     held = np.bincount(springs.ends[:, 0], half, count) + np.bincount(springs.ends[:, 1], half, count)
     hold = held / np.bincount(cells.corner.ravel(), np.repeat(cells.area / 3.0, 3), count)
     hold[surface.faces[surface.is_quad].ravel()] = np.inf
-    return float(np.sort(hold)[count // 4])
+    return _HOLD_SHARE * float(np.sort(hold)[count // 4])
 
 
 @dataclass(kw_only=True)

@@ -11,19 +11,27 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass, field
+from typing import Literal
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError
+from warpflat.errors import InputError, nearest
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
+from warpflat.kernels.transfer import correct
+from warpflat.launching import Sequence as LaunchSequence
+from warpflat.launching import record
 from warpflat.network import SpringNetwork
 from warpflat.tangent import TangentMatrix
 
-__all__ = ["Energies", "Outcome", "RelaxOptions", "Relaxation", "Upright", "relax"]
+__all__ = ["SOLVERS", "Energies", "Outcome", "RelaxOptions", "Relaxation", "Solver", "Upright", "Watch", "relax"]
+
+
+Solver = Literal["multilevel", "plain"]
+SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
 
 # Steps between two looks at the stiffness that a membrane has where it is.
 _FOLLOW_EVERY = 100
@@ -40,6 +48,7 @@ class RelaxOptions:
         max_steps: a state that has taken so many is not stepped on, and says so (`converged` is false).
         check_every: steps between two looks at energies and convergence.
         kinetic_damping: set velocities to zero when the forces begin to brake the motion.
+        solver: "multilevel" (`warpflat.multilevel`; garments are sewn by plain steps all the same), or "plain", the paper's steps alone.
     """
 
     time_step: float = 0.01
@@ -48,6 +57,7 @@ class RelaxOptions:
     max_steps: int = 20_000
     check_every: int = 10
     kinetic_damping: bool = True
+    solver: Solver = "multilevel"
 
     def validate(self) -> None:
         """Raise InputError for a value out of its bounds; names the value."""
@@ -63,6 +73,8 @@ class RelaxOptions:
                 raise InputError(f"relax: {key} = {value!r} is not a number")
             if not low <= value <= high:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
+        if self.solver not in SOLVERS:
+            raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
 
 
 @dataclass(frozen=True)
@@ -90,7 +102,8 @@ class Outcome:
 
     Attributes:
         converged: false if it ran into its step limit.
-        steps: approximate implicit steps taken.
+        steps: approximate implicit steps taken on the piece's own mesh.
+        work_units: all work, in such steps.
         restarts: how often the velocities were set to zero.
         energy_change: last relative change of the energy per step, eq. (11).
         residual: largest force on a vertex over the mean spring force.
@@ -100,6 +113,7 @@ class Outcome:
 
     converged: bool
     steps: int
+    work_units: float
     restarts: int
     energy_change: float
     residual: float
@@ -132,7 +146,8 @@ class Relaxation:
         upright: of each piece the vertices whose chord is kept along +y, the ends of the datum: it is the grain, and
             nothing else says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to
             the plane.
-        position: #V vec2d [m]. velocity: #V vec2d [m/s]. On the network's device.
+        position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
+            constant forces [N]. On the network's device.
     """
 
     network: SpringNetwork
@@ -148,7 +163,7 @@ class Relaxation:
         self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
         self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self._load = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.load = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._power = wp.zeros(n, dtype=wp.float64, device=device)
@@ -173,35 +188,36 @@ class Relaxation:
         self._record()
 
     def _record(self) -> None:
-        """Record the launches of a step: a recorded launch costs a fifth of a fresh one."""
+        """Record the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one."""
         net, h = self.network, self.options.time_step
         n, c, device = net.vertex_count, net.cell_count, net.device
         evaluate_cells, _, parameters = net.cell_model
-        self._evaluate_cells = wp.launch(
-            evaluate_cells,
-            dim=c,
-            inputs=[self.position, self.velocity, net.cells, parameters, h, 0],
-            outputs=[
-                self._cell_acting,
-                self._cell_clearance,
-                self._cell_force,
-                self._cell_viscosity,
-                self._cell_stiffness,
-            ],
-            device=device,
-            record_cmd=True,
-        )
-        self._evaluate_seams = None
-        if net.seams is not None:
-            self._evaluate_seams = wp.launch(
-                evaluate_seams,
-                dim=net.seam_count,
-                inputs=[self.position, self.velocity, net.seams, h, 0],
-                outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
+        launches = [
+            record(
+                evaluate_cells,
+                dim=c,
+                inputs=[self.position, self.velocity, net.cells, parameters, h],
+                outputs=[
+                    self._cell_acting,
+                    self._cell_clearance,
+                    self._cell_force,
+                    self._cell_viscosity,
+                    self._cell_stiffness,
+                ],
                 device=device,
-                record_cmd=True,
             )
-        self._gather = wp.launch(
+        ]
+        if net.seams is not None:
+            launches.append(
+                record(
+                    evaluate_seams,
+                    dim=net.seam_count,
+                    inputs=[self.position, self.velocity, net.seams, h],
+                    outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
+                    device=device,
+                )
+            )
+        gather = record(
             gather_forces,
             dim=n,
             inputs=[
@@ -220,9 +236,8 @@ class Relaxation:
                 self._seam_force,
                 self._seam_viscosity,
                 self._seam_stiffness,
-                self._load,
+                self.load,
                 h,
-                0,
             ],
             outputs=[
                 self.force,
@@ -233,9 +248,9 @@ class Relaxation:
                 self._reach,
             ],
             device=device,
-            record_cmd=True,
         )
-        self._advance = wp.launch(
+        self._evaluate = LaunchSequence([*launches, gather])
+        self._advance = record(
             advance,
             dim=n,
             inputs=[
@@ -247,28 +262,43 @@ class Relaxation:
                 self._stiffness,
                 self._reach,
                 h,
-                0,
             ],
             outputs=[self.position, self.velocity],
             device=device,
-            record_cmd=True,
         )
-
-    def _evaluate(self) -> None:
-        self._evaluate_cells.launch()
-        if self._evaluate_seams is not None:
-            self._evaluate_seams.launch()
-        self._gather.launch()
 
     def step(self) -> None:
         """One approximate implicit step."""
-        self._evaluate()
+        self._evaluate.launch()
         if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
             self.velocity.zero_()
-            self._evaluate()
+            self._evaluate.launch()
             self.restarts += 1
         self._advance.launch()
         self.steps += 1
+
+    def evaluate_at_rest(self) -> None:
+        """The forces of the present layout; velocities become zero."""
+        self.velocity.zero_()
+        self._evaluate.launch()
+
+    def mirrored_cells(self) -> int:
+        """How many cells are mirrored or have no area, at the last evaluated state."""
+        return int(np.count_nonzero(self._cell_clearance.numpy() <= 0.0))
+
+    def move(self, base: wp.array, way: wp.array, share: float) -> None:
+        """Go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
+        wp.launch(
+            correct,
+            dim=self.network.vertex_count,
+            inputs=[base, way, share, self.network.bonds.freedom, 0],
+            outputs=[self.position],
+            device=self.network.device,
+        )
+
+    def work_of_load(self) -> float:
+        """Sum of load times place [J]."""
+        return float(np.einsum("ij,ij->", self.load.numpy(), self.position.numpy()))
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
@@ -326,7 +356,7 @@ class Relaxation:
             load[here] = -(np.einsum("ij,ij->", arm, force[here] @ turn) / inertia) * weight[:, None] * arm
         self.position.assign(position)
         self.velocity.assign(velocity)
-        self._load.assign(load)
+        self.load.assign(load)
 
     def forces(self) -> NDArray[np.float64]:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -336,7 +366,7 @@ class Relaxation:
 
     def _cloth_force(self) -> NDArray[np.float64]:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
-        return np.array(self.force.numpy()) - self._load.numpy()
+        return np.array(self.force.numpy()) - self.load.numpy()
 
     def _arms(self, position: NDArray[np.float64], vertices: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Velocities of a rigid turn by 1 rad/s, and the weights by which motion is averaged: the stiffnesses."""
@@ -407,6 +437,7 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
     return Outcome(
         converged=converged,
         steps=state.steps - first,
+        work_units=float(state.steps - first),
         restarts=state.restarts,
         energy_change=change,
         residual=residual,

@@ -1,0 +1,93 @@
+"""Between a level of a mesh and the next coarser one: layouts go up by weighted sums, forces come down by their transpose."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Weights:
+    """A sparse matrix by rows: row i has `column` and `weight` from `offset[i]` to `offset[i + 1]`."""
+
+    offset: wp.array(dtype=wp.int32)
+    column: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.float64)
+
+
+@wp.func
+def weighted_sum(i: int, weights: Weights, values: wp.array(dtype=wp.vec2d)):
+    """Row i of the matrix times `values`."""
+    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for e in range(weights.offset[i], weights.offset[i + 1]):
+        total += weights.weight[e] * values[weights.column[e]]
+    return total
+
+
+@wp.kernel
+def transfer(
+    weights: Weights,
+    values: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    result: wp.array(dtype=wp.vec2d),
+):
+    """result_i = sum_j w_ij values_j: a layout or a correction for the finer level, or the forces on a coarser one."""
+    i = wp.tid() + first
+    result[i] = weighted_sum(i, weights, values)
+
+
+@wp.kernel
+def coarse_difference(
+    kept: wp.array(dtype=wp.int32),
+    fine: wp.array(dtype=wp.vec2d),
+    coarse: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    difference: wp.array(dtype=wp.vec2d),
+):
+    """How far the coarse level has come from the places of its vertices on the finer one. kept: #coarse, fine vertices [m]."""
+    i = wp.tid() + first
+    difference[i] = coarse[i] - fine[kept[i]]
+
+
+@wp.kernel
+def coarse_load(
+    restriction: Weights,
+    residual: wp.array(dtype=wp.vec2d),
+    force: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    load: wp.array(dtype=wp.vec2d),
+):
+    """The load with which the coarse level has, where the finer one stands, the finer one's residual forces [N]:
+    load = R residual - force, force that of the coarse level without load (full approximation scheme)."""
+    i = wp.tid() + first
+    load[i] = weighted_sum(i, restriction, residual) - force[i]
+
+
+@wp.kernel
+def correct(
+    base: wp.array(dtype=wp.vec2d),
+    correction: wp.array(dtype=wp.vec2d),
+    share: wp.float64,
+    freedom: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    position: wp.array(dtype=wp.vec2d),
+):
+    """position = base + share of the correction, where a vertex is free to go [m]."""
+    i = wp.tid() + first
+    position[i] = base[i] + share * wp.cw_mul(correction[i], freedom[i])
+
+
+@wp.kernel
+def inject(
+    kept: wp.array(dtype=wp.int32),
+    fine: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    coarse: wp.array(dtype=wp.vec2d),
+):
+    """The places of the coarse level's vertices on the finer one. kept: #coarse, fine vertices [m]."""
+    i = wp.tid() + first
+    coarse[i] = fine[kept[i]]

@@ -1,0 +1,337 @@
+"""Multilevel relaxation: the approximate implicit steps smooth, coarser meshes of the same piece carry what is far.
+
+A step tells each vertex of its neighbours only, so that the number of steps grows with the number of vertices. Here each level is a
+spring network of its own, with the same fabric, guard and steps, on a quarter of the vertices of the next finer one
+(`warpflat.coarsen`). A cycle (full approximation scheme, Brandt 1977; Brandt and Livne 2011):
+
+1. a few steps from rest on the fine level;
+2. the coarse level starts where its vertices are, under the load that gives it the fine level's residual forces there;
+3. the same on the coarse level, down to the coarsest, which is relaxed by steps;
+4. the way the coarse vertices have gone is carried up, as far as it lowers the fine energy and mirrors no face;
+5. a few steps from rest again.
+
+Nested iteration gives the start: the coarsest level is relaxed first, and each finer one is moved as far as the coarser went. The minimum is that
+of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's work as the unit.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from warpflat.coarsen import Coarser, coarser
+from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
+from warpflat.launching import Launch, record
+from warpflat.network import SpringNetwork
+from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
+
+__all__ = ["Levels", "relax_multilevel"]
+
+FloatArray = NDArray[np.float64]
+
+# A level of at most so many vertices is the coarsest; the coarsest is relaxed with so many steps, more at the very first.
+_COARSEST = 250
+_COARSEST_STEPS = 120
+_FIRST_STEPS = 300
+# Cycles on each level on the way up, before the finest.
+_CYCLES_ON_THE_WAY = 2
+# Steps before and after, at least, and at most where cycles gain little; a cycle that leaves more than this share of what the one
+# before gained gets twice the steps.
+_LEAST_STEPS = 4
+_MOST_STEPS = 256
+_SLOW = 0.35
+# How often levels are made anew, since the piece has come far from where they were made.
+_RENEWALS = 8
+# In units of a step: evaluating the forces, evaluating the energy.
+_FORCE_WORK = 1.0
+_ENERGY_WORK = 0.5
+
+
+@dataclass
+class _Level:
+    """A level and its way to the next coarser one."""
+
+    state: Relaxation
+    coarse: Relaxation | None = None
+    down: Launch | None = None
+    load: Launch | None = None
+    differ: Launch | None = None
+    up: Launch | None = None
+    carry: Launch | None = None
+    base: wp.array | None = None
+    correction: wp.array | None = None
+
+
+def _weights(matrix: csr_array, device: wp.Device) -> Weights:
+    weights = Weights()
+    weights.offset = wp.array(matrix.indptr.astype(np.int32), dtype=wp.int32, device=device)
+    weights.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device=device)
+    weights.weight = wp.array(matrix.data.astype(np.float64), dtype=wp.float64, device=device)
+    return weights
+
+
+def _strain_fields(network: SpringNetwork, layout: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """#S, k L^2 of the springs, and 3 by #S, c^4, s^4 and c^2 s^2 of their directions: what each stores of uniform strains."""
+    s = network.spring_arrays
+    d = layout[s.ends[:, 1]] - layout[s.ends[:, 0]]
+    c2 = d[:, 0] ** 2 / np.maximum(np.einsum("ij,ij->i", d, d), 1e-300)
+    return s.stiffness * s.rest_length**2, np.stack([c2 * c2, (1.0 - c2) ** 2, c2 * (1.0 - c2)])
+
+
+def _calibrated(
+    network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray
+) -> SpringNetwork:
+    """The coarse network with its springs weighed by their directions, so that under uniform strains it stores what the fine one
+    does: edge springs on triangles store that only roughly, each mesh in its own way."""
+    if network.model != "springs" or network.surface.is_quad.all():
+        return network
+    energy, fields = _strain_fields(fine, fine_layout)
+    wished = fields @ energy
+    energy, fields = _strain_fields(network, layout)
+    factor = np.linalg.lstsq((fields * energy) @ fields.T, wished, rcond=1e-6)[0]
+    s = network.spring_arrays
+    return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
+
+
+class Levels:
+    """The levels of a piece, finest first; made once, and good for any number of relaxations of the same network.
+
+    Attributes:
+        sizes: vertices of each level.
+        work: done so far, in steps of the finest level.
+        stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
+    """
+
+    def __init__(self, finest: Relaxation, *, work: float = 0.0) -> None:
+        """Of a relaxation and its present layout, which must mirror no face."""
+        self._levels = [_Level(finest)]
+        self.work = work
+        self.stale = False
+        layout = finest.positions()
+        while True:
+            fine = self._levels[-1].state
+            if fine.network.vertex_count <= _COARSEST:
+                break
+            step = coarser(fine.network.surface, layout)
+            if step is None:
+                break
+            coarse = self._coarse(fine, step, layout)
+            layout = layout[step.kept]
+            coarse.evaluate_at_rest()
+            if coarse.mirrored_cells():
+                break
+            self._join(step, coarse)
+            self._levels.append(_Level(coarse))
+
+    @property
+    def sizes(self) -> list[int]:
+        """Vertices of each level, finest first."""
+        return [level.state.network.vertex_count for level in self._levels]
+
+    @staticmethod
+    def _coarse(fine: Relaxation, step: Coarser, fine_layout: FloatArray) -> Relaxation:
+        net, layout = fine.network, fine_layout[step.kept]
+        network = SpringNetwork.build(
+            step.surface,
+            net.fabric,
+            layout,
+            grain_angle=net.grain_angle,
+            device=net.device,
+            model=net.model,
+            stretch=None if net.stretch is None else net.stretch[step.face_of],
+        )
+        network = _calibrated(network, layout, net, fine_layout)
+        # What threads are held by is a matter of the finest mesh.
+        network.guard = net.guard
+        return Relaxation(network, fine.options, start=layout)
+
+    def _join(self, step: Coarser, coarse: Relaxation) -> None:
+        level, device = self._levels[-1], coarse.network.device
+        fine = level.state
+        kept = wp.array(step.kept, dtype=wp.int32, device=device)
+        prolongation = _weights(step.prolongation, device)
+        restriction = _weights(csr_array(step.prolongation.T.tocsr()), device)
+        n, c = fine.network.vertex_count, coarse.network.vertex_count
+        level.coarse = coarse
+        level.base = wp.zeros(n, dtype=wp.vec2d, device=device)
+        level.correction = wp.zeros(n, dtype=wp.vec2d, device=device)
+        difference = wp.zeros(c, dtype=wp.vec2d, device=device)
+        level.down = record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device)
+        level.load = record(
+            coarse_load, dim=c, inputs=[restriction, fine.force, coarse.force], outputs=[coarse.load], device=device
+        )
+        level.differ = record(
+            coarse_difference, dim=c, inputs=[kept, level.base, coarse.position], outputs=[difference], device=device
+        )
+        level.up = record(transfer, dim=n, inputs=[prolongation, difference], outputs=[level.correction], device=device)
+        level.carry = record(
+            transfer, dim=n, inputs=[prolongation, coarse.position], outputs=[fine.position], device=device
+        )
+
+    # --- the parts of a cycle
+
+    def _count(self, level: int, units: float) -> None:
+        self.work += units * self._levels[level].state.network.vertex_count / self._levels[0].state.network.vertex_count
+
+    def smooth(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
+        """Some steps from rest."""
+        state = self._levels[level].state
+        state.velocity.zero_()
+        for _ in range(steps):
+            state.step()
+            if each_step is not None:
+                each_step()
+        self._count(level, steps)
+
+    def _objective(self, level: int) -> float:
+        self._count(level, _ENERGY_WORK)
+        state = self._levels[level].state
+        return state.energies().potential - state.work_of_load()
+
+    def cycle(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
+        """One cycle from this level down and up again."""
+        here = self._levels[level]
+        if here.coarse is None:
+            self.smooth(level, _COARSEST_STEPS)
+            return
+        self.smooth(level, steps, each_step)
+        here.state.evaluate_at_rest()
+        self._count(level, _FORCE_WORK)
+        assert here.down is not None and here.load is not None
+        here.down.launch()
+        here.coarse.load.zero_()
+        here.coarse.evaluate_at_rest()
+        self._count(level + 1, _FORCE_WORK)
+        if here.coarse.mirrored_cells():
+            self.stale = True
+        else:
+            here.load.launch()
+            self.cycle(level + 1, steps)
+            self._correct(level)
+        self.smooth(level, steps, each_step)
+
+    def _correct(self, level: int) -> None:
+        """Add the coarse level's correction, or a half, a quarter ... of it, so that the energy does not rise."""
+        here = self._levels[level]
+        state = here.state
+        assert here.base is not None and here.correction is not None
+        assert here.differ is not None and here.up is not None
+        before = self._objective(level)
+        wp.copy(here.base, state.position)
+        here.differ.launch()
+        here.up.launch()
+        share = 1.0
+        while share > 0.05:
+            state.move(here.base, here.correction, share)
+            if self._objective(level) <= before:
+                return
+            share *= 0.5
+        wp.copy(state.position, here.base)
+
+    def rise(self, steps: int, arrived: Callable[[], None] | None = None) -> None:
+        """Nested iteration: relax the coarsest level, and move each finer one as far as it went; the finest is not cycled yet."""
+        last = len(self._levels) - 1
+        for level in self._levels[1:]:
+            level.state.load.zero_()
+        self.smooth(last, _FIRST_STEPS)
+        for number in range(last - 1, -1, -1):
+            self._rise_to(number)
+            if number == 0 and arrived is not None:
+                arrived()
+            for _ in range(_CYCLES_ON_THE_WAY if number else 0):
+                self.cycle(number, steps)
+
+    def _rise_to(self, level: int) -> None:
+        """Start a level where the coarser one ended, or moved as far as it went: the former is smoother, the latter keeps what only
+        the finer mesh has. Where neither lowers the energy, it stays where it is."""
+        here = self._levels[level]
+        assert here.carry is not None and here.base is not None
+        start = here.state.position.numpy().copy()
+        self._correct(level)
+        moved, energy = here.state.position.numpy().copy(), self._objective(level)
+        here.carry.launch()
+        if not self._objective(level) < energy:
+            here.state.position.assign(moved if np.isfinite(energy) else start)
+
+
+def first_steps(network: SpringNetwork) -> int:
+    """Steps before and after, for a fabric: a soft shear leaves errors along threads that only accelerated steps smooth."""
+    fabric = network.fabric
+    soft = max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
+    return int(min(max(round(1.7 * math.sqrt(soft)), _LEAST_STEPS), 16))
+
+
+def relax_multilevel(
+    state: Relaxation,
+    *,
+    levels: Levels | None = None,
+    nested: bool = True,
+    watch: Watch | None = None,
+    each_step: Watch | None = None,
+) -> Outcome:
+    """Cycles until the energy and the residual force have come to rest, or the step limit is reached.
+
+    Args:
+        state: where to start; holds the relaxed layout afterwards.
+        levels: of this state, if they are there already.
+        nested: start from the coarsest level; without, cycles begin at the present layout, as after an edit.
+        watch: called after every cycle with the state, its energies and the residual.
+        each_step: called after every step on the finest level, with the energies and the residual of the last look.
+    """
+    options: RelaxOptions = state.options
+    begun = time.perf_counter()
+    state.hold_upright()
+    levels = Levels(state) if levels is None else levels
+    if len(levels.sizes) == 1:
+        return relax(state, watch=watch, each_step=each_step)
+    first, start, renewals = state.steps, levels.work, 0
+    before = state.energies()
+    change, residual, gained = math.inf, math.inf, math.inf
+    steps = first_steps(state.network)
+
+    def look() -> None:
+        if each_step is not None:
+            each_step(state, before, residual)
+
+    if nested:
+        levels.rise(steps, look)
+        state.hold_upright()
+        before = state.energies()
+    converged = False
+    while not converged and levels.work - start < options.max_steps:
+        if levels.stale and renewals < _RENEWALS:
+            levels, renewals = Levels(state, work=levels.work), renewals + 1
+        work = levels.work
+        levels.cycle(0, steps, look)
+        state.evaluate_at_rest()
+        now = state.energies()
+        levels.work += _FORCE_WORK + _ENERGY_WORK
+        residual = state.residual()
+        state.hold_upright()
+        at_rest = now.potential <= state.negligible_energy
+        gain = before.potential - now.potential
+        change = 0.0 if at_rest else abs(gain) / ((levels.work - work) * now.potential)
+        converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
+        if abs(gain) > _SLOW * gained:
+            steps = min(2 * steps, _MOST_STEPS)
+        before, gained = now, abs(gain)
+        if watch is not None:
+            watch(state, now, residual)
+    return Outcome(
+        converged=converged,
+        steps=state.steps - first,
+        work_units=levels.work - start,
+        restarts=state.restarts,
+        energy_change=change,
+        residual=residual,
+        energies=before,
+        seconds=time.perf_counter() - begun,
+    )
+
