@@ -7,7 +7,9 @@ Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and pe
 with t a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). W is that of an
 orthotropic sheet in plane stress; a J-shaped curve adds what the tension differs from K e; and under compression cloth
 wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wrinkled the least energy of any sheet that may shorten freely
-(Pipkin 1986). The energy grows without bound as a cell collapses, so that no cell can be mirrored.
+(Pipkin 1986). The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been
+sheared by 45 degrees lock: 1/2 K_lock <|gamma| - sin 45>^2 is added, for gamma itself ends at 1, and at no more than 1/2 G of
+energy soft cloth would let threads come to lie side by side, and tiny faces of the body would open into palms of cloth.
 """
 
 import warp as wp
@@ -17,6 +19,8 @@ from .cells import Cells, flat_edges
 wp.set_module_options({"enable_backward": False})
 
 TINY = wp.constant(wp.float64(1.0e-300))
+# Warp and weft of cloth lock, thread against thread, at shear angles of 30 to 60 degrees; taken as 45.
+LOCKED = wp.constant(wp.float64(0.7071067811865476))
 
 
 @wp.struct
@@ -26,6 +30,7 @@ class Cloth:
     warp, weft: unit vectors in the plane.
     c_warp, c_weft, c_cross, shear: plane stress [N/m].
     k_warp, k_weft: K, the stiffness of a strip along one thread [N/m].
+    lock: K_lock, what locked threads add to G [N/m].
     compression: f, stiffness under compression over that under tension.
     strain_warp, tension_warp, strain_weft, tension_weft: points of the curves, the first at 0 [1, N/m]; beyond the last
     they go on straight.
@@ -40,6 +45,7 @@ class Cloth:
     shear: wp.float64
     k_warp: wp.float64
     k_weft: wp.float64
+    lock: wp.float64
     compression: wp.float64
     strain_warp: wp.array(dtype=wp.float64)
     tension_warp: wp.array(dtype=wp.float64)
@@ -95,6 +101,17 @@ def stretched_sheet(e: wp.vec2d, cloth: Cloth):
 
 
 @wp.func
+def sheared_threads(gamma: wp.float64, cloth: Cloth):
+    """tau [N/m], its integral from 0 [J/m2] and its slope [N/m]."""
+    beyond = wp.max(wp.abs(gamma) - LOCKED, wp.float64(0.0))
+    slope = cloth.shear
+    if beyond > wp.float64(0.0):
+        slope += cloth.lock
+    tau = cloth.shear * gamma + wp.sign(gamma) * cloth.lock * beyond
+    return wp.vec3d(tau, wp.float64(0.5) * (cloth.shear * gamma * gamma + cloth.lock * beyond * beyond), slope)
+
+
+@wp.func
 def thread_slope(
     e: wp.float64, c: wp.float64, k: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.array(dtype=wp.float64)
 ):
@@ -103,11 +120,47 @@ def thread_slope(
 
 
 @wp.func
-def corner_bound(w: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q_warp: wp.float64, q_weft: wp.float64, psi: wp.float64):
-    """Per area, a bound on the second derivative of the energy by a corner's place; w the gradient of its weight."""
-    along_warp = wp.dot(w, warp)
-    along_weft = wp.dot(w, weft)
-    return q_warp * along_warp * along_warp + q_weft * along_weft * along_weft + psi * wp.dot(w, w)
+def thread_bounds(F: wp.mat22d, worn_warp: wp.vec2d, worn_weft: wp.vec2d, e: wp.vec2d, gamma: wp.float64, cloth: Cloth):
+    """Bounds on the second derivatives [N/m] by (w . warp) and (w . weft), w the gradients of the corners' weights.
+
+    The gradient of |F t| by a corner's place is -(F^T F t / |F t|) (w . t).
+    """
+    back_warp = wp.transpose(F) * worn_warp
+    back_weft = wp.transpose(F) * worn_weft
+    size_warp = wp.dot(back_warp, back_warp)
+    size_weft = wp.dot(back_weft, back_weft)
+    slope_warp = thread_slope(e[0], cloth.c_warp, cloth.k_warp, cloth.strain_warp, cloth.tension_warp)
+    slope_weft = thread_slope(e[1], cloth.c_weft, cloth.k_weft, cloth.strain_weft, cloth.tension_weft)
+    square_warp = wp.max(wp.dot(worn_warp, worn_warp), TINY)
+    square_weft = wp.max(wp.dot(worn_weft, worn_weft), TINY)
+    twice_shear = wp.float64(2.0) * cloth.shear
+    # Threads that lock are far from crossing at right angles, so that both stiffnesses may act in one direction.
+    twice_lock = wp.float64(2.0) * (sheared_threads(gamma, cloth)[2] - cloth.shear)
+    return wp.vec2d(
+        wp.max((slope_warp + cloth.c_cross) * size_warp / square_warp, twice_shear * size_weft)
+        + twice_lock * size_weft,
+        wp.max((slope_weft + cloth.c_cross) * size_weft / square_weft, twice_shear * size_warp)
+        + twice_lock * size_warp,
+    )
+
+
+@wp.func
+def pair_bound(a: wp.vec2d, b: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q: wp.vec2d, psi: wp.float64):
+    """Per area, a bound on the second derivative of the energy by the places of two corners, a and b the gradients of
+    their weights; of one corner, if both are the same."""
+    along_warp = wp.dot(a, warp) * wp.dot(b, warp)
+    along_weft = wp.dot(a, weft) * wp.dot(b, weft)
+    return q[0] * along_warp + q[1] * along_weft + psi * wp.dot(a, b)
+
+
+@wp.func
+def stress_rates(rate_warp: wp.float64, rate_weft: wp.float64, e: wp.vec2d, cloth: Cloth):
+    """Rates of sigma_warp and sigma_weft at the strains e for rates of these, as if pressed cloth did not wrinkle."""
+    slope_warp = thread_slope(e[0], cloth.c_warp, cloth.k_warp, cloth.strain_warp, cloth.tension_warp)
+    slope_weft = thread_slope(e[1], cloth.c_weft, cloth.k_weft, cloth.strain_weft, cloth.tension_weft)
+    return wp.vec2d(
+        slope_warp * rate_warp + cloth.c_cross * rate_weft, slope_weft * rate_weft + cloth.c_cross * rate_warp
+    )
 
 
 @wp.kernel
@@ -127,9 +180,12 @@ def evaluate_membrane(
 ):
     """Forces of the membrane, minus the gradient of (flat area) psi, and what its stiffness exceeds the matrix by.
 
-    The approximate implicit step has the k_ij of the springs as its matrix, which bound the membrane's stiffness at small
-    strain. What a strained cell has beyond them, k = 2 max(bound - held, 0), goes to the diagonal, with the viscosity
-    -h k (v - v_cell), v_cell the mean velocity by stiffness, so that a cell that moves as a whole is not held back.
+    The approximate implicit step has the k_ij of the springs as its matrix, which bound the membrane's stiffness where they
+    were last taken (`bound_membrane`). What a cell has beyond them by now, k = 2 max(bound - held, 0), goes to the diagonal.
+
+    The viscosity is h (dF/dx) v of eq. (6) itself, without the part that the change of psi's area adds, which may be
+    negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear. With
+    the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and creep.
 
     position: #V [m]. velocity: #V [m/s]. acting: #C, 0 in a mirrored cell, whose last three are not written.
     clearance: #C, the cell's least height in the plane [m], 0 once it is mirrored. force, viscosity: 3 #C [N].
@@ -157,9 +213,10 @@ def evaluate_membrane(
         length_weft = wp.max(wp.length(worn_weft), TINY)
         e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
         gamma = wp.dot(worn_warp, worn_weft)
-        tau = cloth.shear * gamma
+        across = sheared_threads(gamma, cloth)
+        tau = across[0]
         law = stretched_sheet(e, cloth)
-        psi = law[2] + wp.float64(0.5) * tau * gamma
+        psi = law[2] + across[1]
         area = wp.float64(0.5) * det * cells.weight[c]
         P = wp.outer(worn_warp * (law[0] / length_warp) + tau * worn_weft, warp) + wp.outer(
             worn_weft * (law[1] / length_weft) + tau * worn_warp, weft
@@ -173,36 +230,83 @@ def evaluate_membrane(
         force[3 * c + 1] = f1
         force[3 * c + 2] = f2
 
-        # The gradient of |F t| by a corner's place is -(F^T F t / |F t|) (w . t), w the gradient of its weight.
-        back_warp = wp.transpose(F) * worn_warp
-        back_weft = wp.transpose(F) * worn_weft
-        size_warp = wp.dot(back_warp, back_warp)
-        size_weft = wp.dot(back_weft, back_weft)
-        slope_warp = thread_slope(e[0], cloth.c_warp, cloth.k_warp, cloth.strain_warp, cloth.tension_warp)
-        slope_weft = thread_slope(e[1], cloth.c_weft, cloth.k_weft, cloth.strain_weft, cloth.tension_weft)
-        twice_shear = wp.float64(2.0) * cloth.shear
-        q_warp = wp.max((slope_warp + cloth.c_cross) * size_warp / (length_warp * length_warp), twice_shear * size_weft)
-        q_weft = wp.max((slope_weft + cloth.c_cross) * size_weft / (length_weft * length_weft), twice_shear * size_warp)
+        q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
         w1 = wp.vec2d(inv[0, 0], inv[0, 1])
         w2 = wp.vec2d(inv[1, 0], inv[1, 1])
+        w0 = -(w1 + w2)
         none = wp.float64(0.0)
         two = wp.float64(2.0)
-        k0 = area * corner_bound(-(w1 + w2), warp, weft, q_warp, q_weft, psi)
-        k1 = area * corner_bound(w1, warp, weft, q_warp, q_weft, psi)
-        k2 = area * corner_bound(w2, warp, weft, q_warp, q_weft, psi)
+        k0 = area * pair_bound(w0, w0, warp, weft, q, psi)
+        k1 = area * pair_bound(w1, w1, warp, weft, q, psi)
+        k2 = area * pair_bound(w2, w2, warp, weft, q, psi)
         k0 = two * wp.max(k0 - cloth.held[3 * c], none)
         k1 = two * wp.max(k1 - cloth.held[3 * c + 1], none)
         k2 = two * wp.max(k2 - cloth.held[3 * c + 2], none)
         v0 = velocity[corner[0]]
         v1 = velocity[corner[1]]
         v2 = velocity[corner[2]]
-        v_cell = (k0 * v0 + k1 * v1 + k2 * v2) / wp.max(k0 + k1 + k2, TINY)
-        viscosity[3 * c] = (time_step * k0) * (v_cell - v0)
-        viscosity[3 * c + 1] = (time_step * k1) * (v_cell - v1)
-        viscosity[3 * c + 2] = (time_step * k2) * (v_cell - v2)
+        # v changes F by -F A, with A the gradient of v in the plane.
+        a1 = v1 - v0
+        a2 = v2 - v0
+        A = wp.mat22d(a1[0], a2[0], a1[1], a2[1]) * inv
+        back_warp = wp.transpose(F) * worn_warp
+        back_weft = wp.transpose(F) * worn_weft
+        unit_warp = back_warp / length_warp
+        unit_weft = back_weft / length_weft
+        rate = stress_rates(-wp.dot(unit_warp, A * warp), -wp.dot(unit_weft, A * weft), e, cloth)
+        tau_rate = -across[2] * (wp.dot(back_weft, A * warp) + wp.dot(back_warp, A * weft))
+        R = wp.outer(unit_warp * rate[0] + back_weft * tau_rate, warp) + wp.outer(
+            unit_weft * rate[1] + back_warp * tau_rate, weft
+        )
+        V = (R * inv_t) * (area * time_step)
+        d1 = wp.vec2d(V[0, 0], V[1, 0])
+        d2 = wp.vec2d(V[0, 1], V[1, 1])
+        viscosity[3 * c] = -(d1 + d2)
+        viscosity[3 * c + 1] = d1
+        viscosity[3 * c + 2] = d2
         stiffness[3 * c] = k0
         stiffness[3 * c + 1] = k1
         stiffness[3 * c + 2] = k2
+
+
+@wp.kernel
+def bound_membrane(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    cloth: Cloth,
+    first: int,
+    # outputs
+    weight: wp.array(dtype=wp.float64),
+):
+    """Each cell's share of the k_ij along its sides, such that they bound the membrane's stiffness at these positions.
+
+    It is what `warpflat.membrane.step_matrix` gives for a cell at rest: cotangents in the metric of the bounds along warp
+    and weft, of which negative ones may be left out.
+
+    position: #V [m]. weight: 3 #C, along the sides 0-1, 1-2, 2-0 [N/m]; a mirrored cell's is left as it was.
+    """
+    c = wp.tid() + first
+    D = flat_edges(position, cells.corner[c])
+    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    if det > wp.float64(0.0):
+        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        F = cells.edges[c] * inv
+        warp = cloth.warp * cells.slack[c][0]
+        weft = cloth.weft * cells.slack[c][1]
+        worn_warp = F * warp
+        worn_weft = F * weft
+        e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
+        gamma = wp.dot(worn_warp, worn_weft)
+        psi = stretched_sheet(e, cloth)[2] + sheared_threads(gamma, cloth)[1]
+        q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
+        area = wp.float64(0.5) * det * cells.weight[c]
+        w1 = wp.vec2d(inv[0, 0], inv[0, 1])
+        w2 = wp.vec2d(inv[1, 0], inv[1, 1])
+        w0 = -(w1 + w2)
+        none = wp.float64(0.0)
+        weight[3 * c] = wp.max(-area * pair_bound(w0, w1, warp, weft, q, psi), none)
+        weight[3 * c + 1] = wp.max(-area * pair_bound(w1, w2, warp, weft, q, psi), none)
+        weight[3 * c + 2] = wp.max(-area * pair_bound(w2, w0, warp, weft, q, psi), none)
 
 
 @wp.kernel
@@ -227,7 +331,7 @@ def compute_membrane_energy(
         e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
         gamma = wp.dot(worn_warp, worn_weft)
         law = stretched_sheet(e, cloth)
-        psi = law[2] + wp.float64(0.5) * cloth.shear * gamma * gamma
+        psi = law[2] + sheared_threads(gamma, cloth)[1]
         energy[c] = wp.float64(0.5) * det * cells.weight[c] * psi
 
 
@@ -264,7 +368,7 @@ def compute_membrane_strain(
             wp.dot(worn_warp, worn_weft),
         )
     law = stretched_sheet(wp.vec2d(e[0], e[1]), cloth)
-    tau = cloth.shear * e[2]
+    across = sheared_threads(e[2], cloth)
     strain[c] = e
-    stress[c] = wp.vec3d(law[0], law[1], tau)
-    energy[c] = (law[2] + wp.float64(0.5) * tau * e[2]) * area[c]
+    stress[c] = wp.vec3d(law[0], law[1], across[0])
+    energy[c] = (law[2] + across[1]) * area[c]

@@ -44,12 +44,12 @@ def spring_forces_on(i: int, position: wp.array(dtype=wp.vec2d), springs: Spring
 
 @wp.func
 def viscosity_forces_on(i: int, velocity: wp.array(dtype=wp.vec2d), springs: Springs, time_step: wp.float64):
-    """Paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]."""
+    """Paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]; a membrane has its own."""
     here = velocity[i]
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     for s in range(springs.offset[i], springs.offset[i + 1]):
         force += springs.stiffness[s] * (velocity[springs.neighbor[s]] - here)
-    return time_step * force
+    return springs.pull * time_step * force
 
 
 @wp.kernel

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -16,7 +17,8 @@ from warpflat.shapes import make_shape
 from warpflat.surface import make_surface
 from warpflat.surface.curvature import curvature_tensors
 from warpflat.tightness import MAPS, Wear, assess_pattern
-from warpflat.wear_report import fit_lines
+from warpflat.wear_picture import write_wear_sheet
+from warpflat.wear_report import fit_lines, garment_wear
 
 RADIUS, HEIGHT = 0.06, 0.3
 NET = find_fabric("power-net")
@@ -167,6 +169,65 @@ def test_a_bodice_that_does_not_fit_says_where_and_which_cut_helps(tmp_path: Pat
     assert lines[0].startswith("front: fits: no (warp ")
     assert any(line.startswith("  would help: a ") for line in lines)
     assert (tmp_path / "out" / "front.wear.png").stat().st_size > 10_000
+
+
+def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
+    fits = outside <= 0.01
+    strain = {"p05": -0.01, "p95": 0.08}
+    return {
+        "area_m2": area,
+        "wear": {
+            "fits": fits,
+            "outside": outside,
+            "strain_limit": 0.05,
+            "strain_warp": strain,
+            "strain_weft": strain,
+            "pressure": {"p05": 0.0, "p50": 0.0, "p95": 0.0},
+            "where_not": [] if fits else ["stretched 8 % along weft"],
+            "would_help": [] if fits else [{"cut": cut, "length_m": 0.1, "outside_after": 0.02}],
+        },
+    }
+
+
+def test_a_garment_fits_if_all_of_its_pieces_do_and_says_which_do_not():
+    pieces = {"front": worn_entry(0.12, 0.3, "a dart from the border"), "back": worn_entry(0.0, 0.1, "")}
+    found = garment_wear(pieces)  # type: ignore[arg-type]
+    assert found == {
+        "fits": False,
+        "outside": pytest.approx(0.09),
+        "where_not": ["front: stretched 8 % along weft"],
+        "would_help": [
+            {"piece": "front", "cut": "a dart from the border", "length_m": 0.1, "outside_after": 0.02},
+        ],
+    }
+    lines = fit_lines({"pieces": pieces, "wear": found})
+    assert "  would help: a dart from the border: 12.0 % -> 2.0 % beyond the limit" in lines
+    assert lines[-1] == "garment: fits: no: front (9.0 % of its cloth beyond the limit)"
+    assert garment_wear({"back": pieces["back"]})["fits"] is True  # type: ignore[dict-item]
+
+
+def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    """The larger piece is twice as large on paper, and its colours mean the same."""
+    from matplotlib.figure import Figure
+
+    shapes = [sleeve(resolution=9), make_shape("cylinder", radius=0.03, height=0.15, angle=300.0, resolution=9)]
+    fitting, tight = (warpflat.flatten(shape, fabric=NET, datum="centre", device="cpu") for shape in shapes)
+    results = [fitting, replace(tight, positions=tight.positions * [0.7, 1.0])]
+    drawn: list[Figure] = []
+    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: (drawn.append(figure), Path(path).touch()))
+    write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
+    assert (tmp_path / "wear.png").exists()
+    figure = drawn[0]
+    maps = [axis for axis in figure.axes if not axis.axison]
+    assert len(maps) == 2 * len(MAPS)
+    inches = figure.get_size_inches()[0]
+    scales = [np.ptp(axis.get_xlim()) / (axis.get_position().width * inches) for axis in maps]
+    np.testing.assert_allclose(scales, scales[0], rtol=1e-9)
+    for first, second in zip(maps[: len(MAPS)], maps[len(MAPS) :], strict=True):
+        assert first.collections[0].get_clim() == second.collections[0].get_clim()
+    told = " ".join(text.get_text() for text in figure.texts)
+    assert "does not fit: cylinder" in told
+    assert "fits: yes, 0.0 % beyond the limit" in told
 
 
 @pytest.mark.parametrize(

@@ -18,6 +18,8 @@ class InputError(ValueError):
 def nearest(word: str, valid: Iterable[str]) -> str:
     """The end of a message about an unknown `word`: the nearest valid one, then all of them."""
     options = sorted(valid)
-    close = difflib.get_close_matches(word, options, n=1, cutoff=0.5)
-    guess = f"did you mean {close[0]!r}? " if close else ""
+    # Somebody who writes EMT_warp means emt_warp.
+    plain = {option.lower(): option for option in reversed(options)}
+    close = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=0.5)
+    guess = f"did you mean {plain[close[0]]!r}? " if close else ""
     return f"{guess}valid: {', '.join(options) if options else 'none'}"

@@ -12,7 +12,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.fabric import Curve, Fabric
 from warpflat.kernels.membrane import Cloth
 
-__all__ = ["MODELS", "Model", "check_model", "cloth_of", "step_matrix"]
+__all__ = ["MODELS", "Model", "check_model", "cloth_of", "corner_sums", "step_matrix"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -56,6 +56,8 @@ def cloth_of(
     cloth.c_warp, cloth.c_weft, cloth.c_cross = plane_stress(fabric)
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
+    # Half of a thread's own: then no more is asked of the step than along the threads.
+    cloth.lock = 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
     cloth.compression = fabric.compression_factor
     for direction in ("warp", "weft"):
         strain, tension = _points(fabric, direction, curves)
@@ -134,7 +136,11 @@ def step_matrix(
         [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
         axis=1,
     )
-    held = np.stack(
+    return weights, corner_sums(weights)
+
+
+def corner_sums(weights: FloatArray) -> FloatArray:
+    """#C by 3, sums at the cells' corners of the weights along their edges 0-1, 1-2, 2-0."""
+    return np.stack(
         [weights[:, 2] + weights[:, 0], weights[:, 0] + weights[:, 1], weights[:, 1] + weights[:, 2]], axis=1
     )
-    return weights, held

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
 from typing import TYPE_CHECKING, Any
@@ -11,12 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
-from warpflat.tightness import MAPS, Misfit, WornFit, assess_fit
+from warpflat.tightness import Misfit, WornFit, assess_fit
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
 
-__all__ = ["Remedy", "fit_lines", "remedies", "wear_measures", "write_wear_picture"]
+__all__ = ["Remedy", "fit_lines", "garment_wear", "help_words", "remedies", "wear_measures"]
 
 IntArray = NDArray[np.int32]
 
@@ -27,8 +26,6 @@ _TRIAL_TOLERANCE = 20.0
 _MOST_TRIALS = 8
 # Nobody sews a dart shorter than this [m].
 _LEAST_CUT = 0.025
-# Below these a map would show rounding.
-_LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -160,6 +157,32 @@ def _tried(result: Flattening, remedy: Remedy) -> Remedy:
     return replace(remedy, outside=assess_fit(opened.network, opened.positions).outside)
 
 
+def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """How a garment of several pieces sits, from their entries in `metrics.json`; `fits` if every piece does.
+
+    Args:
+        pieces: by name, with `wear` and `area_m2`.
+    """
+    worn = {name: piece["wear"] for name, piece in pieces.items()}
+    area = {name: float(piece["area_m2"]) for name, piece in pieces.items()}
+    unfit = {name: wear for name, wear in worn.items() if not wear["fits"]}
+    return {
+        "fits": not unfit,
+        "outside": sum(wear["outside"] * area[name] for name, wear in worn.items()) / sum(area.values()),
+        "where_not": [f"{name}: {words}" for name, wear in unfit.items() for words in wear["where_not"]],
+        "would_help": [{"piece": name, **remedy} for name, wear in unfit.items() for remedy in wear["would_help"]],
+    }
+
+
+def help_words(remedy: Mapping[str, Any], outside: float | None = None) -> str:
+    """A remedy as in `metrics.json`, in words; with the share beyond the limit before it, if that is given."""
+    after = remedy["outside_after"]
+    if after is None:
+        return f"may help: {remedy['cut']}"
+    before = "" if outside is None else f"{100 * outside:.1f} % -> "
+    return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit"
+
+
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """What the console says of each piece's fit: one line, and one for each place and remedy where it does not."""
     lines = []
@@ -179,87 +202,13 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if wear["fits"]:
             continue
         lines += [f"  where not: {words}" for words in wear["where_not"]]
-        for remedy in wear["would_help"]:
-            after = remedy["outside_after"]
-            gain = "" if after is None else f": {100 * wear['outside']:.1f} % -> {100 * after:.1f} % beyond the limit"
-            lines.append(f"  {'may help' if after is None else 'would help'}: {remedy['cut']}{gain}")
+        lines += [f"  {help_words(remedy, wear['outside'])}" for remedy in wear["would_help"]]
         if not wear["would_help"]:
             lines.append("  would help: another fabric, or another stretch; no single dart does")
+    if "wear" in metrics:
+        unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
+        verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
+        lines.append(
+            f"garment: fits: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
+        )
     return lines
-
-
-def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
-    """Strains, tensions and pressure on the pattern, six maps with their scales; what lies beyond the limit is outlined.
-
-    Args:
-        path: the file, ``*.png``.
-        result: a flattened piece.
-
-    Raises:
-        InputError: the file cannot be written.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    from warpflat.export.atomic import atomic_path, require_writable
-
-    require_writable(path)
-    span = np.ptp(result.positions, axis=0)
-    width = 3.4
-    height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
-    figure = Figure(figsize=(3 * (width + 1.1), 2 * (height + 0.75) + 0.5), dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
-    axes = figure.subplots(2, 3)
-    for axis, name in zip(axes.ravel(), MAPS, strict=True):
-        _draw_map(figure, axis, result, name)
-    fit = result.fit
-    verdict = (
-        "fits" if fit.fits else f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
-    )
-    figure.suptitle(
-        f"{result.surface.name} in {result.fabric.name}, as worn: {verdict}; limit {100 * fit.limit:.3g} %", fontsize=12
-    )
-    figure.tight_layout()
-    with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": "warpflat"})
-
-
-def _draw_map(figure: Any, axis: Any, result: Flattening, name: str) -> None:
-    from matplotlib.collections import LineCollection, PolyCollection
-
-    from warpflat.export.colours import weighted_percentile
-    from warpflat.surface.topology import border_edges
-
-    fit, p = result.fit, result.positions
-    label, factor, unit = MAPS[name]
-    values = factor * getattr(fit, name)
-    polygons = [p[face[face >= 0]] for face in result.faces]
-    low, high = (weighted_percentile(values, fit.area, share) for share in (0.01, 0.99))
-    least = _LEAST_SCALE[unit]
-    if (low > 0.3 * high and high > least) or name == "pressure":
-        # All of it pulls: from the least to the most, or from nothing where that is near.
-        colours, low, high = "YlOrRd", 0.0 if low < 0.3 * high else low, max(high, least)
-        high = max(high, low + 0.1 * least)
-    else:
-        # White is rest; red pulls, blue is slack.
-        colours, high = "RdBu_r", max(abs(low), abs(high), least)
-        low = -high
-    drawn = PolyCollection(
-        polygons, array=values, cmap=colours, edgecolors="face", linewidths=0.2, clim=(low, high), rasterized=True
-    )
-    axis.add_collection(drawn)
-    axis.add_collection(LineCollection(list(p[border_edges(result.faces)]), colors="black", linewidths=0.9))
-    if fit.misfits:
-        for misfit in fit.misfits:
-            axis.add_collection(
-                LineCollection(list(p[border_edges(result.faces[misfit.faces])]), colors="#00a000", linewidths=0.7)
-            )
-    axis.set_aspect("equal")
-    axis.autoscale_view()
-    axis.set_axis_off()
-    middle = weighted_percentile(values, fit.area, 0.5)
-    shown = f"{middle:,.0f}" if abs(middle) >= 100 else f"{middle:.3g}"
-    axis.set_title(f"{label}, median {shown} {unit}", fontsize=10)
-    bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend="both" if name != "pressure" else "max", pad=0.02)
-    bar.set_label(unit, fontsize=9)
-    bar.ax.tick_params(labelsize=8)

@@ -15,6 +15,7 @@ from warpflat.membrane import cloth_of
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import border_edges
+from warpflat.tangent import TangentMatrix
 
 DEVICE = "cpu"
 CLOTH = Fabric(
@@ -129,6 +130,44 @@ def bent_quads() -> tuple[FloatArray, FloatArray]:
     return np.array(points), faces
 
 
+def creased_quads(diagonal: int) -> tuple[FloatArray, FloatArray]:
+    """A sheet of random quads that may be folded along a diagonal of every third: the lines x - y = 0, 3, 6 and -3."""
+    rng = np.random.default_rng(9)
+    x, y = np.meshgrid(np.arange(10.0), np.arange(7.0))
+    on_line = (x - y) % 3 == 0
+    slide = np.where(on_line, rng.uniform(-0.2, 0.2, x.shape), 0.0)
+    shift = np.where(on_line[..., None], slide[..., None], rng.uniform(-0.2, 0.2, (*x.shape, 2)))
+    points = 0.03 * (np.stack([x, y], axis=-1) + shift).reshape(-1, 2)
+    index = np.arange(70).reshape(7, 10)
+    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    if diagonal:
+        points[:, 0] *= -1.0
+        faces = faces[:, ::-1]
+    return points, faces
+
+
+def folded(points: FloatArray, F: FloatArray, diagonal: int) -> FloatArray:
+    """The flat points of `creased_quads` under F, folded along its lines to and fro by different angles."""
+    along = F @ np.array([-1.0 if diagonal else 1.0, 1.0])
+    along = along / np.linalg.norm(along)
+    out = np.array([along[1], -along[0]])
+    mapped = points @ F.T
+    distance = mapped @ out
+    lines = np.array([-0.09, 0.0, 0.09, 0.18]) * np.sqrt(0.5)
+    sign = -1.0 if diagonal else 1.0
+    of_line = np.sort([(np.array([sign * d * np.sqrt(2.0), 0.0]) @ F.T) @ out for d in lines])
+    breaks = np.concatenate([[distance.min() - 1.0], of_line, [distance.max() + 1.0]])
+    slope = np.array([0.2, 0.9, 0.4, -0.5, 0.3])
+    run = np.concatenate([[0.0], np.cumsum(np.diff(breaks) * np.cos(slope))])
+    rise = np.concatenate([[0.0], np.cumsum(np.diff(breaks) * np.sin(slope))])
+    return np.column_stack(
+        [
+            np.outer(mapped @ along, along) + np.outer(np.interp(distance, breaks, run), out),
+            np.interp(distance, breaks, rise),
+        ]
+    )
+
+
 def density(fabric: Fabric, F: FloatArray, grain_angle: float) -> float:
     """The closed form, for threads in tension and pressed ones alike."""
     warp, weft = grain_axes(grain_angle)
@@ -139,6 +178,20 @@ def density(fabric: Fabric, F: FloatArray, grain_angle: float) -> float:
     return 0.5 * share * (k1 * e1**2 + k2 * e2**2 + 2 * nu * k2 * e1 * e2) + 0.5 * fabric.shear_stiffness * gamma**2
 
 
+def flat_and_worn(mesh: str, F: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Points in the plane, faces, and the points on the body, which is the plane strained by F and folded."""
+    if mesh == "random triangles":
+        points, faces = random_triangles()
+        return points, faces, worn(points, F, fold=False)
+    if mesh == "quads bent between rows":
+        points, faces = bent_quads()
+        return points, faces, worn(points, F, fold=True)
+    diagonal = int(mesh == "quads creased along 1-3")
+    points, faces = creased_quads(diagonal)
+    return points, faces, folded(points, F, diagonal)
+
+
+MESHES = ["random triangles", "quads bent between rows", "quads creased along 0-2", "quads creased along 1-3"]
 STRAINS = {
     "warp": [[1.0, 0.0], [0.0, 1.03]],
     "weft": [[1.04, 0.0], [0.0, 1.0]],
@@ -150,12 +203,12 @@ STRAINS = {
 
 @pytest.mark.parametrize("ratio", [2.7, 100.0])
 @pytest.mark.parametrize("strain", STRAINS)
-@pytest.mark.parametrize("mesh", ["random triangles", "bent quads"])
+@pytest.mark.parametrize("mesh", MESHES)
 def test_a_patch_under_uniform_strain_stores_the_membrane_s_energy(mesh: str, strain: str, ratio: float):
     fabric = replace(CLOTH, shear_stiffness=CLOTH.stiffness_weft / ratio)
     F = np.array(STRAINS[strain])
-    points, faces = random_triangles() if mesh == "random triangles" else bent_quads()
-    surface = make_surface(worn(points, F, fold=mesh == "bent quads"), faces, sliver_tolerance=0.0)
+    points, faces, body = flat_and_worn(mesh, F)
+    surface = make_surface(body, faces, sliver_tolerance=0.0)
     network = network_of(surface, fabric, points)
     area = 0.5 * sum(
         w * abs(np.linalg.det([points[c[1]] - points[c[0]], points[c[2]] - points[c[0]]]))
@@ -220,6 +273,24 @@ def test_a_strip_pulled_along_a_curve_contracts_by_poisson():
     assert stress[0] == pytest.approx(float(fabric.tension(e, "warp")), rel=1e-9)
 
 
+def test_threads_lock_once_they_are_sheared_by_45_degrees():
+    def sheared(degrees: float) -> FloatArray:
+        angle = np.radians(degrees)
+        return np.array([[1.0, np.sin(angle)], [0.0, np.cos(angle)]])
+
+    below, stress = one_cell(sheared(44.0), CLOTH)
+    assert below == pytest.approx(0.5 * CLOTH.shear_stiffness * np.sin(np.radians(44.0)) ** 2, rel=1e-9)
+    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * np.sin(np.radians(44.0)), rel=1e-9)
+    # Threads side by side would cost 1/2 G = 25 J/m2; half of the softer thread's stiffness holds them apart.
+    beyond = np.sin(np.radians(80.0)) - np.sqrt(0.5)
+    locked, stress = one_cell(sheared(80.0), CLOTH)
+    free = 0.5 * CLOTH.shear_stiffness * np.sin(np.radians(80.0)) ** 2
+    assert locked == pytest.approx(free + 0.5 * 300.0 * beyond**2, rel=1e-9)
+    assert stress[2] == pytest.approx(CLOTH.shear_stiffness * np.sin(np.radians(80.0)) + 300.0 * beyond, rel=1e-9)
+    other, back = one_cell(sheared(-80.0), CLOTH)
+    assert (other, back[2]) == pytest.approx((locked, -stress[2]), rel=1e-9)
+
+
 def test_pressed_cloth_wrinkles():
     fabric = replace(CLOTH, compression_factor=0.1)
     both, stress = one_cell(np.diag([0.97, 0.98]), fabric)
@@ -235,16 +306,18 @@ def test_pressed_cloth_wrinkles():
     assert one_cell(F, fabric)[0] == pytest.approx(density(fabric, F, 0.0), rel=1e-9)
 
 
+@pytest.mark.parametrize("shear", [0.0, 1.3])
 @pytest.mark.parametrize("meant", [None, (1.1, 1.25)])
 @pytest.mark.parametrize("name", CLOTHS)
-def test_forces_are_minus_the_gradient(name: str, meant: tuple[float, float] | None):
+def test_forces_are_minus_the_gradient(name: str, meant: tuple[float, float] | None, shear: float):
     x, y = np.meshgrid([-0.1, 0.0, 0.1], [0.0, 0.11, 0.24])
     points = np.stack([x + 0.01 * y, y, 1.5 * x**2 - 0.8 * y**2], axis=-1).reshape(-1, 3)
     faces = [[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 7, -1], [3, 7, 6, -1], [4, 5, 8, -1], [4, 8, 7, -1]]
     surface = make_surface(points, faces)
     stretch = None if meant is None else np.tile(meant, (6, 1))
     network = network_of(surface, CLOTHS[name], points[:, :2], grain_angle=20.0, stretch=stretch)
-    flat = 0.97 * points[:, :2] + np.random.default_rng(1).normal(scale=0.004, size=(9, 2))
+    flat = 0.97 * points[:, :2] @ np.array([[1.0, 0.0], [shear, 1.0]])
+    flat += np.random.default_rng(1).normal(scale=0.004, size=(9, 2))
     force = evaluated(network, flat)["vertex_force"]
     step, slope = 1e-7, np.zeros_like(flat)
     for i, k in np.ndindex(flat.shape):
@@ -282,6 +355,43 @@ def test_the_step_s_matrix_bounds_the_membrane_s_stiffness(mesh: str, name: str)
     assert slack.min() > -1e-5 * np.abs(hessian).max()
     held = np.bincount(network.cell_arrays.corner.ravel(), network.cloth.held.numpy(), minlength=n)
     np.testing.assert_allclose(held, np.diag(laplacian), rtol=1e-12)
+
+
+@pytest.mark.parametrize("name", ["plain", "poisson", "soft shear"])
+def test_viscosity_is_the_rate_of_the_forces_over_a_time_step(name: str):
+    points, faces = random_triangles()
+    network = network_of(
+        make_surface(worn(points, np.eye(2), fold=False), faces), CLOTHS[name], points, grain_angle=20.0
+    )
+    moving = np.random.default_rng(6).normal(size=points.shape)
+    viscosity = evaluated(network, points, moving)["viscosity"]
+    step = 1e-8
+    there, back = (evaluated(network, points + s * step * moving)["force"] for s in (1, -1))
+    np.testing.assert_allclose(viscosity, 0.01 * (there - back) / (2 * step), atol=1e-5 * np.abs(viscosity).max())
+
+
+def test_the_matrix_that_follows_bounds_the_stiffness_of_the_present_layout_and_is_the_same_at_rest():
+    points, faces = random_triangles()
+    network = network_of(make_surface(worn(points, np.eye(2), fold=False), faces), CLOTHS["soft shear"], points)
+    at_rest = np.array(network.springs.stiffness.numpy())
+    matrix = TangentMatrix(network)
+    matrix.follow(wp.array(points, dtype=wp.vec2d, device=DEVICE))
+    np.testing.assert_allclose(network.springs.stiffness.numpy(), at_rest, rtol=1e-6, atol=1e-9 * at_rest.max())
+    flat = points @ np.array([[1.2, 0.4], [0.0, 0.8]])
+    matrix.follow(wp.array(flat, dtype=wp.vec2d, device=DEVICE))
+    assert np.abs(network.springs.stiffness.numpy() - at_rest).max() > 0.5 * at_rest.max()
+    # Nothing is left for the diagonal, and x . H x <= sum k_ij |x_i - x_j|^2 for the part of H without second derivatives.
+    assert evaluated(network, flat)["stiffness"].max() < 1e-9 * at_rest.max()
+    springs, rng = network.springs, np.random.default_rng(7)
+    offset, neighbor = springs.offset.numpy(), springs.neighbor.numpy()
+    k, here = springs.stiffness.numpy(), np.repeat(np.arange(len(flat)), np.diff(springs.offset.numpy()))
+    assert offset[-1] == len(neighbor)
+    for trial in range(40):
+        v = rng.normal(size=flat.shape) if trial % 2 else np.sin(flat @ rng.normal(size=(2, 2)) * 20.0)
+        viscosity = evaluated(network, flat, v)["viscosity"]
+        power = -np.einsum("ij,ij->", viscosity, v[network.cell_arrays.corner.ravel()]) / 0.01
+        held = 0.5 * (k * ((v[here] - v[neighbor]) ** 2).sum(axis=1)).sum()
+        assert 0.0 <= power <= held * (1.0 + 1e-12)
 
 
 def test_a_collapsing_cell_costs_without_bound_and_a_mirrored_one_is_refused():

@@ -18,6 +18,7 @@ from warpflat.surface.topology import triangulate
 __all__ = ["DrawnView", "Facets", "View", "facets_of", "pattern_view", "surface_view"]
 
 _FINE = 500_000  # triangles, about as many as pixels: from here on smooth light and smooth edges show no difference
+_SEGMENTS_TO_A_PATH = 500
 _MARGIN = 3  # pixels around the image of a mesh
 _LIGHT = np.array([-0.42, 0.55, 0.72]) / np.linalg.norm([-0.42, 0.55, 0.72])  # right, up, towards the viewer
 _BACK = np.array([0.80, 0.80, 0.79])
@@ -160,12 +161,10 @@ class DrawnView:
 
     def draw(self, axes: Any, face_colours: NDArray[np.float64]) -> None:
         """The coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
-        colours, covered = self._shade(face_colours)
         margin = _MARGIN / self._dpi
         left, bottom = self.left - margin, self.bottom - margin
         extent = (left, left + self._columns / self._dpi, bottom, bottom + self._rows / self._dpi)
-        pixels = np.round(reduce_samples(colours, covered, self._per_pixel) * 255).astype(np.uint8)
-        axes.imshow(pixels, extent=extent, interpolation="nearest", aspect="auto", zorder=1)
+        axes.imshow(self._image(face_colours), extent=extent, interpolation="nearest", aspect="auto", zorder=1)
         self._draw_mesh(axes)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
@@ -173,16 +172,18 @@ class DrawnView:
         self, axes: Any, edges: NDArray[np.int32], *, width: float, colour: Any = INK, halo: bool = False, zorder: float
     ) -> None:
         """The visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
-        from matplotlib.collections import LineCollection
+        from matplotlib.collections import PathCollection
+        from matplotlib.path import Path
 
         if len(edges):
             segments = self._visible(edges)
+            # Many to a path: a path each takes longer to set up than all of them to draw.
+            parts = [segments[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(segments), _SEGMENTS_TO_A_PATH)]
+            paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
             layers = [((1.0, 1.0, 1.0, 0.7), width + 1.6, HALO_LAYER)] if halo else []
             for ink, thickness, layer in (*layers, (colour, width, zorder)):
-                lines = LineCollection(
-                    list(segments), colors=[ink], linewidths=thickness, capstyle="round", zorder=layer
-                )
-                axes.add_collection(lines)
+                look = {"edgecolors": [ink], "linewidths": thickness, "capstyle": "round", "zorder": layer}
+                axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
 
     def visible_line(self, line: NDArray[np.int32]) -> NDArray[np.float64]:
         """#N by 2 [in], the longest stretch of a polyline of vertices that can be seen."""
@@ -203,29 +204,62 @@ class DrawnView:
         result[:, 2] = points[:, 2]
         return result
 
-    def _shade(self, face_colours: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
-        triangle = self._samples.triangle
-        covered = triangle >= 0
-        colours = face_colours[self.view.facets.face_of_triangle[triangle]]
-        if self.view.vectors is not None:
-            normals = self._normals(self.view.vectors)
-            lengths = np.linalg.norm(normals, axis=-1, keepdims=True)
-            normals = normals / np.where(lengths > 0.0, lengths, 1.0)
-            behind = normals[..., 2] < 0.0
-            # The reverse of the cloth, seen through a neck or an armhole, is grey: the colours belong to its face.
-            colours = np.where(behind[..., None], 0.25 * colours + 0.75 * _BACK, colours)
-            lit = np.clip(np.where(behind[..., None], -normals, normals) @ _LIGHT, 0.0, 1.0)
-            light = np.where(behind, 0.62, 0.55) + np.where(behind, 0.25, 0.50) * lit
-            colours = np.clip(colours * light[..., None], 0.0, 1.0)
-        return colours, covered
+    def _image(self, face_colours: NDArray[np.float64]) -> NDArray[np.uint8]:
+        """#R by #C by 4, the pixels. One whose samples all show the same triangle is shaded once, others sample by sample."""
+        side = self._per_pixel
+        blocks = self._samples.triangle.reshape(self._rows, side, self._columns, side)
+        first = blocks[:, 0, :, 0]
+        alike = np.ones(first.shape, dtype=bool)
+        for i in range(side):
+            for j in range(side):
+                alike &= blocks[:, i, :, j] == first
+        pixels = np.zeros((self._rows, self._columns, 4), dtype=np.float32)
+        colours = face_colours[self.view.facets.face_of_triangle].astype(np.float32)
+        row, column = np.nonzero(alike & (first >= 0))
+        middle = np.column_stack([column + 0.5, row + 0.5]) * side
+        pixels[row, column, :3] = self._shaded(first[row, column], middle, colours)
+        pixels[row, column, 3] = 1.0
+        row, column = np.nonzero(~alike)
+        samples = blocks[row, :, column, :]
+        covered = samples >= 0
+        pixel, i, j = np.nonzero(covered)
+        spots = np.column_stack([column[pixel] * side + j + 0.5, row[pixel] * side + i + 0.5])
+        shaded = np.zeros((*samples.shape, 3), dtype=np.float32)
+        shaded[covered] = self._shaded(samples[covered], spots, colours)
+        across = (side, len(row) * side)
+        shaded, covered = shaded.transpose(1, 0, 2, 3).reshape(*across, 3), covered.transpose(1, 0, 2).reshape(across)
+        pixels[row, column] = reduce_samples(shaded, covered, side)[0]
+        return np.asarray(np.round(pixels * 255).astype(np.uint8))
 
-    def _normals(self, vectors: NDArray[np.float64]) -> NDArray[np.float64]:
-        """#R by #C by 3, normals of any length at each sample: blended, of a fine mesh each triangle's own."""
+    def _shaded(
+        self, triangle: NDArray[np.int32], spots: NDArray[np.float64], colours: NDArray[np.float32]
+    ) -> NDArray[np.float32]:
+        """#S by 3, the colours (#T by 3) of triangles (#S) in the light at spots on them (#S by 2, column and row)."""
+        shown = colours[triangle]
+        if self.view.vectors is None:
+            return shown
+        normals = self._normals(triangle, spots)
+        lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
+        towards = (normals @ _LIGHT.astype(np.float32)) / np.where(lengths > 0.0, lengths, 1.0)
+        behind = normals[:, 2] < 0.0
+        # The reverse of the cloth, seen through a neck or an armhole, is grey: the colours belong to its face.
+        shown[behind] = 0.25 * shown[behind] + 0.75 * _BACK.astype(np.float32)
+        lit = np.clip(np.where(behind, -towards, towards), 0.0, 1.0)
+        light = np.where(behind, np.float32(0.62), np.float32(0.55)) + np.where(behind, 0.25, 0.50) * lit
+        return np.asarray(np.clip(shown * light[:, None].astype(np.float32), 0.0, 1.0))
+
+    @cached_property
+    def _smooth(self) -> NDArray[np.float32]:
+        """#V by 3, the normals at the vertices."""
+        assert self.view.vectors is not None
+        return vertex_normals(self.view.vectors, self.view.facets.triangles, len(self.view.points)).astype(np.float32)
+
+    def _normals(self, triangle: NDArray[np.int32], spots: NDArray[np.float64]) -> NDArray[np.float32]:
+        """#S by 3, normals of any length at spots: blended, of a fine mesh each triangle's own."""
+        assert self.view.vectors is not None
         if self._fine:
-            return np.asarray(vectors[self._samples.triangle])
-        triangles = self.view.facets.triangles
-        smooth = vertex_normals(vectors, triangles, len(self.view.points))
-        return interpolate(self._samples, self._grid, triangles, smooth)
+            return self.view.vectors[triangle].astype(np.float32)
+        return interpolate(triangle, spots, self._grid, self.view.facets.triangles, self._smooth)
 
     def _draw_mesh(self, axes: Any) -> None:
         faces = self.view.facets.faces
@@ -240,7 +274,7 @@ class DrawnView:
         self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
 
     def _visible(self, edges: NDArray[np.int32]) -> NDArray[np.float64]:
-        """#S by 2 by 2 [in], the edges, on a surface cut into short pieces of which the hidden ones are left out."""
+        """#S by 2 by 2 [in], the edges, on a surface without their hidden parts, which are found in short pieces."""
         a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
         if self.view.vectors is None:
             return np.stack([self.to_page(a), self.to_page(b)], axis=1)
@@ -251,7 +285,9 @@ class DrawnView:
         begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
         start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
         seen = self._seen(self._to_samples(0.5 * (start + stop)))
-        return np.stack([self.to_page(start[seen]), self.to_page(stop[seen])], axis=1)
+        goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
+        first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
+        return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
     def _seen(self, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
         """#N, whether points on the mesh (#N by 3, as samples) are in front, with room for the mesh's own slope."""

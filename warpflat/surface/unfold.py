@@ -83,8 +83,8 @@ def _normal_turns(
     used = faces >= 0
     at = place[faces[used]]
     spread = np.broadcast_to(of_face[:, None], (*faces.shape, 3))[used]
-    normal = np.stack([np.bincount(at, spread[:, k]) for k in range(3)], axis=1)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1), np.finfo(float).tiny)[:, None]
+    total = np.stack([np.bincount(at, spread[:, k]) for k in range(3)], axis=1)
+    normal = total / np.maximum(np.linalg.norm(total, axis=1), np.finfo(float).tiny)[:, None]
     n = normal[place[faces[index]]]
     return np.stack(
         [
