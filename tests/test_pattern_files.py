@@ -18,7 +18,8 @@ from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_json
 from warpflat.export.svg import write_svg
 from warpflat.flattening import flatten
-from warpflat.pattern import draft_garment
+from warpflat.pattern import Dart, Edge, Piece, draft_garment, draft_piece
+from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.read_json import pattern_from_json, read_pattern_json
 from warpflat.pattern.sample import sample_dress
@@ -119,6 +120,11 @@ def test_a_marker_is_made_when_asked_for(tmp_path: Path):
     assert marker["width_m"] == 0.9
     assert 0.5 < marker["length_m"] < 0.6
     assert len(marker["placements"]) == 1
+    metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
+    assert metrics["marker"] == {key: marker[key] for key in metrics["marker"]}
+    assert metrics["marker"]["pieces"] == 1
+    assert metrics["pattern"]["fit_error_mm"] < 0.5
+    assert result.metrics["marker"] == metrics["marker"]
     assert any(note.startswith("marker: 0.") and "0.90 m wide" in note for note in result.notes)
 
 
@@ -153,6 +159,28 @@ def test_a_ragged_border_gets_a_wider_tolerance_and_says_so(tmp_path: Path):
     assert any("border is ragged" in note for note in written.notes)
     (piece,) = read_pattern_json(tmp_path / "pattern.json").pieces[""]
     assert sum(len(edge.curve.bezier) for edge in piece.edges) < 60
+
+
+def test_two_ragged_sides_of_a_dart_are_smoothed_alike_and_stay_equally_long():
+    """As a cut across a coarse mesh leaves them: each juts out in its own way."""
+    random = np.random.default_rng(4)
+    share = np.linspace(0, 1, 41)[:, None]
+    tip, mouth = np.array([0.2, 0.3]), np.array([0.14, 0.0])
+    bow = np.array([-0.02, 0.0]) * np.sin(np.pi * share)
+    left = mouth + share * (tip - mouth) + bow
+    right = np.array([0.4, 0.0]) * [1, 0] + left * [-1, 1]
+    for leg in (left, right):
+        leg[1:-1] += random.normal(0, 1e-3, (39, 2))
+    corners = np.array([right[0], (0.4, 0.0), (0.4, 0.5), (0.0, 0.5), (0.0, 0.0), left[0]])
+    edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
+    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
+    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
+    first, second = piece.edge("l"), piece.edge("r")
+    assert first.tolerance == second.tolerance > 1e-4
+    assert first.length == pytest.approx(second.length, abs=2e-4)
+    assert max(len(first.curve.bezier), len(second.curve.bezier)) <= 12 < len(fit_curve(left).bezier)
+    assert max(first.fit_error, second.fit_error) < 0.004
+    assert [note for note in piece.notes if "legs differ" in note] == []
 
 
 # --- once more, from pattern.json

@@ -21,6 +21,7 @@ __all__ = [
     "FORMATS",
     "PatternOptions",
     "WrittenPattern",
+    "add_metrics",
     "export_pattern",
     "garment_files",
     "pattern_options",
@@ -28,10 +29,6 @@ __all__ = [
 ]
 
 FORMATS = ("dxf", "svg", "pdf", "json")
-#: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
-TOLERANCES = (1e-4, 3e-4, 1e-3, 2e-3)
-#: A clean border has no more than one curve for so much of its length [m], in the mean.
-CURVE = 0.010
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -60,10 +57,11 @@ class PatternOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenPattern:
-    """Names of the files, and what the maker should know, one sentence each."""
+    """Names of the files, what the maker should know, one sentence each, and entries of `metrics.json`."""
 
     files: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    metrics: Mapping[str, Any] = field(default_factory=dict)
 
 
 def garment_files(
@@ -181,27 +179,56 @@ def _drawn(
         *notes,
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
+    metrics: dict[str, Any] = {"pattern": _measures(drafted)}
     if options.cloth is not None:
-        marked, told = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+        marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
         files += marked
         notes = (*notes, *told)
-    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)))
+        if plan:
+            metrics["marker"] = plan
+    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
+
+
+def add_metrics(folder: Path, written: WrittenPattern, metrics: Mapping[str, Any]) -> dict[str, Any]:
+    """The metrics of a run with those of its pattern, in its `metrics.json` too."""
+    from warpflat.export import write_json
+
+    together = {**metrics, **written.metrics}
+    if written.metrics:
+        write_json(folder / "metrics.json", together)
+    return together
+
+
+def _measures(drafted: DraftedGarment) -> dict[str, Any]:
+    """How far curves keep from the mesh, and sides of seams from each other, at worst."""
+    edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
+    near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
+    return {
+        "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
+        "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
+        "seam_difference_per_50mm_mm": max(near, default=None),
+        "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
+    }
 
 
 def _drafted(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
-    """The pattern drafted; without a tolerance given, with the least that makes clean curves of its borders."""
+    """The pattern drafted, and where its curves had to leave the border of the mesh."""
     from warpflat.pattern import draft_garment
+    from warpflat.pattern.curves import TOLERANCE
 
-    if tolerance is not None:
-        return draft_garment(pattern, tolerance=tolerance), ()
-    for tried in TOLERANCES:
-        drafted = draft_garment(pattern, tolerance=tried)
-        edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
-        if sum(len(edge.curve.bezier) - 1 for edge in edges) <= sum(edge.length for edge in edges) / CURVE:
-            break
-    if tried == TOLERANCES[0]:
+    drafted = draft_garment(pattern, tolerance=tolerance)
+    ragged: dict[str, float] = {}
+    for pieces in drafted.pieces.values():
+        for piece in pieces:
+            for edge in piece.edges:
+                if tolerance is None and edge.tolerance > TOLERANCE:
+                    name = f"{piece.name}.{edge.name}"
+                    ragged[name] = max(ragged.get(name, 0.0), edge.fit_error)
+    if not ragged:
         return drafted, ()
-    return drafted, (f"the border is ragged: the pattern's curves keep within {tried * 1000:g} mm of it",)
+    return drafted, (
+        f"the border is ragged at {', '.join(ragged)}: the curves keep within {max(ragged.values()) * 1000:.1f} mm of it",
+    )
 
 
 def _write(
@@ -234,7 +261,7 @@ def _write(
 
 def _marker(
     drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
-) -> tuple[list[str], tuple[str, ...]]:
+) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
     """Write `NAME.marker.svg` and `NAME.marker.json`, for one garment of each size."""
     from warpflat.export import write_json
     from warpflat.export.svg import write_marker_svg
@@ -243,7 +270,7 @@ def _marker(
     try:
         marker = make_marker(drafted, cloth, seconds=seconds)
     except InputError as error:
-        return [], (f"no marker was made: {error}",)
+        return [], (f"no marker was made: {error}",), {}
     files = [f"{name}.marker.svg", f"{name}.marker.json"]
     write_marker_svg(marker, folder / files[0])
     placements: list[dict[str, Any]] = [
@@ -256,16 +283,16 @@ def _marker(
         }
         for copy in marker.placements
     ]
-    write_json(
-        folder / files[1],
-        {
-            "schema": 1,
-            "width_m": marker.width,
-            "length_m": marker.length,
-            "utilisation": marker.utilisation,
-            "placements": placements,
-        },
+    measures: dict[str, Any] = {
+        "width_m": marker.width,
+        "length_m": marker.length,
+        "utilisation": marker.utilisation,
+        "pieces": len(placements),
+        "garments": len(drafted.pieces),
+    }
+    write_json(folder / files[1], {"schema": 1, **measures, "placements": placements})
+    told = (
+        f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
+        f"{len(placements)} pieces"
     )
-    return files, (
-        f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used",
-    )
+    return files, (told,), measures

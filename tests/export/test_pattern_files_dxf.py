@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+import os
+import re
+import shutil
+import subprocess
 from datetime import datetime
 from itertools import pairwise
+from xml.etree import ElementTree as ET
 
 import ezdxf
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 from shapely.geometry import LinearRing, Point
 
 from warpflat.errors import InputError
@@ -97,7 +103,7 @@ def test_sewing_lines_and_mirror_line_keep_their_names(dress, file):
     (piece,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
     block = document.blocks.get("FRONT_BODICE_38")
     named = {t.dxf.text for t in block.query('TEXT[layer=="15"]')}
-    assert named == {f"EDGE: {e.name}" for e in piece.edges}
+    assert named == {f"EDGE: {e.name}" for e in piece.edges} | {f"DART: {d.dart.name}" for d in piece.darts}
     (mirror,) = block.query('LINE[layer=="6"]')
     assert abs(mirror.dxf.start.x) < 1e-6
     assert abs(mirror.dxf.end.x) < 1e-6
@@ -158,6 +164,37 @@ def test_the_same_pattern_gives_the_same_bytes(dress, tmp_path):
     for name in ("a.dxf", "b.dxf"):
         write_dxf(dress, tmp_path / name, created=CREATED, sizes=["38"])
     assert (tmp_path / "a.dxf").read_bytes() == (tmp_path / "b.dxf").read_bytes()
+
+
+@pytest.mark.skipif(
+    not (shutil.which("librecad") and shutil.which("pdftocairo")),
+    reason="librecad or pdftocairo (poppler) is not installed: no second program reads the DXF",
+)
+def test_another_cad_program_draws_the_outline_in_true_size(tmp_path):
+    """LibreCAD prints the file on A4 in scale 1; poppler says where its lines lie, to the printer's 1200 dots per inch."""
+    turn = np.linspace(0, np.pi / 2, 12)[:, None]
+    arc = np.array([0.05, 0.12]) + 0.05 * np.column_stack([np.cos(turn), np.sin(turn)])
+    corners = np.array([(0.05, 0.17), (0, 0.17), (0, 0), (0.1, 0), (0.1, 0.12)])
+    lines = [arc, *(np.stack(pair) for pair in pairwise(corners))]
+    piece = Piece(name="cuff", edges=[Edge(name=f"e{i}", points=line) for i, line in enumerate(lines)])
+    drafted = draft_garment(Garment(name="cuff", pieces={"": [piece]}))
+    write_dxf(drafted, tmp_path / "cuff.dxf", created=CREATED)
+    environment = {**os.environ, "QT_QPA_PLATFORM": "offscreen"}
+    printing = ["librecad", "dxf2pdf", "-c", "-s", "1", "cuff.dxf"]
+    subprocess.run(printing, cwd=tmp_path, env=environment, check=True, capture_output=True, timeout=60)
+    subprocess.run(["pdftocairo", "-svg", "cuff.pdf", "cuff.svg"], cwd=tmp_path, check=True, timeout=60)
+    drawn = []
+    for path in ET.parse(tmp_path / "cuff.svg").getroot().iter("{http://www.w3.org/2000/svg}path"):
+        a, b, c, d, e, f = map(float, re.findall(r"-?[\d.]+", path.get("transform", "matrix(1,0,0,1,0,0)")))
+        numbers = np.array(re.findall(r"-?\d+(?:\.\d+)?", path.get("d")), dtype=float).reshape(-1, 2)
+        drawn.append((numbers @ [[a, b], [c, d]] + [e, f]) * [25.4 / 72, -25.4 / 72])
+    seen = np.unique(np.round(np.concatenate(drawn), 3), axis=0)
+    expected = drafted.pieces[""][0].cut_line * 1000
+    near = KDTree(seen)
+    # Where on the page it lies is the printer's affair: some shift brings every point of the outline to an end of a line.
+    shifts = seen[np.newaxis] - expected[0]
+    missed = near.query((expected[:, np.newaxis] + shifts).reshape(-1, 2))[0].reshape(len(expected), -1)
+    assert missed.max(axis=0).min() < 0.05
 
 
 def test_unknown_options_say_what_is_valid(dress, tmp_path):

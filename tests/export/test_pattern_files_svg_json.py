@@ -13,7 +13,7 @@ import pytest
 
 from warpflat.errors import InputError
 from warpflat.export.pattern_json import pattern_json, write_pattern_json
-from warpflat.export.svg import write_marker_svg, write_svg
+from warpflat.export.svg import STYLE, write_marker_svg, write_svg
 from warpflat.pattern import draft_garment
 from warpflat.pattern.marker import Cloth, make_marker
 from warpflat.pattern.sample import sample_dress
@@ -87,6 +87,10 @@ def test_nested_sizes_lie_upon_each_other(dress, tmp_path):
     assert boxes[1][:, 0].max() - boxes[0][:, 0].max() == pytest.approx(10, abs=0.5)
     texts = [t.text for t in root.iter(f"{SVG}text")]
     assert "Sizes 36, 38" in texts
+    # Sewing lines would be a thicket in a nest; they keep their names and are not displayed.
+    side = [p for p in groups[1].findall(f"{SVG}path") if p.get("data-edge") == "side"]
+    assert [p.get("display") for p in side] == ["none"]
+    assert all(p.get("display") is None for p in groups[1].findall(f"{SVG}path") if p.get("class") == "cut")
 
 
 def test_the_marker_is_drawn_in_true_size(dress, tmp_path):
@@ -98,21 +102,39 @@ def test_the_marker_is_drawn_in_true_size(dress, tmp_path):
     assert len(root.findall(f"{SVG}g")) == 8
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed")
+@pytest.mark.skipif(CHROMIUM is None, reason="chromium is not installed: no browser opens the SVG")
 def test_a_browser_shows_the_right_size(dress, svg, tmp_path):
     script = (
-        "<script>addEventListener('load', () => { const s = document.querySelector('svg').getBoundingClientRect();"
-        " document.title = `size ${s.width} ${s.height}`; });</script>"
+        "<script>addEventListener('load', () => { const box = e => e.getBoundingClientRect();"
+        " const s = box(document.querySelector('svg')), c = box(document.getElementById('skirt_front-38.cut'));"
+        " document.title = `size ${s.width} ${s.height} ${c.width} ${c.height}`; });</script>"
     )
     body = svg.read_text(encoding="utf-8").split("?>", 1)[1]
     page = tmp_path / "page.html"
     page.write_text(f"<!doctype html><meta charset=utf-8><body style='margin:0'>{body}{script}", encoding="utf-8")
-    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--dump-dom", page.as_uri()]
+    quiet = ("quic", "background-networking", "component-update", "sync", "gpu")
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--no-first-run", *(f"--disable-{each}" for each in quiet)]
+    command += [f"--user-data-dir={tmp_path / 'profile'}", "--dump-dom", page.as_uri()]
     shown = subprocess.run(command, capture_output=True, text=True, timeout=60, check=True).stdout
-    width, height = map(float, re.search(r"<title>size ([\d.]+) ([\d.]+)</title>", shown).groups())
+    seen = [float(pixels) / 96 * 25.4 for pixels in re.search(r"<title>size ([\d. ]+)</title>", shown).group(1).split()]
     root = ET.parse(svg).getroot()
-    for pixels, text in ((width, root.get("width")), (height, root.get("height"))):
-        assert pixels / 96 * 25.4 == pytest.approx(float(text[:-2]), abs=0.1)
+    assert seen[:2] == pytest.approx([float(root.get(side)[:-2]) for side in ("width", "height")], abs=0.1)
+    (piece,) = (piece for piece in dress.pieces["38"] if piece.name == "skirt front")
+    assert seen[2:] == pytest.approx(np.ptp(piece.cut_line, axis=0) * 1000, abs=0.1), "the piece, in true size"
+
+
+@pytest.mark.skipif(
+    shutil.which("inkscape") is None, reason="inkscape is not installed: no drawing program opens the SVG"
+)
+def test_a_drawing_program_shows_the_right_size(dress, svg):
+    sizes = []
+    for side in ("width", "height"):
+        query = ["inkscape", "--query-id=skirt_front-38.cut", f"--query-{side}", str(svg)]
+        told = subprocess.run(query, capture_output=True, text=True, timeout=120, check=True).stdout
+        sizes.append(float(told.split()[-1]) / 96 * 25.4)
+    (piece,) = (piece for piece in dress.pieces["38"] if piece.name == "skirt front")
+    line = STYLE["cut"][1]
+    assert sizes == pytest.approx(np.ptp(piece.cut_line, axis=0) * 1000 + line, abs=0.2), "with its line's width"
 
 
 def test_json_holds_every_edge_stitch_and_the_map_to_the_mesh(dress, tmp_path):

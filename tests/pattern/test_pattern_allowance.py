@@ -192,6 +192,39 @@ def test_any_dart_folds_flat_under_the_cloth_beside_it(depth, opening, lean, slo
     assert flap.difference(mirrored.buffer(1e-5)).area < 1e-8
 
 
+@settings(max_examples=60, deadline=None, derandomize=True)
+@given(
+    opening=st.floats(0.15, np.radians(60)),
+    bow=st.floats(-0.06, 0.06),
+    twist=st.floats(-0.04, 0.04),
+    slope=st.floats(-0.4, 0.4),
+    fold_to=st.sampled_from(["left", "right"]),
+)
+def test_a_dart_with_curved_legs_keeps_its_wedge(opening, bow, twist, slope, fold_to):
+    """Legs as the cut of a mesh leaves them, bowed or like an S by some per cent of their length, in mirror image."""
+    assume(abs(bow) + 2 * abs(twist) < 0.08)
+    sides, wedge, _ = dart_sides(0.14, opening, 0.0, slope, slope, fold_to)
+    share = np.linspace(0, 1, 21)[:, None]
+    aside = 0.14 * (4 * bow * share * (1 - share) + 8 * twist * share * (1 - share) * (1 - 2 * share))
+
+    def bent(leg, side):
+        along = (leg[1] - leg[0]) / np.linalg.norm(leg[1] - leg[0])
+        return leg[0] + share * (leg[1] - leg[0]) + side * aside * np.array([-along[1], along[0]])
+
+    left, right = bent(wedge.left, 1.0), bent(wedge.right[::-1], -1.0)[::-1]
+    sides[1] = Wedge(name="dart", left=left, right=right, fold_to=fold_to)
+    chain = np.concatenate(
+        [s.points[:-1] if isinstance(s, Side) else np.concatenate([left[:-1], right[:-1]]) for s in sides]
+    )
+    body = shapely.Polygon(chain)
+    assume(body.is_valid)
+    cut = shapely.Polygon(cut_outline(sides).points)
+    assert cut.is_valid
+    assert body.difference(cut.buffer(1e-6)).area < 1e-9
+    ray = shapely.LineString([wedge.tip + 1e-4 * wedge.middle, wedge.tip + (0.14 * np.cos(opening / 2)) * wedge.middle])
+    assert cut.buffer(1e-6).contains(ray), "the wedge stays in the cloth up to its mouth"
+
+
 def test_a_plain_dart_gets_a_roof_of_known_height():
     # Legs at 100 mm and 20 degrees open, border square to the left leg's mouth chord: mirrored by hand.
     sides, wedge, _ = dart_sides(0.1, np.radians(20), 0.0, 0.0, 0.0)

@@ -134,7 +134,8 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, valid
         if edge.kind == "fold":
             _line(block, edge.line[[0, -1]], scale, "6")
         else:
-            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" else "14")
+            # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
+            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
         middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
         _text(block, f"EDGE: {edge.name}", middle, scale, "15", 0.003)
     _line(block, piece.grain, scale, "7")
@@ -143,8 +144,10 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, valid
     for dart in piece.darts:
         if dart.fold is not None:
             _polyline(block, dart.fold, scale, "8")
-    for line in piece.fisheyes.values():
+        _text(block, f"DART: {dart.dart.name}", dart.tip, scale, "15", 0.003)
+    for name, line in piece.fisheyes.items():
         _polyline(block, line, scale, "8", closed=True)
+        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
     for line in piece.cutouts.values():
         _polyline(block, line, scale, "11", closed=True)
     for hole in piece.drill_holes:

@@ -24,7 +24,8 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     """The whole pattern as plain lists and numbers. Lengths are metres, angles radians, y along the grain.
 
     A stitch sews two sides: each lists its edges in the order in which the seam meets them, and whether it runs against
-    the edge's own direction (counter-clockwise round its piece). Numbers are not rounded.
+    the edge's own direction (counter-clockwise round its piece). An edge's `point_lengths` say where along its line the points
+    of its mesh's border came to lie, and `fit_error` how far the curve keeps from them. Numbers are not rounded.
     """
     sample = next(iter(garment.pieces.values()))
     stitches: list[dict[str, Any]] = [
@@ -65,6 +66,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
                 "length_mm": list(report.length_mm),
                 "ease": report.ease,
                 "difference_mm": report.difference_mm,
+                "difference_per_50mm_mm": report.local_mm,
                 "matches": report.matches,
             }
             for report in garment.seams
@@ -100,6 +102,7 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
                 "fold": None if dart.fold is None else dart.fold.tolist(),
                 "fold_to": dart.fold_to,
                 "opening": dart.opening,
+                "length_mm": [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)],
             }
             for dart in piece.darts
         ],
@@ -139,6 +142,9 @@ def _edge(edge: DraftedEdge) -> dict[str, Any]:
         "bezier": edge.curve.bezier.tolist(),
         "straight": edge.curve.straight.tolist(),
         "line": edge.line.tolist(),
+        "fit_error": edge.fit_error,
+        "tolerance": edge.tolerance,
+        "point_lengths": edge.places.tolist(),
         "mesh_vertices": None if edge.edge.vertices is None else np.asarray(edge.edge.vertices).tolist(),
     }
 

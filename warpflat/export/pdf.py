@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from warpflat.errors import InputError, nearest
 from warpflat.export.atomic import atomic_path
 from warpflat.export.pdf_legend import LEGEND_SIZE, draw_legend, legend_page
-from warpflat.export.svg import STYLE
+from warpflat.export.svg import OF_SIZE, STYLE
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import Stroke, Words, draw_nest
 from warpflat.pattern.layout import Sheet, lay_out, nests
@@ -148,7 +148,7 @@ def write_pdf(
     if kind.tiled:
         legend_page(canvas, garment, chosen, sheet, tiling)
     for row, column in tiling.tiles:
-        _tile(canvas, tiling, row, column, garment.name)
+        _tile(canvas, tiling, row, column, garment.name.replace("_", " "))
     canvas.save()
     with atomic_path(path) as temporary:
         Path(temporary).write_bytes(stream.getvalue())
@@ -227,7 +227,7 @@ def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Se
     for placed in sheet.placed:
         for index, drawing in enumerate(draw_nest(placed.pieces)):
             nested = len(placed.pieces) > 1
-            for stroke in drawing.strokes:
+            for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
                 _stroke(canvas, stroke, placed.offset, index if nested else None)
             for words in drawing.words:
                 _words(
@@ -241,7 +241,7 @@ def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Se
 def _stroke(canvas: Any, stroke: Stroke, offset: Vector, size_index: int | None) -> None:
     colour, width, dashes = STYLE[stroke.role]
     if size_index is not None:
-        colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in ("cut", "dart", "notch") else colour
+        colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in OF_SIZE else colour
         dashes = SIZE_DASHES[size_index % len(SIZE_DASHES)] if stroke.role == "cut" else dashes
     canvas.setStrokeColor(colour)
     canvas.setLineWidth(width / 1000 * POINT)

@@ -36,7 +36,8 @@ _KEY = (
     ("dart_fold", "fold of a dart"),
     ("internal", "construction line"),
     ("grain", "grain: along the warp"),
-    ("notch", "notch; double at the back"),
+    ("drill", "tip of a dart: mark it"),
+    ("notch", "notch: clip; double at the back"),
 )
 
 
@@ -45,8 +46,9 @@ def draw_legend(canvas: Any, at: Vector, garment: DraftedGarment, sizes: Sequenc
     from warpflat.export.pdf import SIZE_COLOURS, SIZE_DASHES
 
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
-    _text(canvas, x, top - 0.008, garment.name, 18, bold=True)
-    _text(canvas, x, top - 0.016, f"Size{'s' if len(sizes) > 1 else ''} {', '.join(sizes)}", 11)
+    _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
+    if any(sizes):
+        _text(canvas, x, top - 0.016, f"Size{'s' if len(sizes) > 1 else ''} {', '.join(sizes)}", 11)
     _text(canvas, x, top - 0.025, "Print at 100 % (actual size). Do not fit to the page.", 10, bold=True)
     _text(canvas, x, top - 0.031, f"Paper: {paper}. Measure both squares before you cut anything.", 8)
     _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "50 mm")
@@ -55,6 +57,13 @@ def draw_legend(canvas: Any, at: Vector, garment: DraftedGarment, sizes: Sequenc
     for role, meaning in _KEY:
         y -= 0.0052
         _sample(canvas, x + 0.117, y, *STYLE[role])
+        if role == "grain":
+            for tip, back in ((0.117, 0.003), (0.136, -0.003)):
+                for up in (0.001, -0.001):
+                    canvas.line((x + tip) * POINT, y * POINT, (x + tip + back) * POINT, (y + up) * POINT)
+        if role == "drill":
+            canvas.circle((x + 0.1265) * POINT, y * POINT, 0.002 * POINT)
+            canvas.line((x + 0.1265) * POINT, (y - 0.003) * POINT, (x + 0.1265) * POINT, (y + 0.003) * POINT)
         _text(canvas, x + 0.139, y - 0.0009, meaning, 7)
     if len(sizes) > 1:
         for index, size in enumerate(sizes):
@@ -73,7 +82,9 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     paper = tiling.paper
     low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
     draw_legend(canvas, low, garment, sizes, paper.name)
-    y = float(low[1]) - 0.004
+    # The room for the sizes' lines and the notes is not left empty.
+    noted = any(piece.notes for pieces in garment.pieces.values() for piece in pieces)
+    y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 and not noted else 0.0)
     lines = [
         "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
         f"the half diamonds meet, and glue. {len(tiling.tiles)} sheets; empty ones are left out.",
@@ -84,7 +95,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     pieces = next(iter(garment.pieces.values()))
     for piece in pieces:
         cut = next((text for text, _ in piece.label.lines if text.startswith("Cut ")), "")
-        _text(canvas, float(low[0]), y - 0.002, f"{piece.name}: {cut[0].lower() + cut[1:]}", 7.5)
+        _text(canvas, float(low[0]), y - 0.002, f"{piece.name.replace('_', ' ')}: {cut[0].lower() + cut[1:]}", 7.5)
         y -= 0.0042
     _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
     canvas.showPage()
@@ -121,7 +132,7 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
         middle = origin + scale * (placed.pieces[len(placed.pieces) // 2].label.at + placed.offset)
         canvas.setFillColor("#000000")
         canvas.setFont(FONT, 6)
-        canvas.drawCentredString(*(middle * POINT), placed.pieces[0].name)
+        canvas.drawCentredString(*(middle * POINT), placed.pieces[0].name.replace("_", " "))
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:

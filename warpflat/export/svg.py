@@ -17,7 +17,7 @@ from warpflat.pattern.drawing import Drawing, Stroke, Words, draw_nest, grain_st
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Copy, Marker
 
-__all__ = ["STYLE", "SvgPage", "write_marker_svg", "write_svg"]
+__all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
 Vector = NDArray[np.float64]
 
@@ -35,6 +35,8 @@ STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
     "drill": ("#000000", 0.25, ()),
     "cutout": ("#000000", 0.5, ()),
 }
+#: What has the colour of its size in a nest.
+OF_SIZE = ("cut", "dart", "notch")
 #: Height of the letters' body over that of their capitals.
 BODY = 1.39
 
@@ -56,7 +58,8 @@ def write_svg(
         garment: drafted.
         path: of the file.
         sizes: those to draw; None draws all.
-        nested: lay all sizes of a piece upon each other, as a grading nest.
+        nested: lay all sizes of a piece upon each other, as a grading nest; of several sizes the sewing lines are not
+            displayed.
         width: of the sheet [m].
     """
     chosen = _chosen(garment, sizes)
@@ -77,7 +80,7 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     share = f"{marker.length:.3f} m of {marker.width:.3f} m, {marker.utilisation:.1%} used"
     page = SvgPage(marker.length, marker.width, f"marker {marker.fabric}: {share}".replace(" :", ":"))
     cloth = np.array([[0, 0], [marker.length, 0], [marker.length, marker.width], [0, marker.width]])
-    page.stroke(page.root, Stroke(role="internal", name="cloth", points=cloth, closed=True), "cloth")
+    page.stroke(page.root, Stroke(role="drill", name="cloth", points=cloth, closed=True), "cloth")
     for index, copy in enumerate(marker.placements):
         page.marker_copy(copy, index)
     page.write(path)
@@ -142,8 +145,10 @@ class SvgPage:
         if stroke.name:
             attributes["id"] = self._id(f"{key}.{stroke.name}")
             attributes["data-edge"] = stroke.name
-        if colour is not None:
+        if colour is not None and stroke.role in OF_SIZE:
             attributes["style"] = f"stroke: {colour}"
+        if stroke.hidden:
+            attributes["display"] = "none"
         if stroke.curve is not None:
             attributes["d"] = self._bezier(stroke.curve.transformed(matrix))
         else:
@@ -185,7 +190,7 @@ class SvgPage:
         for stroke in grain_strokes(copy.grain):
             self.stroke(group, stroke, key)
         texts = [
-            copy.piece.name,
+            copy.piece.name.replace("_", " "),
             f"size {copy.piece.size}" if copy.piece.size else "",
             "mirrored" if copy.mirrored else "",
         ]

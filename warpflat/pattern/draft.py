@@ -12,12 +12,30 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_outline
-from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
+from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
+from warpflat.pattern.fitting import fit_edges
 from warpflat.pattern.label import Label, default_grain, place_label
-from warpflat.pattern.notches import Notch, SeamReport, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Piece
+from warpflat.pattern.notches import (
+    SEAM_TOLERANCE,
+    Notch,
+    SeamReport,
+    cut_darts,
+    dart_notches,
+    seam_notches,
+    seam_reports,
+)
+from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Piece, Seam
 
-__all__ = ["DraftedDart", "DraftedEdge", "DraftedGarment", "DraftedPiece", "DrillHole", "draft_garment", "draft_piece"]
+__all__ = [
+    "DraftedDart",
+    "DraftedEdge",
+    "DraftedGarment",
+    "DraftedPiece",
+    "DrillHole",
+    "draft_garment",
+    "draft_piece",
+    "eye_legs",
+]
 
 Vector = NDArray[np.float64]
 
@@ -34,12 +52,18 @@ class DraftedEdge:
         curve: fitted, from corner to corner.
         line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
         width: the allowance [m] that it got.
+        places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
+        fit_error: how far [m] the curve keeps from these points, at most.
+        tolerance: how far [m] it was allowed to, beside what equal length takes.
     """
 
     edge: Edge
     curve: Curve
     line: Vector
     width: float
+    places: Vector
+    fit_error: float
+    tolerance: float
 
     @property
     def name(self) -> str:
@@ -145,12 +169,15 @@ class DraftedGarment:
         return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
 
 
-def draft_garment(garment: Garment, *, tolerance: float = 1e-4, sizes: Sequence[str] | None = None) -> DraftedGarment:
+def draft_garment(
+    garment: Garment, *, tolerance: float | None = None, sizes: Sequence[str] | None = None
+) -> DraftedGarment:
     """Draft every piece of a garment and match the notches of its seams.
 
     Args:
         garment: flat pieces and seams.
-        tolerance: how far [m] a fitted curve may lie from the points of an edge.
+        tolerance: how far [m] a fitted curve may lie from the points of an edge; None takes 0.1 mm, and more where
+            a border is so ragged that its curve would be all wiggles.
         sizes: only these; None drafts all.
 
     Raises:
@@ -162,10 +189,11 @@ def draft_garment(garment: Garment, *, tolerance: float = 1e-4, sizes: Sequence[
     drafted: dict[str, tuple[DraftedPiece, ...]] = {}
     reports: list[SeamReport] = []
     for size in chosen:
+        drawn = _fitted(garment.pieces[size], garment.seams, tolerance)
         pieces = {
-            piece.name: draft_piece(piece, garment=garment.name, tolerance=tolerance) for piece in garment.pieces[size]
+            piece.name: _draft(piece, garment.name, drawn[piece.name], tolerance) for piece in garment.pieces[size]
         }
-        notches = seam_notches(garment.seams, pieces)
+        notches = seam_notches([*garment.seams, *cut_darts(pieces)], pieces)
         drafted[size] = tuple(
             replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
         )
@@ -173,23 +201,34 @@ def draft_garment(garment: Garment, *, tolerance: float = 1e-4, sizes: Sequence[
     return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports))
 
 
-def draft_piece(piece: Piece, *, garment: str = "", tolerance: float = 1e-4) -> DraftedPiece:
+def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
     """Draft one piece on its own: every line but the notches that its seams would give it."""
+    return _draft(piece, garment, _fitted([piece], (), tolerance)[piece.name], tolerance)
+
+
+def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance: float | None) -> DraftedPiece:
     frame = _frame(piece)
-    edges = tuple(_draft_edge(edge, frame, tolerance) for edge in piece.edges)
     wedges, darts = _darts(piece, edges)
     edges = tuple(_widened(edge, piece, darts) for edge in edges)
     cut = cut_outline(_sides(piece, edges, wedges))
     notes = [*cut.notes]
     for dart in piece.darts:
         left, right = (next(e for e in edges if e.name == leg) for leg in (dart.left, dart.right))
-        if abs(left.length - right.length) > 0.001:
+        if abs(left.length - right.length) > SEAM_TOLERANCE:
             notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
+        if not darts[dart.name] and left.width > 0:
+            notes.append(
+                f"dart {dart.name} is cut away, not folded: {_why_cut(dart, left, right)}; sew its legs as a seam"
+            )
     drafted_darts = tuple(_dart_lines(dart, wedges, edges, cut.points) for dart in piece.darts)
     holes = {hole.name: (hole.kind, _moved(hole.points, frame)) for hole in piece.holes}
-    fisheyes = {name: points for name, (kind, points) in holes.items() if kind == "dart"}
+    fisheyes = {name: _fisheye(points, tolerance) for name, (kind, points) in holes.items() if kind == "dart"}
+    for name, line in fisheyes.items():
+        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in eye_legs(line)))))
+        if apart > SEAM_TOLERANCE:
+            notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
     drills = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts]
-    drills += [DrillHole(name=name, at=end) for name, points in fisheyes.items() for end in _far_ends(points)]
+    drills += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in eye_legs(line)[0][[0, -1]]]
     internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line) if piece.grain is None else _moved(piece.grain, frame)
@@ -246,10 +285,35 @@ def _moved(points: Vector, frame: Vector) -> Vector:
     return points @ frame[:, :2].T + frame[:, 2]
 
 
-def _draft_edge(edge: Edge, frame: Vector, tolerance: float) -> DraftedEdge:
-    points = _moved(edge.points, frame)
-    curve = fit_curve(points[[0, -1]] if edge.kind == "fold" else points, tolerance)
-    return DraftedEdge(edge=edge, curve=curve, line=curve.sample(), width=edge.width)
+def _fitted(
+    pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None
+) -> dict[str, tuple[DraftedEdge, ...]]:
+    """The edges of all pieces as curves, by piece."""
+    lines: dict[tuple[str, str], Vector] = {}
+    for piece in pieces:
+        frame = _frame(piece)
+        lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
+    fitted = fit_edges(pieces, lines, seams, tolerance)
+    return {
+        piece.name: tuple(
+            _drafted_edge(edge, *fitted[piece.name, edge.name], lines[piece.name, edge.name]) for edge in piece.edges
+        )
+        for piece in pieces
+    }
+
+
+def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: Vector) -> DraftedEdge:
+    import shapely
+
+    line, marks = curve.sample(), shapely.points(points)
+    drawn = shapely.LineString(line)
+    # Not the nearest place anywhere: a border that nearly touches itself must not jump.
+    places = np.maximum.accumulate(shapely.line_locate_point(drawn, marks))
+    places[[0, -1]] = 0.0, drawn.length
+    fit_error = float(shapely.distance(drawn, marks).max())
+    return DraftedEdge(
+        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=tolerance
+    )
 
 
 def _darts(piece: Piece, edges: tuple[DraftedEdge, ...]) -> tuple[dict[str, Wedge], dict[str, bool]]:
@@ -320,8 +384,27 @@ def _line(edges: tuple[DraftedEdge, ...], name: str) -> Vector:
     return next(edge.line for edge in edges if edge.name == name)
 
 
-def _far_ends(points: Vector) -> tuple[Vector, Vector]:
-    """The two points of a closed line that are farthest apart: the tips of a fish-eye dart."""
-    distance = np.linalg.norm(points[:, None] - points[None], axis=2)
-    a, b = np.unravel_index(int(distance.argmax()), distance.shape)
-    return points[a], points[b]
+def eye_legs(line: Vector) -> tuple[Vector, Vector]:
+    """The two sides (#P by 2 [m]) of a fish-eye dart's closed line, both from its lower tip to its upper one."""
+    distance = np.linalg.norm(line[:, None] - line[None], axis=2)
+    a, b = sorted(map(int, np.unravel_index(int(distance.argmax()), distance.shape)))
+    first, second = line[a : b + 1], np.concatenate([line[b:], line[: a + 1]])
+    if tuple(first[0, ::-1]) > tuple(first[-1, ::-1]):
+        return second, first[::-1]
+    return first, second[::-1]
+
+
+def _fisheye(points: Vector, tolerance: float | None) -> Vector:
+    """Its closed line with both sides as clean curves, the first point not repeated."""
+    first, second = (fit_curve(leg, tolerance or TOLERANCE).sample() for leg in eye_legs(points))
+    return np.concatenate([first[:-1], second[:0:-1]])
+
+
+def _why_cut(dart: Dart, left: DraftedEdge, right: DraftedEdge) -> str:
+    import shapely
+
+    bend = max(
+        float(shapely.distance(shapely.LineString(e.line[[0, -1]]), shapely.points(e.line)).max())
+        for e in (left, right)
+    )
+    return f"its legs bend by {bend * 1000:.0f} mm" if dart.cut else "it opens too wide"

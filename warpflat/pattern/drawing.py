@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
-from warpflat.pattern.draft import DraftedEdge, DraftedPiece
+from warpflat.pattern.draft import DraftedEdge, DraftedPiece, eye_legs
 from warpflat.pattern.notches import Notch
 
 __all__ = ["Drawing", "Stroke", "Words", "draw_nest", "draw_piece", "grain_strokes"]
@@ -21,7 +21,7 @@ ARROW, BARB = 0.006, 0.002
 #: The bracket that says "on fold" stands this far [m] inside the fold.
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
-NAME, NAME_GAP = 0.0022, 0.0024
+NAME, NAME_GAP = 0.0024, 0.0028
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -36,6 +36,7 @@ class Stroke:
         points: #P by 2 [m].
         closed: the last point joins the first.
         curve: the same line as Béziers, where there is one.
+        hidden: not to be seen, but named and kept in files that can keep what is not seen.
     """
 
     role: str
@@ -43,6 +44,7 @@ class Stroke:
     points: Vector
     closed: bool = False
     curve: Curve | None = None
+    hidden: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -87,7 +89,10 @@ def draw_piece(piece: DraftedPiece) -> Drawing:
 
 
 def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
-    """One piece in all its sizes, one upon the other: cut lines, darts and notches of each; label and grain once."""
+    """One piece in all its sizes, one upon the other: cut lines, darts and notches of each; label and grain once.
+
+    The sewing lines of so many sizes would be a thicket: they are hidden.
+    """
     if len(pieces) == 1:
         return (draw_piece(pieces[0]),)
     drawings = []
@@ -96,13 +101,13 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
     for index, piece in enumerate(pieces):
         strokes = [
             _cut(piece),
-            *(_edge(e) for e in piece.edges if e.kind in ("dart", "fold")),
+            *(replace(_edge(e), hidden=e.kind not in ("dart", "fold")) for e in piece.edges),
             *_details(piece),
         ]
         words: list[Words] = []
         if index == middle:
             strokes += [*grain_strokes(piece.grain), *_internal(piece)]
-            words += [*_label(piece, ", ".join(p.size for p in pieces)), *_line_names(piece)]
+            words += [*_label(piece, ", ".join(p.size for p in pieces)), *_line_names(piece, borders=False)]
             for fold in piece.fold_edges:
                 fold_strokes, fold_words = _bracket(fold)
                 strokes += fold_strokes
@@ -137,8 +142,14 @@ def _details(piece: DraftedPiece) -> list[Stroke]:
         for axis in np.eye(2):
             cross = np.stack([hole.at - 1.5 * DRILL * axis, hole.at + 1.5 * DRILL * axis])
             strokes.append(Stroke(role="drill", name="", points=cross))
-    for role, lines in (("cutout", piece.cutouts), ("dart", piece.fisheyes)):
-        strokes += [Stroke(role=role, name=name, points=line, closed=True) for name, line in lines.items()]
+    strokes += [Stroke(role="cutout", name=name, points=line, closed=True) for name, line in piece.cutouts.items()]
+    for name, line in piece.fisheyes.items():
+        left, right = eye_legs(line)
+        strokes += [
+            Stroke(role="dart", name=f"{name}.left", points=left),
+            Stroke(role="dart", name=f"{name}.right", points=right),
+            Stroke(role="dart_fold", name=f"{name}.fold", points=left[[0, -1]]),
+        ]
     return strokes
 
 
@@ -163,35 +174,63 @@ def _fitted(line: bytes) -> Curve:
     return fit_curve(np.frombuffer(line).reshape(-1, 2))
 
 
-def _line_names(piece: DraftedPiece) -> list[Words]:
-    """The name of every internal line that has room for it, where it keeps clear of the other lines and the label."""
+def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
+    """The names of edges, darts and internal lines, along them, where they have room and keep clear of all else.
+
+    An edge's name stands inside the sewing line, a dart's beside its first leg. Without `borders` edges have none.
+    """
     import shapely
 
-    words = []
-    lines = {name: shapely.LineString(line) for name, line in piece.internal_lines.items()}
     rows = np.array([[0.0, 0.5], [0.0, -0.5]]) * piece.label.height
-    label = shapely.LineString(piece.label.at + rows).buffer(0.03)
-    for name, line in piece.internal_lines.items():
+    taken = [
+        shapely.LineString(piece.label.at + rows).buffer(0.03),
+        *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
+        shapely.LineString(piece.grain[1] + (piece.grain[0] - piece.grain[1]) * [[0.0], [0.05]]),
+        shapely.LineString(piece.grain[0] + (piece.grain[1] - piece.grain[0]) * [[0.0], [0.05]]),
+    ]
+    legs = {leg: dart.dart for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)}
+    lines = [(name, line, False) for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        dart = legs.get(edge.name)
+        if edge.name == dart.left if dart is not None else borders and edge.kind != "fold":
+            lines.append((edge.name if dart is None else dart.name, edge.line, True))
+    lines += [(name, eye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    drawn = {index: shapely.LineString(line) for index, (_, line, _) in enumerate(lines)}
+    words = []
+    for index, (name, line, border) in enumerate(lines):
         arc, half = arc_lengths(line), len(name) * NAME * 0.4
-        if arc[-1] < 2 * half + 0.02:
+        if arc[-1] < 2 * half + (0.008 if border else 0.02):
             continue
-        others = shapely.union_all([label, *(other for key, other in lines.items() if key != name)])
+        others = shapely.union_all([*taken, *(other for key, other in drawn.items() if key != index)])
         clear, share = -1.0, 0.5
         for tried in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
+            if not half <= tried * arc[-1] <= arc[-1] - half:
+                continue
             distance = float(others.distance(shapely.Point(_at_share(line, tried))))
             if distance > clear:
                 clear, share = distance, tried
             if clear > half + 0.006:
                 break
-        step = half / max(float(arc[-1]), 1e-12)
-        near, far = _at_share(line, share - step), _at_share(line, share + step)
-        x, y = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
-        if x < -1e-9 or (abs(x) <= 1e-9 and y < 0):
-            x, y = -x, -y
-        middle = (near + far + 2 * _at_share(line, share)) / 4
-        angle = float(np.arctan2(y, x))
-        words.append(Words(text=name, at=middle + NAME_GAP * np.array([-y, x]), height=NAME, angle=angle))
+        words.append(_words_along(name, line, share, half, inwards=border))
+        taken.append(shapely.Point(words[-1].at).buffer(half))
     return words
+
+
+def _words_along(name: str, line: Vector, share: float, half: float, *, inwards: bool) -> Words:
+    """A name beside a line, upright: above it, or to its left as the line runs, where a border has the piece."""
+    length = max(float(arc_lengths(line)[-1]), 1e-12)
+    near, far = _at_share(line, share - half / length), _at_share(line, share + half / length)
+    along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+    left = np.array([-along[1], along[0]])
+    # Upright, and steep ones read upwards.
+    if along[0] < -0.2 or (abs(along[0]) <= 0.2 and along[1] < 0):
+        along = -along
+    aside = left if inwards else np.array([-along[1], along[0]])
+    # Clear of the whole stretch, however it bends.
+    stretch = [_at_share(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
+    bulge = max(float((point - near) @ aside) for point in stretch)
+    at = (near + far) / 2 + (bulge + NAME_GAP) * aside
+    return Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
 
 
 def grain_strokes(grain: Vector) -> list[Stroke]:

@@ -24,8 +24,10 @@ __all__ = ["pattern_of_surface"]
 Vector = NDArray[np.float64]
 Ids = NDArray[np.int32]
 
-#: The legs of a dart that is folded stray from straight by no more than this [m].
-FOLDED = 2e-3
+#: The legs of a dart that is folded stray from straight by no more than this [m], or this share of their length.
+FOLDED, FOLDED_SHARE = 2e-3, 0.04
+#: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
+GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
 
 def pattern_of_surface(
@@ -81,7 +83,23 @@ def _piece(result: Flattening, size: str) -> Piece:
     drawn = [replace(dart, cut=_bent(piece, dart)) for dart in piece.darts]
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
-    return replace(piece, holes=holes, darts=drawn, grain=grain_of(piece.outline, result, datum))
+    grain = _beside(grain_of(piece.outline, result, datum), piece)
+    return replace(piece, holes=holes, darts=drawn, grain=grain)
+
+
+def _beside(grain: Vector, piece: Piece) -> Vector:
+    """The grain line, moved aside as far as it takes to keep off holes and fish-eye darts."""
+    import shapely
+
+    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    across = np.array([along[1], -along[0]])
+    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
+    for step in range(31):
+        for side in (1, -1):
+            moved = grain + side * step * GRAIN_STEP * across
+            if free.contains(shapely.LineString(moved)):
+                return moved
+    return grain
 
 
 def _bent(piece: Piece, dart: Dart) -> bool:
@@ -89,8 +107,11 @@ def _bent(piece: Piece, dart: Dart) -> bool:
     import shapely
 
     legs = [piece.edge(name).points for name in (dart.left, dart.right)]
-    strays = [shapely.distance(shapely.LineString(leg[[0, -1]]), shapely.points(leg)).max() for leg in legs]
-    return bool(max(strays) > FOLDED)
+    for leg in legs:
+        chord = shapely.LineString(leg[[0, -1]])
+        if shapely.distance(chord, shapely.points(leg)).max() > max(FOLDED, FOLDED_SHARE * chord.length):
+            return True
+    return False
 
 
 def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:

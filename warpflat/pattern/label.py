@@ -60,8 +60,9 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
             widths[kind] = "/".join(f"{v:g}" for v in values) + " mm"
     if widths:
         lines.append("Includes " + ", ".join(f"{kind} {text}" for kind, text in widths.items()))
-    if garment:
-        lines.append(garment)
+    title = garment.replace("_", " ")
+    if title.upper() != lines[0]:
+        lines.append(title)
     return tuple(lines)
 
 

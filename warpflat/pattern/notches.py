@@ -16,7 +16,7 @@ from warpflat.pattern.pieces import Piece, Seam, SeamSide
 if TYPE_CHECKING:
     from warpflat.pattern.draft import DraftedPiece
 
-__all__ = ["Notch", "SeamReport", "dart_notches", "seam_notches", "seam_reports"]
+__all__ = ["Notch", "SeamReport", "cut_darts", "dart_notches", "seam_notches", "seam_reports"]
 
 Vector = NDArray[np.float64]
 
@@ -30,8 +30,9 @@ DOUBLE_SPACING = 0.008
 SHORTEST, SPACING = 0.080, 0.200
 #: A notch this close [m] to a joint of edges would be lost in it.
 CLEAR = 0.012
-#: Sides of a seam may differ by this [m].
-SEAM_TOLERANCE = 5e-4
+#: Sides of a seam may differ by this [m], and by this over any stretch of `STRETCH` [m].
+SEAM_TOLERANCE, LOCAL_TOLERANCE = 5e-4, 2e-4
+STRETCH = 0.050
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,6 +72,8 @@ class SeamReport:
         length_mm: of both sides [mm].
         ease: what the seam asks for.
         difference_mm: what the second side is too long (or, negative, too short) for that ease [mm].
+        local_mm: the same over the worst 50 mm of the first side, without its sign, measured between the vertices of
+            the mesh that both sides share; None where they come from no mesh, or not with the same vertices.
     """
 
     name: str
@@ -79,17 +82,20 @@ class SeamReport:
     length_mm: tuple[float, float]
     ease: float
     difference_mm: float
+    local_mm: float | None = None
 
     @property
     def matches(self) -> bool:
-        return abs(self.difference_mm) <= SEAM_TOLERANCE * 1000
+        near = self.local_mm is None or self.local_mm <= LOCAL_TOLERANCE * 1000
+        return near and abs(self.difference_mm) <= SEAM_TOLERANCE * 1000
 
 
 def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
     """Lengths of both sides of every seam, along the fitted sewing lines."""
     reports = []
     for seam in seams:
-        first, second = (_Chain(side, pieces).length for side in seam.sides)
+        chains = [_Chain(side, pieces) for side in seam.sides]
+        first, second = (chain.length for chain in chains)
         reports.append(
             SeamReport(
                 name=seam.name,
@@ -98,9 +104,25 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 length_mm=(first * 1000, second * 1000),
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
+                local_mm=_local_difference(chains[0], chains[1], seam.ease),
             )
         )
     return reports
+
+
+def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
+    """The worst difference [mm] over `STRETCH`, from the lengths at which both sides have their common vertices."""
+    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
+        return None
+    first, second = one.places, other.places
+    if len(first) != len(second):
+        return None
+    starts = np.unique(np.concatenate([first, first - STRETCH]))
+    starts = starts[(starts >= 0) & (starts <= first[-1] - STRETCH)]
+    starts = starts if len(starts) else first[:1]
+    ends = np.minimum(starts + STRETCH, first[-1])
+    stretch = np.interp(ends, first, second) - np.interp(starts, first, second)
+    return float(np.abs(stretch - (ends - starts) * (1 + ease)).max() * 1000)
 
 
 class _Chain:
@@ -117,6 +139,15 @@ class _Chain:
     @property
     def length(self) -> float:
         return float(self.joints[-1])
+
+    @property
+    def places(self) -> Vector:
+        """The length at each point of the edges as they came in, joints once."""
+        rows: list[Vector] = []
+        for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
+            along = edge.length - edge.places[::-1] if side.reversed else edge.places
+            rows.append(start + along[bool(rows) :])
+        return np.concatenate(rows)
 
     def index(self, length: float) -> int:
         """The edge on which that length falls."""
@@ -187,6 +218,23 @@ def _fractions(seam: Seam, first: _Chain, second: _Chain) -> list[float]:
     fractions = (np.arange(count) + 0.42) / count
     joints = np.concatenate([first.joints / first.length, second.joints / second.length])
     return [float(f) for f in fractions if np.abs(joints - f).min() * first.length > CLEAR]
+
+
+def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
+    """The darts that are cut away, as the seams by which they are closed, both legs from the border to the tip."""
+    return [
+        Seam(
+            name=f"{name}.{dart.dart.name}",
+            sides=(
+                (SeamSide(piece=name, edge=dart.dart.left),),
+                (SeamSide(piece=name, edge=dart.dart.right, reversed=True),),
+            ),
+            double=False,
+        )
+        for name, piece in pieces.items()
+        for dart in piece.darts
+        if dart.fold is None and piece.edge(dart.dart.left).width > 0
+    ]
 
 
 def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut_line: Vector) -> tuple[Notch, ...]:

@@ -89,6 +89,7 @@ def _garment(data: Mapping[str, Any]) -> DraftedGarment:
             length_mm=(seam["length_mm"][0], seam["length_mm"][1]),
             ease=seam["ease"],
             difference_mm=seam["difference_mm"],
+            local_mm=seam["difference_per_50mm_mm"],
         )
         for seam in data["seams"]
     )
@@ -126,7 +127,15 @@ def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
         piece=piece,
         frame=frame,
         edges=tuple(
-            DraftedEdge(edge=edge, curve=_curve(d), line=_points(d["line"]), width=d["allowance"])
+            DraftedEdge(
+                edge=edge,
+                curve=_curve(d),
+                line=_points(d["line"]),
+                width=d["allowance"],
+                places=np.array(d["point_lengths"], dtype=np.float64),
+                fit_error=d["fit_error"],
+                tolerance=d["tolerance"],
+            )
             for edge, d in zip(piece.edges, data["edges"], strict=True)
         ),
         cut_line=_points(data["cut_line"]),

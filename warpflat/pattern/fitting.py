@@ -1,0 +1,132 @@
+"""All borders of a garment as curves: as close to the mesh as each is clean, and both sides of a seam as long as before."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+
+__all__ = ["TOLERANCES", "EdgeKey", "fit_edges"]
+
+Vector = NDArray[np.float64]
+#: Names of a piece and of its edge.
+EdgeKey = tuple[str, str]
+
+#: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
+TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
+#: A clean border has no more than so many curves, and one more for so much of its length [m].
+CURVES, CURVE = 4, 0.012
+#: A clean border turns back and forth by no more than this [rad], and this for each metre. The borders of garments that
+#: follow the mesh stay below 2 rad/m; a cut across the mesh, whose triangles jut out in turns, reaches 7 and more.
+SWING, SWING_PER_METRE = 0.3, 3.5
+#: Smoothed sides of a ragged seam agree in length within this [m], if a tolerance can be found for it.
+EQUAL = 1e-4
+
+
+def fit_edges(
+    pieces: Sequence[Piece], lines: Mapping[EdgeKey, Vector], seams: Sequence[Seam], tolerance: float | None
+) -> dict[EdgeKey, tuple[Curve, float]]:
+    """A curve for every edge, and how far [m] it was allowed to keep from the points.
+
+    Each keeps the length of its chords (see :func:`fit_curve`), so that sides that are equal on the mesh stay equal.
+    Where a border is so ragged that its curve would be all wiggles, a wider tolerance smooths them away, and their
+    length with them; the other side of the seam or dart gets the same tolerance, and both the lengths of the shorter.
+    Where curves would cross, as on coarse meshes in narrow places, the chords stay.
+
+    Args:
+        pieces: of one size.
+        lines: #P by 2 [m], the points of every edge, in its piece's direction.
+        seams: between them; the legs of the pieces' darts are taken as seams too.
+        tolerance: [m] for all edges; None takes the least of `TOLERANCES` that makes a clean curve of each.
+    """
+    fitted = {}
+    for piece in pieces:
+        for edge in piece.edges:
+            line = lines[piece.name, edge.name]
+            fitted[piece.name, edge.name] = _clean(line[[0, -1]] if edge.kind == "fold" else line, tolerance)
+    if tolerance is None:
+        for first, second, against, ease in _pairs(pieces, seams):
+            wide = max(fitted[first][1], fitted[second][1])
+            if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
+                fitted[first], fitted[second] = _together(lines[first], lines[second], against, ease)
+    for piece in pieces:
+        _uncross(piece, lines, fitted)
+    return fitted
+
+
+def _clean(line: Vector, tolerance: float | None) -> tuple[Curve, float]:
+    if tolerance is not None:
+        return fit_curve(line, tolerance), tolerance
+    for tried in TOLERANCES:
+        curve = fit_curve(line, tried)
+        if not _ragged(curve):
+            break
+    return curve, tried
+
+
+def _ragged(curve: Curve) -> bool:
+    line = curve.sample()
+    length, turns = float(arc_lengths(line)[-1]), turning_angles(line)
+    swing = float(np.abs(turns).sum() - np.ptp(np.concatenate([[0.0], np.cumsum(turns)])))
+    return len(curve.bezier) > CURVES + length / CURVE or swing > SWING + SWING_PER_METRE * length
+
+
+def _pairs(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[EdgeKey, EdgeKey, bool, float]]:
+    """Edges that are sewn to one other edge, whether these run against each other, and the second's ease."""
+
+    def key(side: SeamSide) -> EdgeKey:
+        return side.piece, side.edge
+
+    for seam in seams:
+        (first, *more), (second, *others) = seam.sides
+        if not more and not others and first != second:
+            yield key(first), key(second), first.reversed != second.reversed, seam.ease
+    for piece in pieces:
+        for dart in piece.darts:
+            yield (piece.name, dart.left), (piece.name, dart.right), True, 0.0
+
+
+def _together(
+    first: Vector, second: Vector, against: bool, ease: float
+) -> tuple[tuple[Curve, float], tuple[Curve, float]]:
+    """Both sides of a ragged seam, smoothed, with the lengths up to each point of the one that is shorter then."""
+    sides = [first, second[::-1] if against else second]
+    longer = np.array([1.0, 1.0 + ease])
+    for tolerance in TOLERANCES[1:]:
+        reached = [
+            _reached(fit_curve(side, tolerance), side) / share for side, share in zip(sides, longer, strict=True)
+        ]
+        lengths = min(reached, key=lambda places: float(places[-1]))
+        curves = [
+            fit_curve(side, tolerance, lengths=lengths * share) for side, share in zip(sides, longer, strict=True)
+        ]
+        apart = abs(curves[1].length - curves[0].length * longer[1])
+        if apart <= EQUAL and not any(map(_ragged, curves)):
+            break
+    return (curves[0], tolerance), (curves[1].reversed() if against else curves[1], tolerance)
+
+
+def _reached(curve: Curve, points: Vector) -> Vector:
+    """#P, the length [m] along the curve at each of the points."""
+    import shapely
+
+    line = shapely.LineString(curve.sample())
+    places = np.maximum.accumulate(shapely.line_locate_point(line, shapely.points(points)))
+    places[[0, -1]] = 0.0, line.length
+    return np.asarray(places)
+
+
+def _uncross(piece: Piece, lines: Mapping[EdgeKey, Vector], fitted: dict[EdgeKey, tuple[Curve, float]]) -> None:
+    import shapely
+
+    keys = [(piece.name, edge.name) for edge in piece.edges]
+    drawn = {key: shapely.LineString(fitted[key][0].sample()) for key in keys}
+    if shapely.Polygon(np.concatenate([line.coords[:-1] for line in drawn.values()])).is_valid:
+        return
+    for key in keys:
+        if not drawn[key].is_simple or any(drawn[key].crosses(drawn[other]) for other in keys if other != key):
+            fitted[key] = chords(lines[key]), fitted[key][1]
