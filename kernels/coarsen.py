@@ -16,7 +16,8 @@ LEAST_STRAIGHT = wp.constant(wp.float64(0.7))
 class Ring:
     """Triangles and where they are around each vertex.
 
-    vertices: #V, on the body [m]. layout: #V, in the plane [m]. corner: #T, anticlockwise. offset: #V+1, where each vertex's entries in `slot` begin.
+    vertices: #V, on the body [m]. layout: #V, in the plane [m]. corner: #T, anticlockwise.
+    offset: #V+1, where each vertex's entries in `slot` begin.
     slot: 3 times the triangle plus the corner. before, after: #V, its neighbours along the border, -1 inside.
     """
 
@@ -164,7 +165,7 @@ def find_targets(
         for turn in range(1, 3):
             u = corner_of(ring, ring.slot[e], turn)
             # Inside, each neighbour comes once as the first of a triangle's two.
-            if (before < 0 and turn == 1) or u == before or u == after:
+            if (before < 0 and turn == 1) or u == before or u == after:  # noqa: SIM109
                 worst = worst_after(v, u, normal, ring)
                 if worst > best and worst < wp.float64(1.5) and common_neighbors(v, u, ring) == shared:
                     best = worst

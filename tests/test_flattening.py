@@ -83,7 +83,9 @@ def test_energies_of_the_stages(dome: Flattening):
     assert dome.converged
     assert relax.residual is not None
     assert relax.residual <= 5e-3
-    assert relax.work_units == relax.steps == dome.history[-1, 0]
+    assert relax.steps == dome.history[-1, 0]
+    # Work on coarser levels counts too.
+    assert relax.work_units > relax.steps
     assert dome.history[-1, 1] == relax.spring_energy_j
     assert (np.diff(dome.history[:, 0]) > 0).all()
 
@@ -247,7 +249,7 @@ def test_a_step_limit_is_reported_not_hidden():
         fabric=cloth(200.0),
         datum="centre",
         device="cpu",
-        relax=RelaxOptions(max_steps=12),
+        relax=RelaxOptions(max_steps=12, solver="plain"),
     )
     assert not piece.converged
     assert piece.measures["converged"] is False

@@ -89,7 +89,7 @@ def steps_of(threads: int | None, *, triangles: bool) -> dict[str, np.ndarray]:
                 state._seam_force,
                 state._seam_viscosity,
                 state._seam_stiffness,
-                state._load,
+                state.load,
                 h,
             ],
             outputs=[

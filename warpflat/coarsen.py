@@ -59,7 +59,7 @@ def coarser(surface: Surface, layout: FloatArray) -> Coarser | None:
     return _every_second(surface, grid) if grid is not None else _collapsed(surface, layout)
 
 
-def _part(surface: Surface, kept: IntArray, faces: IntArray) -> Surface:
+def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surface:
     """The surface with these vertices and faces (numbered among the kept)."""
     vertices = surface.vertices[kept]
     return Surface(

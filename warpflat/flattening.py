@@ -18,8 +18,8 @@ from warpflat.develop import Development, choose_datum, develop
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric
 from warpflat.membrane import Model, check_model
+from warpflat.multilevel import levels_pay, relax_multilevel
 from warpflat.network import SpringNetwork, grain_axes
-from warpflat.multilevel import relax_multilevel
 from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, Upright, relax
 from warpflat.strain import WornStrain, layout_errors, worn_strain
 from warpflat.strain_map import energy_report
@@ -66,7 +66,8 @@ class Progress:
 
     Attributes:
         stage: "develop", "relax" or "cut:NAME".
-        step: approximate implicit steps so far.
+        step: approximate implicit steps so far, on the piece's own mesh.
+        work_units: all work so far, in such steps.
         max_steps: at most so many.
         spring_energy: [J], of the last look (see `RelaxOptions.check_every`).
         residual: largest force over mean spring force, likewise.
@@ -76,6 +77,7 @@ class Progress:
         """Hold on to the running state; nothing is copied before it is asked for."""
         self.stage = stage
         self.step = state.steps
+        self.work_units = state.work_units
         self.max_steps = max_steps
         self.spring_energy = energies.spring
         self.guard_energy = energies.guard
@@ -408,14 +410,13 @@ class _Run:
         ends = Upright(lower=int(self.datum[0]), upper=int(self.datum[-1]))
         state = Relaxation(network, self.options, start=positions, upright=[ends])
         if after is not None:
-            state.steps, state.restarts = after.steps, after.restarts
+            state.steps, state.restarts, state.work_units = after.steps, after.restarts, after.work_units
         return state
 
     def relax(self, state: Relaxation, *, mended: bool) -> tuple[Relaxation, Outcome]:
         """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
         first = "develop" if self.stage_name == "relax" else self.stage_name
         self._tell(first, state, state.energies(), float("nan"))
-        self.work_units = 0.0
         begun = time.perf_counter()
         clamped = state.network.spring_arrays.clamped_cells
         if clamped:
@@ -435,18 +436,15 @@ class _Run:
         state.options = self.options
         outcome = self._relax(state)
         seconds = time.perf_counter() - begun
-        return state, replace(outcome, steps=state.steps, work_units=self.work_units, seconds=seconds)
+        return state, replace(outcome, steps=state.steps, work_units=state.work_units, seconds=seconds)
 
     def _relax(self, state: Relaxation) -> Outcome:
         each_step = None if self.callback is None else self._each_step
-        if self.options.solver == "plain":
-            outcome = relax(state, watch=self._watch, each_step=each_step)
-        else:
-            # After a cut the layout is near the minimum already.
-            nested = self.stage_name == "relax" and state.steps == 0
-            outcome = relax_multilevel(state, nested=nested, watch=self._watch, each_step=each_step)
-        self.work_units += outcome.work_units
-        return outcome
+        if self.options.solver == "plain" or not levels_pay(state.network):
+            return relax(state, watch=self._watch, each_step=each_step)
+        # After a cut the layout is near the minimum already.
+        nested = self.stage_name == "relax" and state.steps == 0
+        return relax_multilevel(state, nested=nested, watch=self._watch, each_step=each_step)
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
         self.history.append((float(state.steps), energies.spring, energies.guard, residual))

@@ -10,8 +10,9 @@ spring network of its own, with the same fabric, guard and steps, on a quarter o
 4. the way the coarse vertices have gone is carried up, as far as it lowers the fine energy and mirrors no face;
 5. a few steps from rest again.
 
-Nested iteration gives the start: the coarsest level is relaxed first, and each finer one is moved as far as the coarser went. The minimum is that
-of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's work as the unit.
+Nested iteration gives the start: the coarsest level is relaxed first, and each finer one is moved as far as the coarser
+went. The minimum is that of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's
+work as the unit.
 """
 
 from __future__ import annotations
@@ -32,41 +33,60 @@ from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
 
-__all__ = ["Levels", "relax_multilevel"]
+__all__ = ["Levels", "levels_pay", "relax_multilevel"]
 
 FloatArray = NDArray[np.float64]
 
-# A level of at most so many vertices is the coarsest; the coarsest is relaxed with so many steps, more at the very first.
+# A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
+# piece. The coarsest is relaxed with so many steps for each vertex along its side, three times as many at the very first.
 _COARSEST = 250
-_COARSEST_STEPS = 120
-_FIRST_STEPS = 300
+_COARSEST_GRID = 100
+_COARSEST_STEPS = 6.0
 # Cycles on each level on the way up, before the finest.
-_CYCLES_ON_THE_WAY = 2
+_CYCLES_ON_THE_WAY = 1
 # Steps before and after, at least, and at most where cycles gain little; a cycle that leaves more than this share of what the one
 # before gained gets twice the steps.
 _LEAST_STEPS = 4
 _MOST_STEPS = 256
 _SLOW = 0.35
+# K/G from which the coarse triangles of a membrane are of little use.
+_SOFT = 35.0
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
+# Of a correction, the least share that is tried.
+_LEAST_SHARE = 0.05
 # In units of a step: evaluating the forces, evaluating the energy.
 _FORCE_WORK = 1.0
 _ENERGY_WORK = 0.5
 
 
+@dataclass(frozen=True, kw_only=True)
+class _Way:
+    """The way from a level to the next coarser one and back.
+
+    Attributes:
+        coarse: the coarser level.
+        down: its vertices go where they are on the finer one. load: it gets the finer one's residual forces.
+        differ: how far it has come from `base`, #V of the finer level. up: that, as `correction` of the finer level.
+        carry: its layout, as that of the finer level.
+    """
+
+    coarse: Relaxation
+    down: Launch
+    load: Launch
+    differ: Launch
+    up: Launch
+    carry: Launch
+    base: wp.array
+    correction: wp.array
+
+
 @dataclass
 class _Level:
-    """A level and its way to the next coarser one."""
+    """A level, and its way down, but for the coarsest."""
 
     state: Relaxation
-    coarse: Relaxation | None = None
-    down: Launch | None = None
-    load: Launch | None = None
-    differ: Launch | None = None
-    up: Launch | None = None
-    carry: Launch | None = None
-    base: wp.array | None = None
-    correction: wp.array | None = None
+    way: _Way | None = None
 
 
 def _weights(matrix: csr_array, device: wp.Device) -> Weights:
@@ -105,19 +125,17 @@ class Levels:
 
     Attributes:
         sizes: vertices of each level.
-        work: done so far, in steps of the finest level.
         stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
     """
 
-    def __init__(self, finest: Relaxation, *, work: float = 0.0) -> None:
+    def __init__(self, finest: Relaxation) -> None:
         """Of a relaxation and its present layout, which must mirror no face."""
         self._levels = [_Level(finest)]
-        self.work = work
         self.stale = False
         layout = finest.positions()
         while True:
             fine = self._levels[-1].state
-            if fine.network.vertex_count <= _COARSEST:
+            if fine.network.vertex_count <= (_COARSEST_GRID if fine.network.surface.is_quad.all() else _COARSEST):
                 break
             step = coarser(fine.network.surface, layout)
             if step is None:
@@ -127,13 +145,17 @@ class Levels:
             coarse.evaluate_at_rest()
             if coarse.mirrored_cells():
                 break
-            self._join(step, coarse)
+            self._levels[-1].way = self._way(fine, step, coarse)
             self._levels.append(_Level(coarse))
 
     @property
     def sizes(self) -> list[int]:
         """Vertices of each level, finest first."""
         return [level.state.network.vertex_count for level in self._levels]
+
+    @property
+    def _steps_at_the_bottom(self) -> int:
+        return round(_COARSEST_STEPS * math.sqrt(self.sizes[-1]))
 
     @staticmethod
     def _coarse(fine: Relaxation, step: Coarser, fine_layout: FloatArray) -> Relaxation:
@@ -152,33 +174,36 @@ class Levels:
         network.guard = net.guard
         return Relaxation(network, fine.options, start=layout)
 
-    def _join(self, step: Coarser, coarse: Relaxation) -> None:
-        level, device = self._levels[-1], coarse.network.device
-        fine = level.state
+    @staticmethod
+    def _way(fine: Relaxation, step: Coarser, coarse: Relaxation) -> _Way:
+        device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
         kept = wp.array(step.kept, dtype=wp.int32, device=device)
         prolongation = _weights(step.prolongation, device)
         restriction = _weights(csr_array(step.prolongation.T.tocsr()), device)
-        n, c = fine.network.vertex_count, coarse.network.vertex_count
-        level.coarse = coarse
-        level.base = wp.zeros(n, dtype=wp.vec2d, device=device)
-        level.correction = wp.zeros(n, dtype=wp.vec2d, device=device)
+        base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
         difference = wp.zeros(c, dtype=wp.vec2d, device=device)
-        level.down = record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device)
-        level.load = record(
-            coarse_load, dim=c, inputs=[restriction, fine.force, coarse.force], outputs=[coarse.load], device=device
-        )
-        level.differ = record(
-            coarse_difference, dim=c, inputs=[kept, level.base, coarse.position], outputs=[difference], device=device
-        )
-        level.up = record(transfer, dim=n, inputs=[prolongation, difference], outputs=[level.correction], device=device)
-        level.carry = record(
-            transfer, dim=n, inputs=[prolongation, coarse.position], outputs=[fine.position], device=device
+        return _Way(
+            coarse=coarse,
+            down=record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device),
+            load=record(
+                coarse_load, dim=c, inputs=[restriction, fine.force, coarse.force], outputs=[coarse.load], device=device
+            ),
+            differ=record(
+                coarse_difference, dim=c, inputs=[kept, base, coarse.position], outputs=[difference], device=device
+            ),
+            up=record(transfer, dim=n, inputs=[prolongation, difference], outputs=[correction], device=device),
+            carry=record(
+                transfer, dim=n, inputs=[prolongation, coarse.position], outputs=[fine.position], device=device
+            ),
+            base=base,
+            correction=correction,
         )
 
     # --- the parts of a cycle
 
     def _count(self, level: int, units: float) -> None:
-        self.work += units * self._levels[level].state.network.vertex_count / self._levels[0].state.network.vertex_count
+        finest = self._levels[0].state
+        finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
 
     def smooth(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
         """Some steps from rest."""
@@ -197,50 +222,52 @@ class Levels:
 
     def cycle(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
         """One cycle from this level down and up again."""
-        here = self._levels[level]
-        if here.coarse is None:
-            self.smooth(level, _COARSEST_STEPS)
+        state, way = self._levels[level].state, self._levels[level].way
+        if way is None:
+            self.smooth(level, self._steps_at_the_bottom)
             return
         self.smooth(level, steps, each_step)
-        here.state.evaluate_at_rest()
+        state.evaluate_at_rest()
         self._count(level, _FORCE_WORK)
-        assert here.down is not None and here.load is not None
-        here.down.launch()
-        here.coarse.load.zero_()
-        here.coarse.evaluate_at_rest()
+        way.down.launch()
+        way.coarse.load.zero_()
+        way.coarse.evaluate_at_rest()
         self._count(level + 1, _FORCE_WORK)
-        if here.coarse.mirrored_cells():
+        if way.coarse.mirrored_cells():
             self.stale = True
         else:
-            here.load.launch()
+            way.load.launch()
             self.cycle(level + 1, steps)
-            self._correct(level)
+            self._correct(level, way)
         self.smooth(level, steps, each_step)
 
-    def _correct(self, level: int) -> None:
+    def _correct(self, level: int, way: _Way) -> None:
         """Add the coarse level's correction, or a half, a quarter ... of it, so that the energy does not rise."""
-        here = self._levels[level]
-        state = here.state
-        assert here.base is not None and here.correction is not None
-        assert here.differ is not None and here.up is not None
+        state = self._levels[level].state
         before = self._objective(level)
-        wp.copy(here.base, state.position)
-        here.differ.launch()
-        here.up.launch()
+        wp.copy(way.base, state.position)
+        way.differ.launch()
+        way.up.launch()
         share = 1.0
-        while share > 0.05:
-            state.move(here.base, here.correction, share)
+        while share > _LEAST_SHARE:
+            state.move(way.base, way.correction, share)
             if self._objective(level) <= before:
                 return
             share *= 0.5
-        wp.copy(state.position, here.base)
+        wp.copy(state.position, way.base)
+
+    def follow(self) -> None:
+        """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
+        for level in self._levels:
+            if level.state.matrix is not None:
+                level.state.matrix.follow(level.state.position)
 
     def rise(self, steps: int, arrived: Callable[[], None] | None = None) -> None:
         """Nested iteration: relax the coarsest level, and move each finer one as far as it went; the finest is not cycled yet."""
         last = len(self._levels) - 1
         for level in self._levels[1:]:
             level.state.load.zero_()
-        self.smooth(last, _FIRST_STEPS)
+        self.smooth(last, 3 * self._steps_at_the_bottom)
         for number in range(last - 1, -1, -1):
             self._rise_to(number)
             if number == 0 and arrived is not None:
@@ -249,23 +276,31 @@ class Levels:
                 self.cycle(number, steps)
 
     def _rise_to(self, level: int) -> None:
-        """Start a level where the coarser one ended, or moved as far as it went: the former is smoother, the latter keeps what only
-        the finer mesh has. Where neither lowers the energy, it stays where it is."""
-        here = self._levels[level]
-        assert here.carry is not None and here.base is not None
-        start = here.state.position.numpy().copy()
-        self._correct(level)
-        moved, energy = here.state.position.numpy().copy(), self._objective(level)
-        here.carry.launch()
+        """Start a level where the coarser one ended, or moved as far as it went: the former is smoother, the latter keeps
+        what only the finer mesh has. Where neither lowers the energy, it stays where it is."""
+        state, way = self._levels[level].state, self._levels[level].way
+        assert way is not None
+        self._correct(level, way)
+        moved, energy = state.position.numpy().copy(), self._objective(level)
+        way.carry.launch()
         if not self._objective(level) < energy:
-            here.state.position.assign(moved if np.isfinite(energy) else start)
+            state.position.assign(moved)
+
+
+def levels_pay(network: SpringNetwork) -> bool:
+    """Whether cycles take less work than plain steps: always on grids and with springs. Coarse triangles of a membrane whose
+    shear is softer than a 35th of its stiffness carry little; there (denim on the scans) cycles took two to three times the steps."""
+    return network.model == "springs" or bool(network.surface.is_quad.all()) or _softness(network) < _SOFT
+
+
+def _softness(network: SpringNetwork) -> float:
+    fabric = network.fabric
+    return max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
 
 
 def first_steps(network: SpringNetwork) -> int:
     """Steps before and after, for a fabric: a soft shear leaves errors along threads that only accelerated steps smooth."""
-    fabric = network.fabric
-    soft = max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
-    return int(min(max(round(1.7 * math.sqrt(soft)), _LEAST_STEPS), 16))
+    return int(min(max(round(1.7 * math.sqrt(_softness(network))), _LEAST_STEPS), 16))
 
 
 def relax_multilevel(
@@ -291,7 +326,7 @@ def relax_multilevel(
     levels = Levels(state) if levels is None else levels
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
-    first, start, renewals = state.steps, levels.work, 0
+    first, start, renewals = state.steps, state.work_units, 0
     before = state.energies()
     change, residual, gained = math.inf, math.inf, math.inf
     steps = first_steps(state.network)
@@ -305,19 +340,20 @@ def relax_multilevel(
         state.hold_upright()
         before = state.energies()
     converged = False
-    while not converged and levels.work - start < options.max_steps:
+    while not converged and state.work_units - start < options.max_steps:
         if levels.stale and renewals < _RENEWALS:
-            levels, renewals = Levels(state, work=levels.work), renewals + 1
-        work = levels.work
+            levels, renewals = Levels(state), renewals + 1
+        work = state.work_units
+        levels.follow()
         levels.cycle(0, steps, look)
+        state.hold_upright()
         state.evaluate_at_rest()
         now = state.energies()
-        levels.work += _FORCE_WORK + _ENERGY_WORK
+        state.work_units += _FORCE_WORK + _ENERGY_WORK
         residual = state.residual()
-        state.hold_upright()
         at_rest = now.potential <= state.negligible_energy
         gain = before.potential - now.potential
-        change = 0.0 if at_rest else abs(gain) / ((levels.work - work) * now.potential)
+        change = 0.0 if at_rest else abs(gain) / ((state.work_units - work) * now.potential)
         converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
         if abs(gain) > _SLOW * gained:
             steps = min(2 * steps, _MOST_STEPS)
@@ -327,11 +363,10 @@ def relax_multilevel(
     return Outcome(
         converged=converged,
         steps=state.steps - first,
-        work_units=levels.work - start,
+        work_units=state.work_units - start,
         restarts=state.restarts,
         energy_change=change,
         residual=residual,
         energies=before,
         seconds=time.perf_counter() - begun,
     )
-

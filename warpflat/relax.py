@@ -45,7 +45,8 @@ class RelaxOptions:
         time_step: h [s]. The minimum does not depend on it; steps to it stop falling above 1e-3.
         energy_tolerance: eq. (11): relative change of the energy per step.
         residual_tolerance: largest force on a vertex over the mean force of the springs.
-        max_steps: a state that has taken so many is not stepped on, and says so (`converged` is false).
+        max_steps: a state that has taken so many is not stepped on, and says so (`converged` is false); with levels, their work counts in
+            steps of the piece's own mesh, and a cycle that has begun is ended.
         check_every: steps between two looks at energies and convergence.
         kinetic_damping: set velocities to zero when the forces begin to brake the motion.
         solver: "multilevel" (`warpflat.multilevel`; garments are sewn by plain steps all the same), or "plain", the paper's steps alone.
@@ -148,6 +149,7 @@ class Relaxation:
             the plane.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
             constant forces [N]. On the network's device.
+        steps: taken. work_units: all work, in steps of this mesh; those of coarser levels count by their vertices.
     """
 
     network: SpringNetwork
@@ -184,6 +186,7 @@ class Relaxation:
         self.negligible_energy = 0.5e-18 * float(np.sum(springs.stiffness * springs.rest_length**2))
         self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
+        self.work_units = 0.0
         self.restarts = 0
         self._record()
 
@@ -361,7 +364,7 @@ class Relaxation:
     def forces(self) -> NDArray[np.float64]:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
         self.velocity.zero_()
-        self._evaluate()
+        self._evaluate.launch()
         return self._cloth_force()
 
     def _cloth_force(self) -> NDArray[np.float64]:
@@ -421,6 +424,7 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
         chunk = min(options.check_every, options.max_steps - state.steps)
         for _ in range(chunk):
             state.step()
+            state.work_units += 1.0
             if each_step is not None:
                 each_step(state, before, residual)
         now = state.energies()

@@ -1,0 +1,146 @@
+"""Multilevel relaxation: the plain method's minimum, without a mirrored face, with less work."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpflat.cutting import CutPlan, cut
+from warpflat.fabric import Fabric
+from warpflat.flattening import Flattening, flatten
+from warpflat.multilevel import relax_multilevel
+from warpflat.network import SpringNetwork
+from warpflat.relax import Outcome, Relaxation, RelaxOptions, Upright, relax
+from warpflat.shapes import make_shape
+from warpflat.surface import Surface, make_surface
+from warpflat.surface.cut import cut_along
+
+PLAIN, LEVELS = RelaxOptions(solver="plain"), RelaxOptions(solver="multilevel")
+
+
+def cloth(shear: float) -> Fabric:
+    return Fabric(name="cloth", stiffness_warp=1000.0, stiffness_weft=1000.0, shear_stiffness=shear, areal_density=0.15)
+
+
+def cracked(resolution: int, *, triangles: bool) -> Surface:
+    whole = make_shape("dome", resolution=resolution, triangles=triangles)
+    column = np.arange(resolution**2, dtype=np.int32).reshape(resolution, resolution)[: round(0.6 * resolution), 8]
+    made = cut_along(whole.faces, column, vertex_count=len(whole.vertices))
+    return make_surface(whole.vertices[made.vertex_origin], made.faces, lines={"centre": whole.lines["centre"]})
+
+
+def minimum(piece: Flattening) -> float:
+    last = piece.stages[-1]
+    return last.spring_energy_j + last.guard_energy_j
+
+
+def both(surface: Surface, shear: float, **options: object) -> tuple[Flattening, Relaxation, Outcome]:
+    """Relaxed plainly; and the same network with levels, from the same development."""
+    plain = flatten(
+        surface,
+        fabric=cloth(shear),
+        datum="centre",
+        device="cpu",
+        relax=replace(PLAIN, residual_tolerance=1e-3),
+        **options,
+    )
+    ends = Upright(lower=int(plain.datum[0]), upper=int(plain.datum[-1]))
+    state = Relaxation(plain.network, LEVELS, start=plain.development.positions, upright=[ends])
+    return plain, state, relax_multilevel(state)
+
+
+@pytest.mark.parametrize("shear", [200.0, 10.0])
+@pytest.mark.parametrize(
+    ("shape", "resolution", "triangles"),
+    [("dome", 33, False), ("bodice", 33, False), ("saddle", 30, False), ("dome", 33, True), ("bodice", 33, True)],
+)
+def test_the_minimum_is_that_of_the_plain_method(shape: str, resolution: int, triangles: bool, shear: float):
+    plain, state, outcome = both(make_shape(shape, resolution=resolution, triangles=triangles), shear)
+    assert outcome.converged
+    assert state.mirrored_cells() == 0
+    assert outcome.energies.potential == pytest.approx(minimum(plain), rel=1e-3)
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_a_crack_opens_as_far_as_with_the_plain_method(triangles: bool):
+    plain, state, outcome = both(cracked(25, triangles=triangles), 200.0)
+    assert outcome.converged
+    assert state.mirrored_cells() == 0
+    assert outcome.energies.potential == pytest.approx(minimum(plain), rel=1e-3)
+
+
+def test_the_membrane_too():
+    plain, state, outcome = both(make_shape("bodice", resolution=33, triangles=True), 200.0, model="membrane")
+    assert outcome.converged
+    assert state.mirrored_cells() == 0
+    assert outcome.energies.potential == pytest.approx(minimum(plain), rel=1e-3)
+
+
+@pytest.mark.parametrize("shape", ["dome", "bodice"])
+@pytest.mark.parametrize("resolution", [51, 101])
+def test_on_a_grid_thirty_units_of_work_come_within_a_thousandth(shape: str, resolution: int):
+    surface = make_shape(shape, resolution=resolution)
+    done = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
+    state = Relaxation(done.network, LEVELS, start=done.development.positions)
+    seen: list[tuple[float, float]] = []
+    relax_multilevel(state, watch=lambda now, energies, _: seen.append((now.work_units, energies.potential)))
+    assert min(work for work, energy in seen if energy < 1.001 * minimum(done)) <= 30.0
+
+
+def test_a_cycle_never_raises_the_energy_and_mirrors_nothing():
+    surface = make_shape("bodice", resolution=33)
+    piece = flatten(surface, fabric=cloth(20.0), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
+    energies = [state.energies().potential]
+    relax_multilevel(state, watch=lambda s, e, r: energies.append(e.potential))
+    assert (np.diff(energies) <= 1e-9 * energies[0]).all()
+    assert state.mirrored_cells() == 0
+
+
+def test_from_near_the_minimum_little_work_is_left():
+    """A warmer cloth: the pattern of one fabric is the start of the next."""
+    surface = make_shape("bodice", resolution=33)
+    first = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu")
+    network = SpringNetwork.build(surface, cloth(180.0), first.positions, device="cpu")
+    works = []
+    for start, nested in ((first.development.positions, True), (first.positions, False)):
+        state = Relaxation(network, RelaxOptions(residual_tolerance=2e-2), start=start)
+        outcome = relax_multilevel(state, nested=nested)
+        assert outcome.converged
+        works.append(outcome.work_units)
+    assert works[1] < 0.6 * works[0]
+
+
+def test_a_cut_goes_on_from_the_layout_that_is_there():
+    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(200.0), datum="centre", device="cpu")
+    path = np.arange(33 * 33, dtype=np.int32).reshape(33, 33)[:17, 10]
+    plan = CutPlan(name="dart", paths=(path,))
+    released = cut(piece, plan)
+    assert released.converged
+    assert released.flipped_faces == 0
+    assert minimum(released) == pytest.approx(minimum(cut(piece, plan, relax=PLAIN)), rel=1e-3)
+
+
+def test_a_mesh_without_coarser_levels_is_relaxed_by_steps():
+    surface = make_shape("dome", resolution=9)
+    piece = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    states = [Relaxation(piece.network, LEVELS, start=piece.development.positions) for _ in range(2)]
+    outcomes = relax(states[0]), relax_multilevel(states[1])
+    assert outcomes[0].steps == outcomes[1].steps
+    np.testing.assert_array_equal(states[0].positions(), states[1].positions())
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_a_repeat_is_equal_bit_for_bit(triangles: bool):
+    surface = make_shape("bodice", resolution=33, triangles=triangles)
+    first, second = (flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu") for _ in range(2))
+    np.testing.assert_array_equal(first.positions, second.positions)
+
+
+def test_a_work_limit_is_reported_not_hidden():
+    options = RelaxOptions(solver="multilevel", max_steps=12)
+    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(20.0), datum="centre", device="cpu", relax=options)
+    assert not piece.converged
+    assert piece.measures["stages"][-1]["converged"] is False
