@@ -168,7 +168,12 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
 @click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
 @click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
-@click.option("--max-steps", type=int, metavar="N", help="Give up after so many steps.")
+@click.option(
+    "--solver",
+    type=click.Choice(["multilevel", "plain"]),
+    help="Plain: the paper's steps alone.  [default: multilevel]",
+)
+@click.option("--max-steps", type=int, metavar="N", help="Give up after the work of so many steps.")
 @click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
 @click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
 @click.option("--no-picture", is_flag=True, help="Write no picture.png.")
@@ -192,6 +197,7 @@ def flatten(
         "units": ("surface", "units"),
         "component": ("surface", "component"),
         "prim": ("surface", "prim"),
+        "solver": ("relax", "solver"),
         "max_steps": ("relax", "max_steps"),
         "time_step": ("relax", "time_step"),
         "frames": ("output", "frames"),

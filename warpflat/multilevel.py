@@ -218,7 +218,7 @@ class Levels:
     def _objective(self, level: int) -> float:
         self._count(level, _ENERGY_WORK)
         state = self._levels[level].state
-        return state.energies().potential - state.work_of_load()
+        return sum(state.potential()) - state.work_of_load()
 
     def cycle(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
         """One cycle from this level down and up again."""

@@ -194,7 +194,7 @@ class Relaxation:
         """Record the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one."""
         net, h = self.network, self.options.time_step
         n, c, device = net.vertex_count, net.cell_count, net.device
-        evaluate_cells, _, parameters = net.cell_model
+        evaluate_cells, compute_cell_energy, parameters = net.cell_model
         launches = [
             record(
                 evaluate_cells,
@@ -253,6 +253,31 @@ class Relaxation:
             device=device,
         )
         self._evaluate = LaunchSequence([*launches, gather])
+        self._measure = LaunchSequence(
+            [
+                record(
+                    compute_spring_energy,
+                    dim=n,
+                    inputs=[self.position, net.springs],
+                    outputs=[self._vertex_energy],
+                    device=device,
+                ),
+                record(
+                    compute_cell_energy,
+                    dim=c,
+                    inputs=[self.position, net.cells, parameters],
+                    outputs=[self._cell_energy],
+                    device=device,
+                ),
+            ]
+        )
+        self._measure_motion = record(
+            compute_kinetic_energy,
+            dim=n,
+            inputs=[net.mass, self.velocity],
+            outputs=[self._vertex_energy],
+            device=device,
+        )
         self._advance = record(
             advance,
             dim=n,
@@ -303,36 +328,19 @@ class Relaxation:
         """Sum of load times place [J]."""
         return float(np.einsum("ij,ij->", self.load.numpy(), self.position.numpy()))
 
+    def potential(self) -> tuple[float, float]:
+        """Energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
+        self._measure.launch()
+        return float(self._vertex_energy.numpy().sum()), float(self._cell_energy.numpy().sum())
+
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
-        net, device = self.network, self.network.device
-        n, c = net.vertex_count, net.cell_count
-        wp.launch(
-            compute_spring_energy,
-            dim=n,
-            inputs=[self.position, net.springs, 0],
-            outputs=[self._vertex_energy],
-            device=device,
-        )
-        spring = float(self._vertex_energy.numpy().sum())
-        wp.launch(
-            compute_kinetic_energy,
-            dim=n,
-            inputs=[net.mass, self.velocity, 0],
-            outputs=[self._vertex_energy],
-            device=device,
-        )
+        spring, cells = self.potential()
+        self._measure_motion.launch()
         kinetic = float(self._vertex_energy.numpy().sum())
-        _, compute_cell_energy, parameters = net.cell_model
-        wp.launch(
-            compute_cell_energy,
-            dim=c,
-            inputs=[self.position, net.cells, parameters, 0],
-            outputs=[self._cell_energy],
-            device=device,
-        )
-        cells = float(self._cell_energy.numpy().sum())
-        return Energies(spring, cells, kinetic) if net.model == "springs" else Energies(cells, 0.0, kinetic)
+        if self.network.model == "springs":
+            return Energies(spring, cells, kinetic)
+        return Energies(cells, 0.0, kinetic)
 
     def hold_upright(self) -> None:
         """Turn each piece so that the chord of its datum points up, and hold it there.
