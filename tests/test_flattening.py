@@ -137,10 +137,14 @@ def moved(coarse: FloatArray, fine: FloatArray) -> float:
 @pytest.mark.parametrize(
     ("shape", "shear", "triangles", "resolutions"),
     [
-        *[(s, g, t, (33, 65)) for s in ("dome", "saddle") for g in (200.0, 20.0) for t in (False, True)],
+        # The whole table, twice refined, is in docs/model.md and printed by benchmarks/refinement.py.
+        *[(s, g, False, (33, 65, 129)) for s in ("dome", "saddle") for g in (200.0, 20.0)],
+        *[(s, g, True, (33, 65)) for s in ("dome", "saddle") for g in (200.0, 20.0)],
+        # On 33 by 33, 14 mm, the layer along the bodice's sides that shears at G/K = 1/50 is thinner than an edge.
         ("bodice", 200.0, False, (33, 65, 129)),
         ("bodice", 20.0, False, (65, 129)),
         ("bodice", 200.0, True, (33, 65)),
+        ("bodice", 20.0, True, (65, 129)),
     ],
 )
 def test_a_finer_mesh_does_not_move_the_outline(shape, shear, triangles, resolutions):
@@ -151,7 +155,6 @@ def test_a_finer_mesh_does_not_move_the_outline(shape, shear, triangles, resolut
             fabric=cloth(shear),
             datum="centre",
             device="cpu",
-            relax=RelaxOptions(residual_tolerance=2e-3),
         )
         assert piece.converged
         assert piece.flipped_faces == 0
