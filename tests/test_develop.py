@@ -12,6 +12,7 @@ from warpflat.network import cells_of
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, line_from_indices, make_surface, mesh_edges, triangulate
+from warpflat.surface.cut import cut_along
 
 FloatArray = NDArray[np.float64]
 
@@ -98,6 +99,40 @@ def test_what_is_no_grid_has_no_profiles(line: str):
     surface = make_shape("dome", resolution=9, triangles=line == "triangles")
     datum = np.array([0, 1, 10, 19]) if line == "bent" else surface.lines["centre"]
     assert profile_layout(surface, np.asarray(datum, dtype=np.int32)) is None
+
+
+# --- cracks
+
+
+def opened(whole: Surface, path: NDArray[np.int32], **lines: NDArray[np.int32]) -> tuple[Surface, NDArray[np.int32]]:
+    """The surface with a crack along a path, and for each vertex the one that it was."""
+    made = cut_along(whole.faces, path, vertex_count=len(whole.vertices))
+    surface = make_surface(whole.vertices[made.vertex_origin], made.faces, lines=lines)
+    return surface, made.vertex_origin[surface.input_index]
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+@pytest.mark.parametrize("rows", [slice(0, 9), slice(5, 13)], ids=["from the border", "inside"])
+def test_a_piece_with_a_crack_is_developed_as_if_it_had_none(triangles: bool, rows: slice):
+    whole = make_shape("dome", resolution=17, triangles=triangles)
+    centre = whole.lines["centre"]
+    surface, origin = opened(whole, np.arange(17 * 17, dtype=np.int32).reshape(17, 17)[rows, 5], centre=centre)
+    assert len(surface.vertices) > len(whole.vertices)
+    development, before = develop(surface, surface.lines["centre"]), develop(whole, centre)
+    assert development.method == before.method == ("geodesic" if triangles else "profiles")
+    assert mirrored(surface, development.positions) == 0
+    np.testing.assert_allclose(development.positions, before.positions[origin], atol=1e-12)
+    assert "closed" in development.notes[0]
+
+
+def test_a_tube_cut_open_is_not_closed_again():
+    whole = ring(0.1, 0.1, height=0.3)
+    column = np.arange(24 * 5, dtype=np.int32).reshape(5, 24)
+    surface, _ = opened(whole, column[:, 3], front=column[:, 15])
+    development = develop(surface, surface.lines["front"])
+    assert development.notes == ()
+    assert mirrored(surface, development.positions) == 0
+    np.testing.assert_allclose(edge_errors(surface, development.positions), 0.0, atol=1e-12)
 
 
 # --- geodesics

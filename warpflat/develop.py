@@ -1,13 +1,13 @@
 """Development: the first, unrelaxed layout of a piece, from a datum line (paper, section IV.B).
 
 Three ways, the first that leaves no face mirrored: along the profiles of a quad grid, by geodesic distance from the datum
-line, and, where both fold, a harmonic map onto a disk, which cannot.
+line, and, where both fold, a harmonic map onto a disk, which cannot. Cracks are closed for the first two, where that helps.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,7 +18,14 @@ from warpflat.strain import signed_cell_areas
 from warpflat.surface.geodesic import signed_distance_and_station
 from warpflat.surface.lines import line_between, line_on_plane
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops, half_edges, triangulate
+from warpflat.surface.topology import (
+    border_loops,
+    euler_characteristic,
+    half_edges,
+    non_manifold_vertices,
+    places_of,
+    triangulate,
+)
 from warpflat.surface.untangle import untangle
 
 __all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmonic_layout", "profile_layout"]
@@ -98,7 +105,16 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     """
     notes: list[str] = []
     cells = cells_of(surface)
-    for method, layout in (("profiles", profile_layout), ("geodesic", geodesic_layout)):
+    ways = (("profiles", profile_layout), ("geodesic", geodesic_layout))
+    closed = _with_cracks_closed(surface, datum)
+    if closed is not None:
+        whole, index = closed
+        for method, layout in ways:
+            positions = layout(whole, index[datum])
+            if positions is not None and _mirrored(cells, positions[index]) == 0:
+                notes.append("developed with its cracks closed")
+                return Development(positions=positions[index], method=method, notes=tuple(notes))
+    for method, layout in ways:
         positions = layout(surface, datum)
         if positions is None:
             continue
@@ -115,6 +131,29 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     positions = _upright(harmonic_layout(surface), datum)
     notes.append("started from a harmonic map onto a disk instead, which cannot fold")
     return Development(positions=positions, method="harmonic", mended=True, notes=tuple(notes))
+
+
+def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] | None:
+    """The surface with border vertices at one place made one, and for each vertex its number there.
+
+    None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
+    that do not belong together.
+    """
+    lowest, inverse = np.unique(places_of(surface.vertices, surface.faces), return_inverse=True)
+    index = inverse.reshape(-1).astype(np.int32)
+    if len(lowest) == len(surface.vertices) or len(np.unique(index[datum])) < len(datum):
+        return None
+    faces = np.where(surface.faces >= 0, index[surface.faces], np.int32(-1))
+    he = half_edges(faces)
+    runs_once = len(np.unique(he.tail * np.int64(len(lowest)) + he.head)) == len(he.tail)
+    if not runs_once or len(non_manifold_vertices(faces)):
+        return None
+    if euler_characteristic(faces) < euler_characteristic(surface.faces):
+        return None
+    whole = replace(
+        surface, vertices=surface.vertices[lowest], faces=faces, lines={}, input_index=surface.input_index[lowest]
+    )
+    return whole, index
 
 
 def _mirrored(cells: CellArrays, positions: FloatArray) -> int:

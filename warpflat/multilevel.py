@@ -49,7 +49,7 @@ _CYCLES_ON_THE_WAY = 1
 _LEAST_STEPS = 4
 _MOST_STEPS = 256
 _SLOW = 0.35
-# K/G from which the coarse triangles of a membrane are of little use.
+# K/G from which coarse triangles are of little use.
 _SOFT = 35.0
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
@@ -288,9 +288,9 @@ class Levels:
 
 
 def levels_pay(network: SpringNetwork) -> bool:
-    """Whether cycles take less work than plain steps: always on grids and with springs. Coarse triangles of a membrane whose
-    shear is softer than a 35th of its stiffness carry little; there (denim on the scans) cycles took two to three times the steps."""
-    return network.model == "springs" or bool(network.surface.is_quad.all()) or _softness(network) < _SOFT
+    """Whether cycles take less work than plain steps: on grids always, on triangles unless the shear is softer than a 35th of
+    the stiffness. There coarse triangles carry little: denim on the scans took two to three times the plain steps."""
+    return bool(network.surface.is_quad.all()) or _softness(network) < _SOFT
 
 
 def _softness(network: SpringNetwork) -> float:

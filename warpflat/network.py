@@ -35,9 +35,10 @@ from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_m
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
-from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges, unfold_quad_diagonals
+from warpflat.surface.mesh import Surface, once_per_surface
+from warpflat.surface.topology import corner_triangles, half_edges, stable_order, unfold_quad_diagonals
 from warpflat.surface.unfold import lay_quads_flat, quad_creases
+from warpflat.surface.vectors import cross, dot, norm, points_at
 
 __all__ = ["SpringNetwork", "cells_of", "grain_axes", "springs_of", "vertex_masses"]
 
@@ -117,21 +118,29 @@ class CellArrays:
     area: FloatArray
 
 
+@once_per_surface
+def _creases_of(surface: Surface) -> tuple[NDArray[np.int8], IntArray]:
+    return quad_creases(surface.vertices, surface.faces)
+
+
+@once_per_surface
 def cells_of(surface: Surface) -> CellArrays:
     """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
     corner, face, weight = corner_triangles(surface.faces)
-    p = surface.vertices[corner]
-    flat, creased, _ = lay_quads_flat(surface.vertices, surface.faces)
-    around = np.flatnonzero(np.isin(face, creased))
-    p[around, :, :2] = flat[:, [[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]].reshape(-1, 3, 2)
-    p[around, :, 2] = 0.0
+    p = points_at(surface.vertices, corner.T)
+    flat, creased, _ = lay_quads_flat(surface.vertices, surface.faces, creases=_creases_of(surface))
+    is_creased = np.zeros(len(surface.faces), dtype=bool)
+    is_creased[creased] = True
+    around = np.flatnonzero(is_creased[face])
+    laid = flat[:, [[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]].reshape(-1, 3, 2)
+    p[:2, :, around] = laid.T
+    p[2, :, around] = 0.0
     a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    length = np.linalg.norm(a, axis=1)
-    twice = np.linalg.norm(np.cross(a, b), axis=1)
+    length, twice = norm(a), norm(cross(a, b))
     safe = np.where(length > 0, length, 1.0)
     edges = np.zeros((len(corner), 2, 2))
     edges[:, 0, 0] = length
-    edges[:, 0, 1] = np.einsum("ij,ij->i", a, b) / safe
+    edges[:, 0, 1] = dot(a, b) / safe
     edges[:, 1, 1] = twice / safe
     return CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=0.5 * weight * twice)
 
@@ -184,7 +193,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         share = np.where(he.slot[of_quad] % 2 == 0, half_a[row[he.face[of_quad]]], half_b[row[he.face[of_quad]]])
         stiffness += np.bincount(he.edge[of_quad], share, minlength=len(edges))
         diagonal, _ = unfold_quad_diagonals(vertices, surface.faces)
-        creased, _ = quad_creases(vertices, surface.faces)
+        creased, _ = _creases_of(surface)
         for k in (0, 1):
             # A crease is straight itself.
             along = corner[creased == k][:, [k, k + 2]]
@@ -504,7 +513,7 @@ def _by_vertex(
     vertex: NDArray[np.integer], then_by: NDArray[np.integer], count: int
 ) -> tuple[NDArray[np.int64], IntArray]:
     """Order that sorts entries by vertex, and #count+1, where each vertex's begin."""
-    order = np.lexsort((then_by, vertex))
+    order = stable_order(vertex * (np.int64(then_by.max(initial=0)) + 1) + then_by)
     offset = np.zeros(count + 1, dtype=np.int32)
     np.cumsum(np.bincount(vertex, minlength=count), out=offset[1:])
     return order, offset

@@ -18,7 +18,7 @@ from warpflat.kernels.strain import Membrane, compute_worn_strain
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_edges, mesh_edges
+from warpflat.surface.topology import half_edges
 
 __all__ = ["LayoutErrors", "WornStrain", "layout_errors", "membrane_of", "signed_cell_areas", "worn_strain"]
 
@@ -121,14 +121,15 @@ class LayoutErrors:
 def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
     """Errors of a layout (#V by 2 [m]) of the network's surface."""
     cells = network.cell_arrays
-    edges = mesh_edges(surface.faces)
+    he = half_edges(surface.faces)
+    edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
     signed = signed_cell_areas(cells.corner, positions)
     faces = len(surface.faces)
     flat = np.bincount(cells.face, cells.weight * signed, minlength=faces)
     body = np.bincount(cells.face, cells.area, minlength=faces)
-    border = border_edges(surface.faces)
-    border_space, border_plane = _lengths(surface.vertices, border).sum(), _lengths(positions, border).sum()
+    border = he.count == 1
+    border_space, border_plane = in_space[border].sum(), in_plane[border].sum()
     return LayoutErrors(
         length_error=float(np.abs(in_plane - in_space).sum() / in_space.sum()),
         area_error=float(np.abs(flat - body).sum() / body.sum()),

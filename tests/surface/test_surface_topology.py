@@ -22,6 +22,7 @@ from warpflat.surface import (
     triangulate,
     unfold_quad_diagonals,
 )
+from warpflat.surface.topology import stable_order
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 
@@ -239,3 +240,11 @@ def test_triangles_have_no_diagonals():
     lengths, face = unfold_quad_diagonals(grid(3, 3)[0], MIXED)
     assert lengths.shape == (1, 2)
     assert face.tolist() == [0]
+
+
+@pytest.mark.parametrize("greatest", [3, 2**20, 2**62])
+def test_stable_order_is_that_of_a_stable_sort(greatest):
+    keys = np.random.default_rng(4).integers(0, greatest, 500, dtype=np.int64)
+    keys[::7] = keys[0]
+    assert np.array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
+    assert len(stable_order(keys[:0])) == 0

@@ -182,7 +182,12 @@ class DrawnView:
             paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
             layers = [((1.0, 1.0, 1.0, 0.7), width + 1.6, HALO_LAYER)] if halo else []
             for ink, thickness, layer in (*layers, (colour, width, zorder)):
-                look = {"edgecolors": [ink], "linewidths": thickness, "capstyle": "round", "zorder": layer}
+                look: dict[str, Any] = {
+                    "edgecolors": [ink],
+                    "linewidths": thickness,
+                    "capstyle": "round",
+                    "zorder": layer,
+                }
                 axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
 
     def visible_line(self, line: NDArray[np.int32]) -> NDArray[np.float64]:
@@ -222,8 +227,8 @@ class DrawnView:
         row, column = np.nonzero(~alike)
         samples = blocks[row, :, column, :]
         covered = samples >= 0
-        pixel, i, j = np.nonzero(covered)
-        spots = np.column_stack([column[pixel] * side + j + 0.5, row[pixel] * side + i + 0.5])
+        pixel, down, along = np.nonzero(covered)
+        spots = np.column_stack([column[pixel] * side + along + 0.5, row[pixel] * side + down + 0.5])
         shaded = np.zeros((*samples.shape, 3), dtype=np.float32)
         shaded[covered] = self._shaded(samples[covered], spots, colours)
         across = (side, len(row) * side)

@@ -8,6 +8,7 @@ mesh. Colours and light are looked up afterwards, once per pixel.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,24 +84,47 @@ def _fill(
     width = np.floor(np.clip(right, -1, columns - 1)).astype(np.int64) - first + 1
     covers = (width > 0) & (area[which] != 0)
     which, row, first, width = which[covers], row[covers], first[covers], width[covers]
-    span = np.repeat(np.arange(len(width)), width)
-    column = first[span] + np.arange(len(span)) - np.repeat(np.cumsum(width) - width, width)
-    owner = which[span]
     safe = np.where(area != 0, area, 1.0)
     rise, run = b - a, c - a
-    slope_x = (rise[:, 2] * run[:, 1] - run[:, 2] * rise[:, 1]) / safe
+    slope_x = ((rise[:, 2] * run[:, 1] - run[:, 2] * rise[:, 1]) / safe)[which]
     slope_y = (run[:, 2] * rise[:, 0] - rise[:, 2] * run[:, 0]) / safe
-    depth = a[owner, 2] + slope_x[owner] * (column - a[owner, 0]) + slope_y[owner] * (row[span] - a[owner, 1])
     # Seen edge-on, a plane's depth runs away between its corners.
-    low, high = (np.minimum(np.minimum(a, b), c)[:, 2], np.maximum(np.maximum(a, b), c)[:, 2])
-    depth = np.clip(depth, low[owner], high[owner])
-    pixel = row[span] * columns + column
+    low, high = (np.minimum(np.minimum(a, b), c)[which, 2], np.maximum(np.maximum(a, b), c)[which, 2])
+    begin = a[which, 2] + slope_x * (first - a[which, 0]) + slope_y[which] * (row - a[which, 1])
+    end = np.clip(begin + slope_x * (width - 1), low, high)
+    begin = np.clip(begin, low, high)
+    slope = (end - begin) / np.maximum(width - 1, 1)
+    # From here on an entry per sample, many more than spans.
+    starts = np.cumsum(width) - width
+    count = np.arange(int(width.sum()), dtype=np.int32)
+    pixel = count + np.repeat((row * columns + first - starts).astype(np.int32), width)
+    depth = np.repeat(slope, width) * (count - np.repeat(starts.astype(np.int32), width)) + np.repeat(begin, width)
+    owner = np.repeat(index[which].astype(np.int32), width)
     nearer = depth >= front.depth[pixel]
-    pixel, depth, owner = pixel[nearer], depth[nearer], owner[nearer]
-    order = np.argsort(depth, kind="stable")
-    # Of repeated indices NumPy keeps the last assignment: the nearest.
-    front.depth[pixel[order]] = depth[order]
-    front.triangle[pixel[order]] = index[owner[order]]
+    if not nearer.all():
+        pixel, depth, owner, count = pixel[nearer], depth[nearer], owner[nearer], count[: int(nearer.sum())]
+    _put_nearest(front, pixel, depth, owner, count)
+
+
+def _put_nearest(
+    front: Samples,
+    pixel: NDArray[np.int32],
+    depth: NDArray[np.float64],
+    owner: NDArray[np.int32],
+    count: NDArray[np.int32],
+) -> None:
+    """Set pixels to the nearest of those given for each; of equally near ones to the last."""
+    last = np.empty(front.depth.shape, dtype=np.int32)
+    last[pixel] = count
+    lost = last[pixel] != count
+    front.depth[pixel], front.triangle[pixel] = depth, owner
+    if lost.any():
+        several = np.zeros(front.depth.shape, dtype=bool)
+        several[pixel[lost]] = True
+        entries = np.flatnonzero(several[pixel])
+        # Of repeated indices NumPy keeps the last assignment: the nearest.
+        entries = entries[np.argsort(depth[entries], kind="stable")]
+        front.depth[pixel[entries]], front.triangle[pixel[entries]] = depth[entries], owner[entries]
 
 
 def _spans(
@@ -126,27 +150,35 @@ def _spans(
 
 
 def interpolate(
-    samples: Samples, points: NDArray[np.float64], triangles: NDArray[np.int32], values: NDArray[np.float64]
-) -> NDArray[np.float64]:
-    """#R by #C by 3, values at the vertices (#V by 3) blended over the triangles in front; 0 where there is none."""
-    rows, columns = np.nonzero(samples.triangle >= 0)
-    corners = triangles[samples.triangle[rows, columns]]
-    a, b, c = (points[corners[:, k], :2] for k in range(3))
-    x, y = columns + 0.5 - a[:, 0], rows + 0.5 - a[:, 1]
+    triangle: NDArray[np.int32],
+    spots: NDArray[np.float64],
+    points: NDArray[np.float64],
+    triangles: NDArray[np.int32],
+    values: NDArray[Any],
+) -> NDArray[Any]:
+    """#S by #K, values at the vertices (#V by #K) blended over triangles at spots inside them.
+
+    Args:
+        triangle: #S, the triangle of each spot.
+        spots: #S by 2, column and row.
+        points: #V by 2 or more: column and row.
+        triangles: #T by 3.
+        values: #V by #K; the result has their precision.
+    """
+    a, b, c = (points[triangles[:, k], :2] for k in range(3))
     (ux, uy), (vx, vy) = (b - a).T, (c - a).T
     area = ux * vy - uy * vx
     safe = np.where(area != 0, area, 1.0)
-    second = np.clip((x * vy - y * vx) / safe, 0.0, 1.0)[:, None]
-    third = np.clip((ux * y - uy * x) / safe, 0.0, 1.0)[:, None]
-    result = np.zeros((*samples.triangle.shape, values.shape[1]))
-    first = np.clip(1.0 - second - third, 0.0, 1.0)
-    result[rows, columns] = (
-        values[corners[:, 0]] * first + values[corners[:, 1]] * second + values[corners[:, 2]] * third
-    )
-    return result
+    # Per triangle what would else be worked out again at each of its spots.
+    plane = np.column_stack([a, vy / safe, -vx / safe, -uy / safe, ux / safe])[triangle]
+    x, y = spots[:, 0] - plane[:, 0], spots[:, 1] - plane[:, 1]
+    second = np.clip(plane[:, 2] * x + plane[:, 3] * y, 0.0, 1.0).astype(values.dtype)[:, None]
+    third = np.clip(plane[:, 4] * x + plane[:, 5] * y, 0.0, 1.0).astype(values.dtype)[:, None]
+    corner = values[triangles[triangle].T]
+    return np.asarray(corner[0] * np.maximum(1.0 - second - third, 0.0) + corner[1] * second + corner[2] * third)
 
 
-def reduce_samples(colours: NDArray[np.float64], covered: NDArray[np.bool_], per_pixel: int) -> NDArray[np.float64]:
+def reduce_samples(colours: NDArray[Any], covered: NDArray[np.bool_], per_pixel: int) -> NDArray[Any]:
     """RGBA pixels from `per_pixel` squared samples each: their mean colour, and as opacity the covered share.
 
     Args:

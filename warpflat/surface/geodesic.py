@@ -20,7 +20,15 @@ from warpflat.errors import InputError
 from warpflat.surface.lines import line_from_curve
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
-from warpflat.surface.topology import border_edges, components, half_edges, triangulate, unfold_quad_diagonals
+from warpflat.surface.topology import (
+    border_edges,
+    components,
+    half_edges,
+    stable_order,
+    triangulate,
+    unfold_quad_diagonals,
+)
+from warpflat.surface.vectors import cross, dot, norm, points_at
 
 __all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
 
@@ -78,14 +86,15 @@ def signed_distance_and_station(
     station -= station[before]
     ways = _Ways(surface, path.astype(np.int64))
     along = ways.carry(path.astype(np.int64), station)
-    known, vectors = _directions_at_line(surface, path)
-    right, up = (ways.carry(known, component) for component in vectors.T)
-    size = np.hypot(right, up)
-    right, up = (np.where(size > 0, part / np.where(size > 0, size, 1.0), 0.0) for part in (right, up))
+    known, side, about_ends = _directions_at_line(surface, path)
+    columns = ways.carry(known, np.column_stack([side, *about_ends])).T
+    x, y = ways.distance * np.sign(columns[0]), along
+    for (right, up), end, outwards in ((columns[1:3], station[0], -1.0), (columns[3:], station[-1], 1.0)):
+        beyond = outwards * up > 0
+        scale = ways.distance / np.where(beyond, np.hypot(right, up), 1.0)
+        x, y = np.where(beyond, scale * right, x), np.where(beyond, end + scale * up, y)
     sides = _sides(surface, path)
-    if sides is not None:
-        right = sides * np.abs(right)
-    return ways.distance * right, along + ways.distance * up
+    return (x if sides is None else sides * np.abs(x)), y
 
 
 def extend_to_border(surface: Surface, line: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
@@ -156,88 +165,105 @@ class _Ways:
         chain: list[tuple[int, list[float]]] = [(int(vertex), []) for vertex in line]
         distance = np.maximum(np.array(solver.compute_distance([chain]), dtype=np.float64), 0.0)
         distance[line] = 0.0
-        corner = np.concatenate([triangles[:, [i, (i + 1) % 3, (i + 2) % 3]] for i in range(3)]).astype(np.int64)
-        corner = corner[~self.on_line[corner[:, 0]]]
-        corner = corner[np.argsort(corner[:, 0], kind="stable")]
-        self._corner = corner
-        self._first_row = np.flatnonzero(np.diff(corner[:, 0], prepend=-1))
-        p = surface.vertices[corner]
-        side, away = p[:, 2] - p[:, 1], p[:, 0] - p[:, 1]
-        self._side = np.linalg.norm(side, axis=1)
-        safe = np.where(self._side > 0, self._side, 1.0)
-        self._foot = np.einsum("ij,ij->i", away, side) / safe
-        self._height = np.linalg.norm(np.cross(away, side), axis=1) / safe
+        self._see_corners(surface.vertices, triangles)
         for _ in range(_MOST_STEPS):
-            cost = self._choose_ways(distance)
-            better = self._solve(cost)
-            change = float(np.abs(better - distance).max())
-            distance = better
+            cost, change = self._choose_ways(distance)
             if change <= 1e-12 * float(distance.max()):
                 break
+            distance = self._solve(cost)
         self.distance = distance
 
-    def _choose_ways(self, distance: NDArray[np.float64]) -> NDArray[np.float64]:
-        """Set each vertex's way to the best one given the distances; #V, the length [m] of its first leg."""
-        da, db = distance[self._corner[:, 1]], distance[self._corner[:, 2]]
-        safe = np.where(self._side > 0, self._side, 1.0)
-        slope = np.clip((db - da) / safe, -1 + 1e-15, 1 - 1e-15)
+    def _see_corners(self, vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
+        """Each vertex with each side opposite to it, triangle by triangle: how long that is, and where it lies."""
+        at, ahead, behind = (np.roll(triangles, -k, axis=1).T.ravel() for k in range(3))
+        order = stable_order(at)
+        order = order[~self.on_line[at[order]]]
+        self._corner = at[order], ahead[order], behind[order]
+        self._first_row = np.flatnonzero(np.diff(self._corner[0], prepend=-1))
+        away, before, side = (points_at(vertices, index) for index in self._corner)
+        side -= before
+        away -= before
+        del before, at, ahead, behind, order  # large
+        self._side = norm(side)
+        self._safe_side = np.where(self._side > 0, self._side, 1.0)
+        self._foot = dot(away, side) / self._safe_side
+        self._height = norm(cross(away, side)) / self._safe_side
+
+    def _choose_ways(self, distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
+        """Set each vertex's way to the best one given the distances.
+
+        Returns:
+            #V, the length [m] of each way's first leg; and by how much at most the distances change [m] if those of all other
+            vertices are right.
+        """
+        vertex, a, b = self._corner
+        da, db = distance[a], distance[b]
+        slope = np.clip((db - da) / self._safe_side, -1 + 1e-15, 1 - 1e-15)
         at = np.clip(self._foot - slope * self._height / np.sqrt(1 - slope**2), 0, self._side)
-        share = at / safe
-        leg = np.hypot(at - self._foot, self._height)
-        vertex = self._corner[:, 0]
-        before = (1 - share) * da + share * db
+        share = at / self._safe_side
+        leg = np.sqrt((at - self._foot) ** 2 + self._height**2)
+        before = da + share * (db - da)
         # A way leads downhill. Where rounding leaves none that does, the lowest will do; on needles two vertices would
         # else lead to each other.
         value = np.where(before < distance[vertex], before + leg, 1e6 * (1.0 + before))
         least = np.minimum.reduceat(value, self._first_row)
-        row = np.flatnonzero(value == np.repeat(least, np.diff(np.append(self._first_row, len(value)))))
-        chosen, which = np.unique(vertex[row], return_index=True)
-        row = row[which]
+        row = np.flatnonzero(value == np.repeat(least, np.diff(self._first_row, append=len(value))))
+        row = row[np.diff(vertex[row], prepend=-1) > 0]
+        chosen = vertex[row]
         self.first, self.second, self.share = np.arange(self.size), np.arange(self.size), np.zeros(self.size)
-        self.first[chosen], self.second[chosen] = self._corner[row, 1], self._corner[row, 2]
-        self.share[chosen] = share[row]
+        self.first[chosen], self.second[chosen], self.share[chosen] = a[row], b[row], share[row]
         cost = np.zeros(self.size)
         cost[chosen] = leg[row]
         # Nearly triangular in this order, so the factors stay as sparse as the matrix.
         self._order = np.argsort(distance, kind="stable")
-        return cost
+        change = float(np.abs(value[row] - distance[chosen]).max(initial=0.0))
+        return cost, change
 
     def _solve(self, right: NDArray[np.float64], also_fixed: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
         """x with x(v) = right(v) + the x where the way of v passes; x = right on the line."""
-        from scipy.sparse import coo_matrix, identity
+        from scipy.sparse import csc_matrix
         from scipy.sparse.linalg import splu
 
         fixed = self.on_line.copy()
         if also_fixed is not None:
             fixed[also_fixed] = True
-        free = np.flatnonzero(~fixed)
-        rank = np.empty(self.size, dtype=np.int64)
-        rank[self._order] = np.arange(self.size)
-        weights = np.concatenate([1 - self.share[free], self.share[free]])
-        rows = np.tile(rank[free], 2)
-        columns = rank[np.concatenate([self.first[free], self.second[free]])]
-        matrix = identity(self.size, format="csc") - coo_matrix(
-            (weights, (rows, columns)), shape=(self.size, self.size)
-        )
-        solution = splu(matrix.tocsc(), permc_spec="NATURAL").solve(right[self._order])
+        rank = np.empty(self.size, dtype=np.int32)
+        rank[self._order] = np.arange(self.size, dtype=np.int32)
+        # Row by row in the order of distance: 1 for the vertex itself, less its shares of two others if it has a way.
+        free = ~fixed[self._order]
+        offset = np.concatenate([[0], np.cumsum(np.where(free, 3, 1))]).astype(np.int32)
+        at, way = offset[:-1][free], self._order[free]
+        entries, columns = np.ones(offset[-1]), np.empty(offset[-1], dtype=np.int32)
+        columns[offset[:-1]] = np.arange(self.size)
+        columns[at + 1], columns[at + 2] = rank[self.first[way]], rank[self.second[way]]
+        entries[at + 1], entries[at + 2] = self.share[way] - 1.0, -self.share[way]
+        transposed = csc_matrix((entries, columns, offset), shape=(self.size, self.size))
+        # Rows so alike that SuperLU's blocks only cost.
+        factors = splu(transposed, permc_spec="NATURAL", panel_size=1, relax=1)
+        solution = factors.solve(right[self._order], trans="T")
         return np.asarray(solution[rank])
 
     def carry(self, known: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
-        """#V, the values of `known` vertices (those of the line among them) carried to all others along the ways."""
-        right = np.zeros(self.size)
+        """#V (by #K), the values (#N, or #N by #K) of `known` vertices, the line's among them, carried to all others."""
+        right = np.zeros((self.size, *values.shape[1:]))
         right[known] = values
         return self._solve(right, also_fixed=known)
 
 
-def _directions_at_line(surface: Surface, path: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
-    """The vertices of the line and those joined to it, and for each the direction (right, up) in which it lies.
+def _directions_at_line(
+    surface: Surface, path: NDArray[np.int32]
+) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    """The vertices of the line and those joined to it, and where they lie.
 
-    Beside the line that is right or left; about an end it is the direction on the surface, by the angles of the
-    triangles around the end, as far as it lies beyond the right angle. The line's own vertices have (0, 0).
+    Returns:
+        #N, the vertices; #N, more or less than 0 to the right or left of the line; and for either end of it, #N by 2, right
+        and up [m] of it, by the angles of the triangles around it as in the plane. A straight way that passes between two
+        of them has the mean of their places. Vertices not joined to that end lie beside their own place of a straight line.
     """
     rings = _rings(surface.vertices, _short_triangles(surface), path)
-    beside: dict[int, complex] = {}
-    beyond: dict[int, complex] = {}
+    beside: dict[int, float] = {}
+    place_on_line: dict[int, int] = {}
+    around: tuple[dict[int, complex], dict[int, complex]] = ({}, {})
     on_line = set(path.tolist())
     last = len(path) - 1
     for i, centre in enumerate(path.tolist()):
@@ -247,15 +273,23 @@ def _directions_at_line(surface: Surface, path: NDArray[np.int32]) -> tuple[NDAr
         for start, right in starts:
             for follow, sign in zip(rings[centre], (right, -right), strict=True):
                 for vertex, angle in _walk(follow, start, on_line):
-                    if i in (0, last) and angle > np.pi / 2:
-                        up = -np.cos(angle) if i == last else np.cos(angle)
-                        beyond[vertex] = beyond.get(vertex, 0j) + complex(sign * np.sin(angle), up)
-                    else:
-                        beside[vertex] = beside.get(vertex, 0j) + sign
-    found = {**beside, **beyond}
-    vectors = np.array([(value.real, value.imag) for value in found.values()]).reshape(-1, 2)
-    known = np.concatenate([path.astype(np.int64), np.fromiter(found, dtype=np.int64, count=len(found))])
-    return known, np.concatenate([np.zeros((len(path), 2)), vectors])
+                    length = float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[centre]))
+                    beside[vertex] = beside.get(vertex, 0.0) + sign * length
+                    place_on_line[vertex] = i
+                    if i in (0, last):
+                        place = length * complex(sign * np.sin(angle), np.cos(angle) * (1.0 if i == 0 else -1.0))
+                        near = around[0 if i == 0 else 1]
+                        near[vertex] = near.get(vertex, 0j) + place
+    known = np.array([*path, *beside], dtype=np.int64)
+    side = np.array([*np.zeros(len(path)), *beside.values()])
+    station = chain_positions(surface.vertices[path])[[*range(len(path)), *place_on_line.values()]]
+    about_ends = []
+    for near, end in zip(around, (0, last), strict=True):
+        about_end = np.column_stack([side, station - station[end]])
+        joined = [k for k, vertex in enumerate(known.tolist()) if vertex in near]
+        about_end[joined] = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[joined]]
+        about_ends.append(about_end)
+    return known, side, (about_ends[0], about_ends[1])
 
 
 _Follow = dict[int, tuple[int, float]]

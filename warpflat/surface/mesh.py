@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import wraps
+from typing import TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface"]
+__all__ = ["Surface", "once_per_surface"]
+
+Result = TypeVar("Result")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -39,3 +44,16 @@ class Surface:
     def is_quad(self) -> NDArray[np.bool_]:
         """#F, true for quads."""
         return self.faces[:, 3] >= 0
+
+
+def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
+    """A function of a surface, worked out once for each and kept as long as that lives; surfaces do not change."""
+    known: WeakKeyDictionary[Surface, Result] = WeakKeyDictionary()
+
+    @wraps(measure)
+    def remembered(surface: Surface) -> Result:
+        if surface not in known:
+            known[surface] = measure(surface)
+        return known[surface]
+
+    return remembered

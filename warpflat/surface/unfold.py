@@ -10,6 +10,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.surface.topology import places_of
+from warpflat.surface.vectors import cross, dot, norm, points_at
+
 __all__ = ["lay_quads_flat", "quad_creases"]
 
 FloatArray = NDArray[np.float64]
@@ -40,20 +43,25 @@ def quad_creases(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.int8
     crease = np.full(len(index), -1, dtype=np.int8)
     if len(index) == 0:
         return crease, index
-    corner = vertices[faces[index]]
+    corner = points_at(vertices, faces[index].T)
     d02, d13 = corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]
-    l02, l13 = np.linalg.norm(d02, axis=1), np.linalg.norm(d13, axis=1)
-    normal = np.cross(d02, d13)
-    twice_area = np.linalg.norm(normal, axis=1)
-    gap = np.abs(np.einsum("ij,ij->i", corner[:, 1] - corner[:, 0], normal))
-    bent = gap > _FLAT * twice_area * np.maximum(l02, l13)
+    l02, l13 = norm(d02), norm(d13)
+    normal = cross(d02, d13)
+    side = [corner[:, (i + 1) % 4] - corner[:, i] for i in range(4)]
+    bent = np.abs(dot(side[0], normal)) > _FLAT * norm(normal) * np.maximum(l02, l13)
     for i in range(4):
-        here, ahead = corner[:, (i + 1) % 4] - corner[:, i], corner[:, (i + 2) % 4] - corner[:, (i + 1) % 4]
-        bent &= np.einsum("ij,ij->i", np.cross(here, ahead), normal) > 0.0
+        bent &= dot(cross(side[i], side[(i + 1) % 4]), normal) > 0.0
     if not bent.any():
         return crease, index
 
-    turn = _normal_turns(vertices, faces, index, d02, d13, l02, l13)
+    along = np.take(_normals(vertices, faces, index, normal), faces[index].T, axis=1)
+    turn = np.stack(
+        [
+            np.abs(dot(along[:, k + 2] - along[:, k], diagonal)) / np.maximum(length, np.finfo(float).tiny)
+            for k, diagonal, length in ((0, d02, l02), (1, d13, l13))
+        ],
+        axis=1,
+    )
     lengths = np.stack([l02, l13], axis=1)
     told = turn.max(axis=1) > _NO_TURN
     curvature = turn / np.maximum(lengths, np.finfo(float).tiny)
@@ -64,48 +72,35 @@ def quad_creases(vertices: FloatArray, faces: IntArray) -> tuple[NDArray[np.int8
     return crease, index
 
 
-def _normal_turns(
-    vertices: FloatArray,
-    faces: IntArray,
-    index: IntArray,
-    d02: FloatArray,
-    d13: FloatArray,
-    l02: FloatArray,
-    l13: FloatArray,
-) -> FloatArray:
-    """#Q by 2, by how much the normal turns along each diagonal [rad]."""
-    _, place = np.unique(vertices, axis=0, return_inverse=True)
-    place = place.reshape(-1)
-    p = vertices[faces[:, :3]]
-    of_face = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
+def _normals(vertices: FloatArray, faces: IntArray, index: IntArray, of_quads: FloatArray) -> FloatArray:
+    """3 by #V, the surface's unit normal at each vertex: the mean of those of its faces by area, on both sides of a crack."""
+    place = places_of(vertices, faces)
+    a, b, c = (points_at(vertices, faces[:, k]) for k in range(3))
+    of_face = cross(b - a, c - a)
     # Of a creased quad this is at right angles to both diagonals.
-    of_face[index] = np.cross(d02, d13)
-    used = faces >= 0
-    at = place[faces[used]]
-    spread = np.broadcast_to(of_face[:, None], (*faces.shape, 3))[used]
-    total = np.stack([np.bincount(at, spread[:, k]) for k in range(3)], axis=1)
-    normal = total / np.maximum(np.linalg.norm(total, axis=1), np.finfo(float).tiny)[:, None]
-    n = normal[place[faces[index]]]
-    return np.stack(
-        [
-            np.abs(np.einsum("ij,ij->i", n[:, 2] - n[:, 0], d02)) / np.maximum(l02, np.finfo(float).tiny),
-            np.abs(np.einsum("ij,ij->i", n[:, 3] - n[:, 1], d13)) / np.maximum(l13, np.finfo(float).tiny),
-        ],
-        axis=1,
-    )
+    of_face[:, index] = of_quads
+    total = np.zeros((3, len(vertices)))
+    for k in range(4):
+        there = slice(None) if k < 3 else index
+        at = place[faces[there, k]]
+        total += [np.bincount(at, row[there], minlength=len(vertices)) for row in of_face]
+    return np.asarray((total / np.maximum(norm(total), np.finfo(float).tiny))[:, place])
 
 
-def lay_quads_flat(vertices: FloatArray, faces: IntArray) -> tuple[FloatArray, IntArray, NDArray[np.int8]]:
+def lay_quads_flat(
+    vertices: FloatArray, faces: IntArray, *, creases: tuple[NDArray[np.int8], IntArray] | None = None
+) -> tuple[FloatArray, IntArray, NDArray[np.int8]]:
     """The quads that are creased along a diagonal, each unfolded about it into the plane; what can be developed keeps its size.
 
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4, -1 in the last column of a triangle.
+        creases: what `quad_creases` says of them, if that is known.
 
     Returns:
         #K by 4 by 2, corners in the plane, anticlockwise [m]; #K, the face of each; #K, its crease as `quad_creases` has it.
     """
-    crease, index = quad_creases(vertices, faces)
+    crease, index = quad_creases(vertices, faces) if creases is None else creases
     chosen = crease >= 0
     crease, index = crease[chosen], index[chosen]
     turned = np.arange(4)[None] + crease[:, None].astype(np.int64)
