@@ -132,7 +132,7 @@ def test_a_contradiction_is_a_warning_that_names_it(tmp_path: Path):
         (SKIRT, {"seams": [{"name": "side left", "ease": 0.1, "gather": 2}]}, r"seams\[0\]: give either"),
         (SKIRT, {"seams": [{"name": "side left", "gather": 0.5}]}, r"seams\[0\].gather: .*greater than or equal to 1"),
         (SKIRT, {"seams": [{"nam": "x", "ease": 0.1}]}, r"seams\[0\].nam: unknown key 'nam'; did you mean 'name'"),
-        (BODICE, {"seams": [{"name": "x", "ease": 0.1}]}, "seams belong to a form's pieces"),
+        (BODICE, {"seams": [{"name": "x", "ease": 0.1}]}, r"seams\[0\]: on a \[surface\] give the two lines"),
         (SKIRT, {"constraints": [{"line": "hip"}]}, r"constraints\[0\]: ask for something"),
         (SKIRT, {"constraints": [{"line": "hip", "straight": "up"}]}, r"constraints\[0\].straight: .*'warp'"),
         (SKIRT, {"constraints": [{"line": "hip", "length_mm": "bdy"}]}, r"constraints\[0\].length_mm: .*'body'"),

@@ -65,17 +65,21 @@ class Garment:
 
         One of the two is enough for the table: cut it twice, the second time turned over.
         """
-        image, found = self.mannequin.layout.mirror, []
+        found = []
         names = list(self.pieces)
         for number, first in enumerate(names):
             for second in names[number + 1 :]:
-                partners = _partners(self.form.pieces[first], self.form.pieces[second], image)
+                partners = self.mirror_vertices(first, second)
                 if partners is None:
                     continue
                 a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
                 if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < _SAME_PIECE:
                     found.append((first, second))
         return tuple(found)
+
+    def mirror_vertices(self, first: str, second: str) -> NDArray[np.int32] | None:
+        """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair."""
+        return _partners(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
 
     @property
     def notes(self) -> tuple[str, ...]:

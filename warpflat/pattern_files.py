@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from warpflat.pattern import Cloth, DraftedGarment
     from warpflat.pattern import Garment as Pattern
     from warpflat.scene_types import MarkerTable, PatternTable
+    from warpflat.surface_seams import NamedSeam
 
 __all__ = [
     "FORMATS",
@@ -97,13 +98,23 @@ def garment_files(
 
 
 def surface_files(
-    results: Sequence[Flattening], folder: Path, *, name: str, options: PatternOptions | None = None
+    results: Sequence[Flattening],
+    folder: Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    seams: Sequence[NamedSeam] = (),
 ) -> WrittenPattern:
-    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it; else as above."""
+    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it; else as above.
+
+    `seams` are those of its border that were named.
+    """
     from warpflat.pattern.from_surface import pattern_of_surface
 
     options = options or PatternOptions()
-    return _drawn(lambda: pattern_of_surface(results, name=name, rules=options.rules), folder, name, options)
+    return _drawn(
+        lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
+    )
 
 
 def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternOptions:

@@ -124,10 +124,16 @@ class SceneTable(Table):
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
         if self.mannequin is not None and (self.cuts or self.auto_cut):
             raise ValueError("cuts and auto_cut belong to a [surface]")
-        if self.seams and self.mannequin is None:
-            raise ValueError(
-                "seams belong to a form's pieces; both sides of a [surface]'s cuts are equally long anyway"
-            )
+        for number, seam in enumerate(self.seams):
+            if self.mannequin is None and seam.sides is None:
+                raise ValueError(
+                    f'seams[{number}]: on a [surface] give the two lines that are sewn, sides = ["left", "right"]; both sides '
+                    "of its cuts are equally long anyway"
+                )
+            if self.mannequin is not None and seam.sides is not None:
+                raise ValueError(
+                    f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
+                )
         if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
             raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
         return self
@@ -224,7 +230,7 @@ def run_scene(
     from warpflat.film import Film
     from warpflat.pattern_files import add_metrics, pattern_options, surface_files
     from warpflat.result_files import metrics_of, write_results
-    from warpflat.scene_seams import scene_constraints
+    from warpflat.scene_seams import scene_constraints, scene_surface_seams
     from warpflat.sew_surface import sew_surface
 
     settings = scene.settings
@@ -236,6 +242,7 @@ def run_scene(
         return run_garment(scene, folder, on_progress=on_progress, device=device)
     with told_by(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
+        seams = scene_surface_seams(settings.seams, scene.name)
     story = cuts or scene_cuts(scene, device=device)
     wanted = FrameSchedule(settings.output).wanted
     with ExitStack() as stack:
@@ -256,7 +263,7 @@ def run_scene(
                     result = cut(result, plan, relax=relax, callback=each_step)
                     film.last(result)
             lines = {result.surface.name: result.network.surface.lines}
-            sewn = sew_surface(result, scene_constraints(settings.constraints, lines), options=relax)
+            sewn = sew_surface(result, scene_constraints(settings.constraints, lines), seams=seams, options=relax)
             if sewn is not None:
                 result = sewn.result
                 film.last(result)
@@ -271,7 +278,7 @@ def run_scene(
             write_wear_picture(folder / files[-1], piece)
     if wanted:
         files.append("frames.usdc")
-    pattern = surface_files(pieces, folder, name=scene.name, options=drawing)
+    pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
     notes = (*result.notes, *story.notes, *pattern.notes)
     metrics = add_metrics(folder, pattern, metrics_of(pieces, told))
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
@@ -349,6 +356,9 @@ def scene_surface(scene: Scene) -> Surface:
     Raises:
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
     """
+    from warpflat.scene_seams import scene_surface_seams
+    from warpflat.surface_seams import surface_seams
+
     table = scene.settings.surface
     if table is None:
         raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
@@ -367,12 +377,16 @@ def scene_surface(scene: Scene) -> Surface:
             surface = with_lines(surface, {name: _line(surface, line)})
     wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
     wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
+    named = scene_surface_seams(scene.settings.seams, scene.name)
+    wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
     for key, name in wanted.items():
         if name not in surface.lines:
             with told_by(f"{scene.where}: {key}"):
                 if name not in SIDES:
                     raise InputError(f"unknown line {name!r}; {nearest(name, {*surface.lines, *SIDES})}")
                 surface = with_lines(surface, {name: line_on_border(surface, name)})
+    with told_by(f"{scene.where}: seams"):
+        surface_seams(surface, named)
     return surface
 
 

@@ -8,8 +8,9 @@ from warpflat.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.errors import InputError, nearest
 from warpflat.scene_types import ConstraintTable, SeamTable
 from warpflat.seam_wishes import SeamWish
+from warpflat.surface_seams import NamedSeam
 
-__all__ = ["scene_constraints", "scene_wishes"]
+__all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 
 
 def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
@@ -23,6 +24,39 @@ def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
         )
         for table in tables
     ]
+
+
+def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[NamedSeam]:
+    """The seams that a scene names on its surface.
+
+    Args:
+        tables: of the scene, each with its sides.
+        piece: name of the surface; lines may be named "piece.line".
+
+    Raises:
+        InputError: a name occurs twice, both sides are one line, or `longer` is neither of them.
+    """
+    seams: list[NamedSeam] = []
+    for number, table in enumerate(tables):
+        where = f"seams[{number}]"
+        first, second = (side.removeprefix(f"{piece}.") for side in table.sides or ["", ""])
+        if table.name in {seam.name for seam in seams}:
+            raise InputError(f"{where}: seam {table.name!r} is named twice; names are unique")
+        if first == second:
+            raise InputError(f"{where}: both sides are {first!r}; a side is sewn to another one")
+        longer = second if table.longer is None else table.longer.removeprefix(f"{piece}.")
+        if longer not in (first, second):
+            raise InputError(f"{where}: longer is {longer!r}, not one of its sides; {nearest(longer, (first, second))}")
+        seams.append(
+            NamedSeam(
+                name=table.name,
+                sides=(first, second),
+                factor=table.gather if table.gather is not None else 1.0 + (table.ease or 0.0),
+                gathered=table.gather is not None,
+                longer=(first, second).index(longer),
+            )
+        )
+    return seams
 
 
 def scene_constraints(

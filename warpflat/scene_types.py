@@ -120,20 +120,25 @@ class LineTable(Table):
 
 
 class SeamTable(Table):
-    """That one side of a seam of a form is longer than the other, by the seam's name in the pattern.
+    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
+
+    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
+    as "left" or "piece.left"; they may be equally long.
 
     `ease` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
-    piece. `longer` names the piece (or "piece.edge") that is longer; the seam's second side if not given.
+    piece. `longer` names the piece, "piece.edge" or line that is longer; the seam's second side if not given.
     """
 
     name: str = Field(min_length=1)
+    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
     ease: Annotated[float, Field(ge=0, le=0.3)] | None = None
     gather: Annotated[float, Field(ge=1, le=5)] | None = None
     longer: str | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> SeamTable:
-        if (self.ease is None) == (self.gather is None):
+        given = (self.ease is not None) + (self.gather is not None)
+        if given > 1 or (given == 0 and self.sides is None):
             raise ValueError("give either ease = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
         return self
 

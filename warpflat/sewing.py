@@ -28,7 +28,7 @@ from warpflat.kernels.seams import compute_seam_misses
 from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, relax
 from warpflat.strain import signed_cell_areas
-from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties
+from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together
 
 __all__ = ["Held", "SeamPair", "Sewn", "sew"]
@@ -47,19 +47,21 @@ _COARSE = 10.0
 
 @dataclass(frozen=True, kw_only=True)
 class SeamPair:
-    """Two chains of vertices that are sewn together, edge by edge.
+    """Two chains of vertices that are sewn together, edge by edge or from joint to joint.
 
     Attributes:
         name: the seam's.
         pieces: names of the two pieces; the same twice where one is sewn to itself.
         vertices: of the two pieces, in corresponding order.
         ratio: wished length of the first side over the second.
+        joints: #J by 2, places in the two chains that are sewn to each other; None where all are, one to one.
     """
 
     name: str
     pieces: tuple[str, str]
     vertices: tuple[IntArray, IntArray]
     ratio: float = 1.0
+    joints: IntArray | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -191,7 +193,11 @@ def _ties(
     for seam in seams:
         first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
         smooth = [smooth_ties(side, alone) for side in (first, second)]
-        ties.append(one_group(seam_ties(first, second, seam.ratio), *smooth))
+        if seam.joints is None:
+            held = seam_ties(first, second, seam.ratio)
+        else:
+            held = stretch_ties(first, second, seam.joints, whole.surface.vertices, alone, seam.ratio)
+        ties.append(one_group(held, *smooth))
         kinds.append((seam.name, "seam"))
     for constraint in constraints:
         own, lays = constraint_ties(constraint, piece_of(constraint, whole.pieces))

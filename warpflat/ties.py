@@ -20,6 +20,7 @@ __all__ = [
     "seam_ties",
     "smooth_ties",
     "straight_ties",
+    "stretch_ties",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -98,6 +99,43 @@ def seam_ties(first: IntArray, second: IntArray, ratio: float = 1.0) -> Ties:
     return _ties(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
+def stretch_ties(
+    first: IntArray, second: IntArray, joints: IntArray, body: FloatArray, positions: FloatArray, ratio: float = 1.0
+) -> Ties:
+    """Two rows of other vertices sewn by their length on the body, the first `ratio` times as long as the second.
+
+    Between two joints both rows stretch evenly from where they lie. The two vertices of a joint need not lie at the same share
+    of the length: from the first one's joint to its next, the second row is taken between the same shares.
+
+    Args:
+        first, second: vertices.
+        joints: #J by 2, places in both rows that belong together, their ends among them.
+        body: #V by 3 [m].
+        positions: #V by 2, the layout before it is sewn [m].
+        ratio: of the whole lengths.
+    """
+    rows = (first, second)
+    shares = [arc / arc[-1] for arc in (_arc(body[row]) for row in rows)]
+    arcs = [_arc(positions[row]) for row in rows]
+    steps = [np.diff(arc) for arc in arcs]
+    ties = []
+    for side, row in enumerate(rows):
+        inner = np.setdiff1d(np.arange(1, len(row) - 1), joints[:, side])
+        ends = np.column_stack([row[inner - 1], row[inner], row[inner], row[inner + 1]])
+        ties.append(_ties(ends, LENGTHS, ratio=steps[side][inner - 1] / steps[side][inner], tolerance=_EDGE_TOLERANCE))
+    i, j = joints[:-1].T
+    ends = np.column_stack([first[i], first[i + 1], second[j], second[j + 1]])
+    there = np.diff(np.interp(shares[0][joints[:, 0]], shares[1], arcs[1]))
+    share = [steps[side][places] / np.diff(arcs[side][joints[:, side]]) for side, places in ((0, i), (1, j))]
+    own = np.diff(arcs[1][joints[:, 1]])
+    between = _ties(ends, LENGTHS, ratio=ratio * there / own * share[0] / share[1], tolerance=_EDGE_TOLERANCE)
+    return replace(one_group(*ties, between), sum_tolerance=np.array([_SUM_TOLERANCE]))
+
+
+def _arc(points: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
 def length_ties(line: IntArray, lengths: FloatArray) -> Ties:
     """Every edge of a row of vertices so long [m]."""
     ends = np.column_stack([line[:-1], line[1:], line[:-1], line[1:]])
@@ -163,7 +201,7 @@ def _ties(
     ends: ArrayLike,
     kind: int,
     *,
-    ratio: float = 0.0,
+    ratio: FloatArray | float = 0.0,
     target: FloatArray | float = 0.0,
     lever: FloatArray | None = None,
     tolerance: float,
@@ -174,7 +212,7 @@ def _ties(
     return Ties(
         ends=rows,
         kind=np.full(count, int(kind), dtype=np.int32),
-        ratio=np.full(count, ratio),
+        ratio=np.broadcast_to(np.asarray(ratio, dtype=np.float64), (count,)).copy(),
         target=np.broadcast_to(np.asarray(target, dtype=np.float64), (count,)).copy(),
         lever=np.zeros((count, 4, 2)) if lever is None else lever,
         tolerance=np.full(count, tolerance),

@@ -97,7 +97,17 @@ def test_the_marker_is_drawn_in_true_size(dress, tmp_path):
     plan = make_marker(dress, Cloth(width=1.4), sizes={"38": 1}, seconds=1)
     write_marker_svg(plan, tmp_path / "marker.svg")
     root = ET.parse(tmp_path / "marker.svg").getroot()
-    assert float(root.get("height")[:-2]) == pytest.approx(1400)
+    # The cloth, and above it a band with what it is.
+    cloth = next(path for path in root.findall(f"{SVG}path") if path.get("id") == "cloth.cloth")
+    corners = np.array([float(x) for x in re.findall(r"-?[\d.]+", cloth.get("d"))]).reshape(-1, 2)
+    np.testing.assert_allclose(np.ptp(corners, axis=0), [plan.length * 1000, 1400.0], atol=1e-3)
+    assert float(root.get("height")[:-2]) == pytest.approx(corners[:, 1].max())
+    words = [text.text for text in root.findall(f"{SVG}text")]
+    assert words == [
+        "Sample dress marker",
+        "8 pieces, size 38",
+        f"{plan.length:.3f} m of cloth 1.400 m wide, {plan.utilisation:.1%} used",
+    ]
     assert float(root.get("width")[:-2]) == pytest.approx(plan.length * 1000, abs=1e-3)
     assert len(root.findall(f"{SVG}g")) == 8
 
@@ -150,7 +160,7 @@ def test_json_holds_every_edge_stitch_and_the_map_to_the_mesh(dress, tmp_path):
         assert edge["length"] == drafted.length
         assert edge["mesh_vertices"] is None
     armhole = next(s for s in data["stitches"] if s["name"] == "armhole")
-    assert armhole["sides"][0][1] == {"piece": "back bodice", "edge": "armhole", "reversed": True}
+    assert armhole["sides"][0][1] == {"piece": "back bodice", "edge": "armhole", "reversed": True, "mirrored": False}
     darts = [s for s in data["stitches"] if s["kind"] == "dart"]
     assert {s["name"] for s in darts} == {"front bodice.waist_dart", "front bodice.bust_dart", "back bodice.waist_dart"}
     assert all(abs(s["difference_mm"]) < 0.5 and s["matches"] for s in data["seams"])

@@ -130,6 +130,39 @@ def test_an_arc_needs_few_segments_and_a_straight_line_one():
     assert fit_curve(np.linspace([0, 0], [0.3, 0.1], 50)).straight.tolist() == [True]
 
 
+def test_a_curve_keeps_near_its_points_or_keeps_their_length():
+    """A tight curve, as at the foot of an armhole, through chords of 10 mm."""
+    t = np.linspace(0, np.pi / 2, 5)
+    arc = 0.025 * np.column_stack([np.cos(t), np.sin(t)])
+    chords = arc_lengths(arc)[-1]
+    kept, near = fit_curve(arc), fit_curve(arc, near=True)
+    strays = [shapely.distance(shapely.LineString(c.sample()), shapely.points(arc)).max() for c in (kept, near)]
+    assert strays[1] <= 1e-4 < strays[0]
+    assert kept.length == pytest.approx(chords, abs=6e-5)
+    assert chords < near.length < 0.025 * np.pi / 2 + 1e-4, "no longer than the arc"
+
+
+def test_curves_leave_their_points_only_where_the_seam_demands_it():
+    """A round edge sewn to a straight one: through chords of 5 mm it keeps near its points, through 30 mm it cannot."""
+    for step, near in ((0.005, True), (0.03, False)):
+        count = round(0.12 / step) + 1
+        angle = np.linspace(-0.5, 0.5, count) * 2 * np.arcsin(step / 0.12) * (count - 1)
+        round_edge = 0.06 * np.column_stack([np.sin(angle), 1 - np.cos(angle)])
+        straight = np.column_stack([np.arange(count) * step, np.zeros(count)])
+        ids = np.arange(count, dtype=np.int32)
+        pieces = []
+        for name, points in (("round", round_edge), ("straight", straight)):
+            top = points[[-1, 0]] + [[0.0, 0.2], [0.0, 0.2]]
+            corners = [points[-1], top[0], top[1], points[0]]
+            others = [Edge(name=f"e{k}", points=np.stack(corners[k : k + 2])) for k in range(3)]
+            pieces.append(Piece(name=name, edges=[Edge(name="sewn", points=points, vertices=ids), *others]))
+        sides = ((SeamSide(piece="round", edge="sewn"),), (SeamSide(piece="straight", edge="sewn"),))
+        garment = Garment(name="two", pieces={"": pieces}, seams=[Seam(name="s", sides=sides)])
+        drafted = draft_garment(garment)
+        assert drafted.seams[0].matches, step
+        assert (drafted.pieces[""][0].edge("sewn").fit_error <= 1e-4) == near, step
+
+
 def test_a_corner_inside_an_edge_stays_sharp():
     points = np.concatenate([np.linspace([0, 0], [0.1, 0], 20), np.linspace([0.1, 0], [0.1, 0.1], 20)[1:]])
     curve = fit_curve(points)

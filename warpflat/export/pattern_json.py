@@ -24,8 +24,9 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     """The whole pattern as plain lists and numbers. Lengths are metres, angles radians, y along the grain.
 
     A stitch sews two sides: each lists its edges in the order in which the seam meets them, and whether it runs against
-    the edge's own direction (counter-clockwise round its piece). An edge's `point_lengths` say where along its line the points
-    of its mesh's border came to lie, and `fit_error` how far the curve keeps from them. Numbers are not rounded.
+    the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is cut turned over.
+    An edge's `point_lengths` say where along its line the points of its mesh's border came to lie, and `fit_error` how far
+    the curve keeps from them. Numbers are not rounded.
     """
     sample = next(iter(garment.pieces.values()))
     stitches: list[dict[str, Any]] = [
@@ -43,8 +44,8 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             "kind": "dart",
             "ease": 0.0,
             "sides": [
-                [{"piece": piece.name, "edge": dart.dart.left, "reversed": False}],
-                [{"piece": piece.name, "edge": dart.dart.right, "reversed": True}],
+                [_side(SeamSide(piece=piece.name, edge=dart.dart.left))],
+                [_side(SeamSide(piece=piece.name, edge=dart.dart.right, reversed=True))],
             ],
         }
         for piece in sample
@@ -81,7 +82,7 @@ def write_pattern_json(garment: DraftedGarment, path: str | os.PathLike[str]) ->
 
 
 def _side(side: SeamSide) -> dict[str, Any]:
-    return {"piece": side.piece, "edge": side.edge, "reversed": side.reversed}
+    return {"piece": side.piece, "edge": side.edge, "reversed": side.reversed, "mirrored": side.mirrored}
 
 
 def _piece(piece: DraftedPiece) -> dict[str, Any]:

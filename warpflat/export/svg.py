@@ -14,6 +14,7 @@ from warpflat.export.atomic import atomic_path
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, Words, draw_nest, grain_strokes
+from warpflat.pattern.label import LEADING, LETTER
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Copy, Marker
 
@@ -76,11 +77,23 @@ def write_svg(
 
 
 def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
-    """Write the lay plan in true size: the cloth lies along x, the pieces on it with their grain and names."""
-    share = f"{marker.length:.3f} m of {marker.width:.3f} m, {marker.utilisation:.1%} used"
-    page = SvgPage(marker.length, marker.width, f"marker {marker.fabric}: {share}".replace(" :", ":"))
-    cloth = np.array([[0, 0], [marker.length, 0], [marker.length, marker.width], [0, marker.width]])
-    page.stroke(page.root, Stroke(role="drill", name="cloth", points=cloth, closed=True), "cloth")
+    """Write the lay plan in true size: the cloth lies along x, the pieces on it with their grain and names.
+
+    Above it stands what it is of, its length and width, and how much of the cloth is used.
+    """
+    name = f"{marker.name.replace('_', ' ')} marker {marker.fabric}".strip()
+    sizes = list(dict.fromkeys(copy.piece.size for copy in marker.placements if copy.piece.size))
+    cut = f"{len(marker.placements)} pieces" + (f", size {', '.join(sizes)}" if sizes else "")
+    cloth = f"{marker.length:.3f} m of cloth {marker.width:.3f} m wide, {marker.utilisation:.1%} used"
+    rows = [name, cut, cloth]
+    height = min(0.014, marker.length / (LETTER * max(map(len, rows))))
+    band = (len(rows) + 0.5) * LEADING * height
+    page = SvgPage(marker.length, marker.width + band, f"{name}: {cut}, {cloth}")
+    for row, text in enumerate(rows):
+        at = np.array([marker.length / 2, marker.width + band - (row + 0.75) * LEADING * height])
+        page.words(page.root, Words(text=text, at=at, height=height, bold=row == 0))
+    border = np.array([[0, 0], [marker.length, 0], [marker.length, marker.width], [0, marker.width]])
+    page.stroke(page.root, Stroke(role="drill", name="cloth", points=border, closed=True), "cloth")
     for index, copy in enumerate(marker.placements):
         page.marker_copy(copy, index)
     page.write(path)

@@ -24,6 +24,9 @@ LENGTH_WEIGHT = 8e-6
 HELD = 20.0
 #: A curve of another length than its points' chords may lie this many tolerances from them.
 OTHER_LENGTHS = 3.0
+#: A curve that is to keep near its points is given the lengths of one that runs inside them by these shares of the
+#: tolerance, until it does keep near; and its lengths then count by so much less.
+INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
 #: Steps in which a fit is brought to its lengths, and points of its quadrature between two points of the border.
 GAUSS_NEWTON, GAUSS = 8, 6
 #: The chords by which a curve is drawn or cut stay this close [m] to it.
@@ -87,7 +90,11 @@ def turning_angles(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def fit_curve(
-    points: NDArray[np.float64], tolerance: float = TOLERANCE, *, lengths: NDArray[np.float64] | None = None
+    points: NDArray[np.float64],
+    tolerance: float = TOLERANCE,
+    *,
+    lengths: NDArray[np.float64] | None = None,
+    near: bool = False,
 ) -> Curve:
     """A smooth curve near the points, of few segments, that is as long as the line of chords through them.
 
@@ -97,23 +104,26 @@ def fit_curve(
 
     A curve through the points themselves would be longer than their chords by as much as it bends, and so the two sides
     of a seam, equal on the mesh, would differ once they are drawn. An arc of radius R through chords h keeps their length
-    if it runs h^2 / (24 R) inside: 0.07 mm for chords of 10 mm on a radius of 60 mm.
+    if it runs h^2 / (24 R) inside: 0.07 mm for chords of 10 mm on a radius of 60 mm. Where that is farther than the
+    tolerance, `near` says which of the two is given up.
 
     Args:
         points: #P by 2 [m]; repeated points are dropped.
         tolerance: largest distance [m] of a point from the curve, beside what equal length takes. A wider one than that
             of clean borders is to smooth a zigzag away, and its length counts less.
         lengths: #P, the length [m] of the curve up to each point, where it is not to be that of the chords.
+        near: keep within the tolerance everywhere, and the chords' length only as far as that allows.
     """
     keep = _distinct(points)
     clean = points[keep]
     clean[-1] = points[-1]
     reached = None if lengths is None else lengths[keep]
     breaks = [0, *_corners(clean, tolerance), len(clean) - 1]
-    runs = [
-        _fit_run(clean[a : b + 1], tolerance, None if reached is None else reached[a : b + 1] - reached[a])
-        for a, b in pairwise(breaks)
-    ]
+    runs = []
+    for a, b in pairwise(breaks):
+        run = clean[a : b + 1]
+        curve = _fit_run(run, tolerance, None if reached is None else reached[a : b + 1] - reached[a])
+        runs.append(_nearer(curve, run, tolerance) if near else curve)
     return Curve(
         bezier=np.concatenate([run.bezier for run in runs]), straight=np.concatenate([run.straight for run in runs])
     )
@@ -141,12 +151,46 @@ def _distinct(points: NDArray[np.float64]) -> NDArray[np.intp]:
     return np.flatnonzero(keep) if keep.sum() > 1 else np.array([0, len(points) - 1])
 
 
-def _fit_run(points: NDArray[np.float64], tolerance: float, lengths: NDArray[np.float64] | None = None) -> Curve:
-    """One stretch without corners: of the fits that are close and as long as they should be, the simplest."""
+def _nearer(curve: Curve, points: NDArray[np.float64], tolerance: float) -> Curve:
+    """The curve, or one that is as much longer as it takes to keep within the tolerance of the points."""
+    # Measured on the chords by which the curve is drawn.
+    room = tolerance - CHORD / 2
+    for share in INSIDE:
+        if _stray(curve.sample(), points) <= tolerance:
+            break
+        curve = _fit_run(points, tolerance, _lengths_inside(points, share * tolerance), room=room)
+    return curve
+
+
+def _lengths_inside(points: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+    """#P, the lengths [m] of a curve that runs no more than `depth` [m] inside the points.
+
+    Over a chord h an arc that turns by t is longer by h t^2 / 24, and by t for each metre that it runs farther outside.
+    """
+    step, turn = np.linalg.norm(np.diff(points, axis=0), axis=1), np.abs(turning_angles(points))
+    both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
+    longer = np.maximum(0.0, step * both**2 / 24 - depth * both)
+    return np.concatenate([[0.0], np.cumsum(step + longer)])
+
+
+def _fit_run(
+    points: NDArray[np.float64],
+    tolerance: float,
+    lengths: NDArray[np.float64] | None = None,
+    *,
+    room: float | None = None,
+) -> Curve:
+    """One stretch without corners: of the fits that are close and as long as they should be, the simplest.
+
+    The points may lie by `room` [m] from a curve of other lengths than their chords'.
+    """
     # A zigzag smoothed away is longer than the curve by the square of its width.
     slack = max(1.0, (tolerance / TOLERANCE) ** 2) if lengths is None else 1.0
     arc = arc_lengths(points) if lengths is None else lengths
-    room = tolerance if lengths is None else OTHER_LENGTHS * tolerance
+    strict = room is not None
+    slack = NEAR if strict else slack
+    if room is None:
+        room = tolerance if lengths is None else OTHER_LENGTHS * tolerance
     line = chords(points[[0, -1]])
     if len(points) == 2 or _chord_distance(points).max() <= tolerance:
         return line
@@ -165,7 +209,7 @@ def _fit_run(points: NDArray[np.float64], tolerance: float, lengths: NDArray[np.
         if stray > room + bend / 6 or _stray(points, samples) > room + bend / 4:
             continue
         off = max(off, abs(float(arc_lengths(samples)[-1] - arc[-1])))
-        score = max(stray / (room + bend / 24), off / (LENGTH * slack))
+        score = max(stray / (room if strict else room + bend / 24), off / (LENGTH * slack))
         if len(bezier) < len(points) and score < worst:
             best, worst = curve, score
         if worst <= 1.0:
@@ -256,7 +300,9 @@ def _with_lengths(
     for _ in range(GAUSS_NEWTON):
         rate = (weights / speed)[:, None, None] * slope[:, free, None] * tangent[:, None, :]
         rate = np.cumsum(rate.reshape(-1, GAUSS, 2 * inner).sum(axis=1), axis=0)
-        move = -np.linalg.lstsq(np.concatenate([fit, rate / weighed, hold]), now, rcond=None)[0].reshape(-1, 2)
+        jacobian = np.concatenate([fit, rate / weighed, hold])
+        # The normal equations are well enough conditioned by the hold, and ten times as quick as least squares.
+        move = -np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ now).reshape(-1, 2)
         for share in (1.0, 0.5, 0.25, 0.1):
             tried = control.copy()
             tried[free] += share * move

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
+from warpflat.pattern.notches import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 __all__ = ["TOLERANCES", "EdgeKey", "fit_edges"]
@@ -15,6 +16,7 @@ __all__ = ["TOLERANCES", "EdgeKey", "fit_edges"]
 Vector = NDArray[np.float64]
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
+Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
 
 #: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
@@ -25,6 +27,8 @@ CURVES, CURVE = 4, 0.012
 SWING, SWING_PER_METRE = 0.3, 3.5
 #: Smoothed sides of a ragged seam agree in length within this [m], if a tolerance can be found for it.
 EQUAL = 1e-4
+#: Curves keep near their points where the sides of their seams then differ by no more than this share of what they may.
+SAFE = 0.8
 
 
 def fit_edges(
@@ -32,7 +36,9 @@ def fit_edges(
 ) -> dict[EdgeKey, tuple[Curve, float]]:
     """A curve for every edge, and how far [m] it was allowed to keep from the points.
 
-    Each keeps the length of its chords (see :func:`fit_curve`), so that sides that are equal on the mesh stay equal.
+    Each keeps within the tolerance of its points, and as near to the length of its chords as that allows. Where the sides
+    of a seam would then differ too much, as on coarse meshes, both keep the length of their chords all along, and run as
+    far from their points as that takes (see :func:`fit_curve`).
     Where a border is so ragged that its curve would be all wiggles, a wider tolerance smooths them away, and their
     length with them; the other side of the seam or dart gets the same tolerance, and both the lengths of the shorter.
     Where curves would cross, as on coarse meshes in narrow places, the chords stay.
@@ -53,6 +59,7 @@ def fit_edges(
             wide = max(fitted[first][1], fitted[second][1])
             if wide > TOLERANCE and len(lines[first]) == len(lines[second]):
                 fitted[first], fitted[second] = _together(lines[first], lines[second], against, ease)
+    _keep_near(pieces, lines, seams, fitted, tolerance)
     for piece in pieces:
         _uncross(piece, lines, fitted)
     return fitted
@@ -75,6 +82,69 @@ def _ragged(curve: Curve) -> bool:
     return len(curve.bezier) > CURVES + length / CURVE or swing > SWING + SWING_PER_METRE * length
 
 
+def _keep_near(
+    pieces: Sequence[Piece],
+    lines: Mapping[EdgeKey, Vector],
+    seams: Sequence[Seam],
+    fitted: dict[EdgeKey, tuple[Curve, float]],
+    tolerance: float | None,
+) -> None:
+    """Bring the curves of clean edges within the tolerance of their points, where their seams allow it."""
+    room = TOLERANCE if tolerance is None else tolerance
+    near = {
+        (piece.name, edge.name): (fit_curve(lines[piece.name, edge.name], room, near=True), room)
+        for piece in pieces
+        for edge in piece.edges
+        if edge.kind != "fold" and fitted[piece.name, edge.name][1] <= room
+    }
+    tried = {**fitted, **near}
+    left = list(_sewn(pieces, seams))
+    # An edge of a pair is sewn at two seams: what one of them takes back concerns the other.
+    while odd := [seam for seam in left if not _agree(*_both(seam, lines, tried), SAFE)]:
+        for sides, ease in odd:
+            if _agree(*_both((sides, ease), lines, fitted), 1.0):
+                tried |= {key: fitted[key] for row in sides for key in ((side.piece, side.edge) for side in row)}
+        left = [seam for seam in left if seam not in odd]
+    fitted |= tried
+
+
+def _both(
+    seam: tuple[Sides, float], lines: Mapping[EdgeKey, Vector], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> tuple[Vector, Vector, float]:
+    """The lengths along both sides of a seam at their points, and the second's ease."""
+    (first, second), ease = seam
+    return _places(first, lines, curves), _places(second, lines, curves), ease
+
+
+def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Sides, float]]:
+    """Both sides of every seam and dart, in one direction, and the second's ease."""
+    for seam in seams:
+        yield seam.sides, seam.ease
+    for piece in pieces:
+        for dart in piece.darts:
+            left, right = SeamSide(piece=piece.name, edge=dart.left), SeamSide(piece=piece.name, edge=dart.right)
+            yield ((left,), (SeamSide(piece=right.piece, edge=right.edge, reversed=True),)), 0.0
+
+
+def _places(
+    side: Sequence[SeamSide], lines: Mapping[EdgeKey, Vector], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> Vector:
+    """The length [m] along one side of a seam at each of its points, joints once."""
+    rows = [np.zeros(1)]
+    for part in side:
+        key = part.piece, part.edge
+        reached = _reached(curves[key][0], lines[key])
+        rows.append(rows[-1][-1] + (reached[-1] - reached[::-1] if part.reversed else reached)[1:])
+    return np.concatenate(rows)
+
+
+def _agree(first: Vector, second: Vector, ease: float, share: float) -> bool:
+    """Whether the sides of a seam differ by no more than a share of what they may."""
+    near = worst_difference(first, second, ease)
+    whole = abs(second[-1] - first[-1] * (1 + ease))
+    return bool(whole <= share * SEAM_TOLERANCE) and (near is None or near <= share * LOCAL_TOLERANCE)
+
+
 def _pairs(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[EdgeKey, EdgeKey, bool, float]]:
     """Edges that are sewn to one other edge, whether these run against each other, and the second's ease."""
 
@@ -83,7 +153,7 @@ def _pairs(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Edg
 
     for seam in seams:
         (first, *more), (second, *others) = seam.sides
-        if not more and not others and first != second:
+        if not more and not others and key(first) != key(second):
             yield key(first), key(second), first.reversed != second.reversed, seam.ease
     for piece in pieces:
         for dart in piece.darts:
@@ -107,6 +177,9 @@ def _together(
         apart = abs(curves[1].length - curves[0].length * longer[1])
         if apart <= EQUAL and not any(map(_ragged, curves)):
             break
+    if apart > SAFE * LOCAL_TOLERANCE:
+        # A short zigzag has no smooth line of the right length: better a wiggle than a seam that does not match.
+        curves, tolerance = [fit_curve(side) for side in sides], TOLERANCE
     return (curves[0], tolerance), (curves[1].reversed() if against else curves[1], tolerance)
 
 

@@ -7,7 +7,7 @@ anything is relaxed (:func:`plan_form`); the flat layouts give the shapes (:func
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS, FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.twins import find_twins, sew_twins
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
@@ -180,8 +181,9 @@ def pattern_of_garment(
 ) -> tuple[Garment, tuple[str, ...]]:
     """The pattern of a garment in one or more sizes.
 
-    A half piece whose centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a
-    seam in the centre, and a note says so.
+    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece whose
+    centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the centre. Notes
+    say so.
 
     Args:
         garments: flattened, by size; "" where there is no size, as on a scan.
@@ -219,7 +221,19 @@ def pattern_of_garment(
     for piece, edge in opened.items():
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=unused(edge, {seam.name for seam in seams}), sides=(side, side)))
-    notes = tuple(
+    twins = find_twins(garments, pieces, seams)
+    seams = sew_twins(seams, twins)
+    drawn = {twin.of for twin in twins}
+    pieces = {
+        size: tuple(
+            replace(piece, quantity=2 * piece.quantity) if piece.name in drawn else piece
+            for piece in row
+            if piece.name not in {twin.name for twin in twins}
+        )
+        for size, row in pieces.items()
+    }
+    notes = tuple(f"{twin.of}: cut twice, once mirrored, it serves for {twin.name} too" for twin in twins)
+    notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.darts import seam_kind
+from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
 from warpflat.pattern.from_mesh import piece_from_mesh
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
@@ -18,6 +19,7 @@ from warpflat.surface.topology import border_loops
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
     from warpflat.surface.cut import Seam as Cut
+    from warpflat.surface_seams import NamedSeam
 
 __all__ = ["pattern_of_surface"]
 
@@ -31,7 +33,12 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
 
 def pattern_of_surface(
-    results: Sequence[Flattening], *, name: str, rules: EdgeRules | None = None, size: str = ""
+    results: Sequence[Flattening],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    size: str = "",
+    seams: Sequence[NamedSeam] = (),
 ) -> tuple[Garment, tuple[str, ...]]:
     """The pattern of one flattened surface, or of the pieces that cuts have left of it.
 
@@ -44,18 +51,20 @@ def pattern_of_surface(
         rules: kinds and allowances of edges; an edge along a feature line has the line's name, others are called
             "edge_1" and so on, counter-clockwise.
         size: for the label.
+        seams: of the border, by the lines that are sewn to each other.
 
     Returns:
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, or a border crosses itself.
+        InputError: the rules name an edge that does not exist, a border crosses itself, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
+    named = [_named(seam, results, pieces) for seam in seams]
     rules.check({piece.name: [edge.name for edge in piece.edges] for piece in pieces})
     pieces = [replace(piece, edges=[_ruled(piece.name, edge, rules) for edge in piece.edges]) for piece in pieces]
-    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules)), ()
+    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules, named)), ()
 
 
 def _piece(result: Flattening, size: str) -> Piece:
@@ -142,18 +151,45 @@ def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
     return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
 
 
-def _seams(results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules) -> tuple[Seam, ...]:
-    """Edges that are one curve in space are sewn together."""
+def _named(seam: NamedSeam, results: Sequence[Flattening], pieces: Sequence[Piece]) -> Seam:
+    """A named seam by the edges that its two lines have become; these run against each other."""
+    first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+    back = tuple(replace(part, reversed=True) for part in reversed(second))
+    return Seam(name=seam.name, sides=(first, back), ease=seam.ease)
+
+
+def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:
+    """The edges along a line, in order, as the border runs."""
+    for result, piece in zip(results, pieces, strict=True):
+        ids = result.network.surface.lines.get(line)
+        if ids is None:
+            continue
+        own = [e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()]
+        if sum(len(edge.points) - 1 for edge in own) != len(ids) - 1:
+            continue
+        ends = {int(edge.vertices[-1]) for edge in own if edge.vertices is not None}
+        start = next((k for k, e in enumerate(own) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
+        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in own[start:] + own[:start])
+    raise InputError(f"line {line!r} is no whole stretch of a piece's border; a cut or another line parts it")
+
+
+def _seams(
+    results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
+) -> tuple[Seam, ...]:
+    """Edges that are one curve in space are sewn together, besides those that are named."""
     ends: dict[tuple[bytes, ...], list[tuple[SeamSide, Vector]]] = {}
+    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
     for result, piece in zip(results, pieces, strict=True):
         vertices = result.network.surface.vertices
         for edge in piece.edges:
             if edge.kind not in ("seam", "cut") or edge.vertices is None:
                 continue
+            if (piece.name, edge.name) in done:
+                continue
             curve = vertices[edge.vertices]
             key = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
             ends.setdefault(key, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
-    seams: list[Seam] = []
+    seams: list[Seam] = [*named]
     for edges in ends.values():
         for i, (first, curve) in enumerate(edges):
             for second, other in edges[i + 1 :]:

@@ -45,8 +45,8 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     if piece.on_fold:
         cut = f"Cut {piece.quantity} on fold"
     elif piece.quantity % 2 == 0 and piece.paired:
-        pairs = piece.quantity // 2
-        cut = f"Cut {piece.quantity} ({pairs} pair{'s' if pairs > 1 else ''})"
+        half = piece.quantity // 2
+        cut = f"Cut {piece.quantity}, {half} mirrored"
     else:
         cut = f"Cut {piece.quantity}"
     lines = [piece.name.replace("_", " ").upper()]

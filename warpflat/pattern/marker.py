@@ -70,8 +70,9 @@ class Copy:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Marker:
-    """A lay plan: cloth from 0 to `length` along x and 0 to `width` across [m]."""
+    """A lay plan: cloth from 0 to `length` along x and 0 to `width` across [m]; `name` is the garment's."""
 
+    name: str
     fabric: str
     width: float
     length: float
@@ -119,7 +120,11 @@ def make_marker(
     plans = [_nest(garment.name, plan, cloth, share, seed) for plan in tries]
     placements = min(plans, key=_length)
     marker = Marker(
-        fabric=fabric, width=cloth.width, length=_length(placements) + cloth.gap, placements=tuple(placements)
+        name=garment.name,
+        fabric=fabric,
+        width=cloth.width,
+        length=_length(placements) + cloth.gap,
+        placements=tuple(placements),
     )
     _check(marker)
     return marker

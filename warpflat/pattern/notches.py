@@ -16,7 +16,7 @@ from warpflat.pattern.pieces import Piece, Seam, SeamSide
 if TYPE_CHECKING:
     from warpflat.pattern.draft import DraftedPiece
 
-__all__ = ["Notch", "SeamReport", "cut_darts", "dart_notches", "seam_notches", "seam_reports"]
+__all__ = ["Notch", "SeamReport", "cut_darts", "dart_notches", "seam_notches", "seam_reports", "worst_difference"]
 
 Vector = NDArray[np.float64]
 
@@ -110,11 +110,13 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     return reports
 
 
-def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
-    """The worst difference [mm] over `STRETCH`, from the lengths at which both sides have their common vertices."""
-    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
-        return None
-    first, second = one.places, other.places
+def worst_difference(first: Vector, second: Vector, ease: float) -> float | None:
+    """How far [m] two sides of a seam differ over the worst `STRETCH` of it; None if they do not share their vertices.
+
+    Args:
+        first, second: #P, the lengths [m] at which both sides have their common vertices.
+        ease: by how much the second is meant to be longer, as a share.
+    """
     if len(first) != len(second):
         return None
     starts = np.unique(np.concatenate([first, first - STRETCH]))
@@ -122,7 +124,15 @@ def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
     starts = starts if len(starts) else first[:1]
     ends = np.minimum(starts + STRETCH, first[-1])
     stretch = np.interp(ends, first, second) - np.interp(starts, first, second)
-    return float(np.abs(stretch - (ends - starts) * (1 + ease)).max() * 1000)
+    return float(np.abs(stretch - (ends - starts) * (1 + ease)).max())
+
+
+def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
+    """The worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
+    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
+        return None
+    worst = worst_difference(one.places, other.places, ease)
+    return None if worst is None else 1000 * worst
 
 
 class _Chain:
@@ -155,6 +165,10 @@ class _Chain:
 
     def piece_name(self, length: float) -> str:
         return self.side[self.index(length)].piece
+
+    def mirrored(self, length: float) -> bool:
+        """Whether the edge there is that of a second copy, cut turned over."""
+        return self.side[self.index(length)].mirrored
 
     def notch(self, seam: str, length: float, double: bool) -> Notch:
         """A notch at that length; both slits of a double one lie as far to either side of it."""
@@ -197,15 +211,17 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
             chains = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
             places = [(chain, fraction * chain.length) for chain in chains]
             names = [chain.piece_name(length).lower() for chain, length in places]
+            places = [(chain, length) for chain, length in places if not chain.mirrored(length)]
             back = any("back" in name for name in names) and not any("front" in name for name in names)
             for chain, length in places:
                 notch = chain.notch(seam.name, length, back if seam.double is None else seam.double)
                 notches.setdefault(chain.piece_name(length), []).append(notch)
         for chain, other in ((first, second), (second, first)):
             for joint in chain.joints[1:-1] / chain.length:
-                if np.abs(other.joints - joint * other.length).min() > CLEAR:
-                    notch = other.notch(seam.name, float(joint * other.length), double=False)
-                    notches.setdefault(other.piece_name(float(joint * other.length)), []).append(notch)
+                length = float(joint * other.length)
+                if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
+                    notch = other.notch(seam.name, length, double=False)
+                    notches.setdefault(other.piece_name(length), []).append(notch)
     return notches
 
 

@@ -183,14 +183,16 @@ class SeamSide:
     Attributes:
         piece, edge: names.
         reversed: the seam runs against the edge's own (counter-clockwise) direction.
+        mirrored: the edge is that of the piece's second copy, which is cut turned over; its notches are those of the first.
     """
 
     piece: str
     edge: str
     reversed: bool = False
+    mirrored: bool = False
 
     def __str__(self) -> str:
-        return f"{self.piece}.{self.edge}"
+        return f"{self.piece}.{self.edge}" + (" (mirrored)" if self.mirrored else "")
 
 
 @dataclass(frozen=True, kw_only=True)

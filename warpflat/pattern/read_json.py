@@ -97,7 +97,10 @@ def _garment(data: Mapping[str, Any]) -> DraftedGarment:
 
 
 def _side(parts: Sequence[Mapping[str, Any]]) -> tuple[SeamSide, ...]:
-    return tuple(SeamSide(piece=p["piece"], edge=p["edge"], reversed=p["reversed"]) for p in parts)
+    return tuple(
+        SeamSide(piece=p["piece"], edge=p["edge"], reversed=p["reversed"], mirrored=p.get("mirrored", False))
+        for p in parts
+    )
 
 
 def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
