@@ -287,7 +287,8 @@ def _directions_at_line(
     for near, end in zip(around, (0, last), strict=True):
         about_end = np.column_stack([side, station - station[end]])
         joined = [k for k, vertex in enumerate(known.tolist()) if vertex in near]
-        about_end[joined] = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[joined]]
+        places = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[joined]]
+        about_end[joined] = np.reshape(places, (-1, 2))
         about_ends.append(about_end)
     return known, side, (about_ends[0], about_ends[1])
 
