@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat import Fabric, flatten
+from warpflat.compare import laid_upon
 from warpflat.flattening import Flattening
 from warpflat.relax import RelaxOptions
 from warpflat.shapes import make_shape
@@ -32,9 +33,7 @@ def outline(piece: Flattening, resolution: int) -> FloatArray:
 def moved(coarse: FloatArray, fine: FloatArray) -> float:
     """Farthest that a border point of the coarse pattern lies from its place in the fine one, laid on each other [m]."""
     fine = fine[:: len(fine) // len(coarse)]
-    a, b = fine - fine.mean(axis=0), coarse - coarse.mean(axis=0)
-    u, _, vt = np.linalg.svd(a.T @ b)
-    return float(np.linalg.norm(a @ u @ np.diag([1.0, np.sign(np.linalg.det(u @ vt))]) @ vt - b, axis=1).max())
+    return float(np.linalg.norm(laid_upon(coarse, fine) - coarse, axis=1).max())
 
 
 def main() -> None:

@@ -111,7 +111,7 @@ def evaluate_guard(
     c = wp.tid() + first
     corner = cells.corner[c]
     D = flat_edges(position, corner)
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     a = wp.vec2d(D[0, 0], D[1, 0])
     b = wp.vec2d(D[0, 1], D[1, 1])
     longest = wp.max(wp.length(a), wp.max(wp.length(b), wp.length(b - a)))
@@ -119,7 +119,7 @@ def evaluate_guard(
     clearance[c] = wp.float64(0.0)
     if det > wp.float64(0.0):
         clearance[c] = det / longest
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         warp = guard.warp * cells.slack[c][0]
         weft = guard.weft * cells.slack[c][1]
@@ -197,10 +197,10 @@ def compute_guard_energy(
     """Energy of the thread guard per cell. position: #V [m]. energy: #C [J], infinite in a collapsed or mirrored cell."""
     c = wp.tid() + first
     D = flat_edges(position, cells.corner[c])
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     energy[c] = wp.float64(wp.inf)
     if det > wp.float64(0.0):
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         y_warp = excess_stretch(F * (guard.warp * cells.slack[c][0]), guard.onset_warp)
         y_weft = excess_stretch(F * (guard.weft * cells.slack[c][1]), guard.onset_weft)

@@ -194,7 +194,7 @@ def evaluate_membrane(
     c = wp.tid() + first
     corner = cells.corner[c]
     D = flat_edges(position, corner)
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     a = wp.vec2d(D[0, 0], D[1, 0])
     b = wp.vec2d(D[0, 1], D[1, 1])
     longest = wp.max(wp.length(a), wp.max(wp.length(b), wp.length(b - a)))
@@ -203,7 +203,7 @@ def evaluate_membrane(
     if det > wp.float64(0.0):
         acting[c] = 1
         clearance[c] = det / longest
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         warp = cloth.warp * cells.slack[c][0]
         weft = cloth.weft * cells.slack[c][1]
@@ -287,9 +287,9 @@ def bound_membrane(
     """
     c = wp.tid() + first
     D = flat_edges(position, cells.corner[c])
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     if det > wp.float64(0.0):
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         warp = cloth.warp * cells.slack[c][0]
         weft = cloth.weft * cells.slack[c][1]
@@ -321,10 +321,10 @@ def compute_membrane_energy(
     """(Flat area) psi per cell. position: #V [m]. energy: #C [J], infinite in a collapsed or mirrored cell."""
     c = wp.tid() + first
     D = flat_edges(position, cells.corner[c])
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     energy[c] = wp.float64(wp.inf)
     if det > wp.float64(0.0):
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         worn_warp = F * (cloth.warp * cells.slack[c][0])
         worn_weft = F * (cloth.weft * cells.slack[c][1])
@@ -354,11 +354,11 @@ def compute_membrane_strain(
     """
     c = wp.tid() + first
     D = flat_edges(position, cells.corner[c])
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     area[c] = wp.float64(0.5) * det * cells.weight[c]
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if det > wp.float64(0.0):
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         worn_warp = F * cloth.warp
         worn_weft = F * cloth.weft

@@ -43,11 +43,11 @@ def compute_worn_strain(
     """
     c = wp.tid() + first
     D = flat_edges(position, cells.corner[c])
-    det = D[0, 0] * D[1, 1] - D[0, 1] * D[1, 0]
+    det = wp.determinant(D)
     area[c] = wp.float64(0.5) * det * cells.weight[c]
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if det > wp.float64(0.0):
-        inv = wp.mat22d(D[1, 1], -D[0, 1], -D[1, 0], D[0, 0]) * (wp.float64(1.0) / det)
+        inv = wp.inverse(D)
         F = cells.edges[c] * inv
         worn_warp = F * membrane.warp
         worn_weft = F * membrane.weft

@@ -48,13 +48,13 @@ def test_fabrics_are_compared_with_the_first(comparison: Comparison):
 
 
 def test_a_layout_is_found_again_wherever_it_lies(comparison: Comparison):
-    from warpflat.compare import _laid_upon
+    from warpflat.compare import laid_upon
 
     target = comparison.layouts["denim"]["front"]
     c, s = np.cos(2.0), np.sin(2.0)
-    np.testing.assert_allclose(_laid_upon(target, target @ [[c, s], [-s, c]] + [3.0, -1.0]), target, atol=1e-12)
+    np.testing.assert_allclose(laid_upon(target, target @ [[c, s], [-s, c]] + [3.0, -1.0]), target, atol=1e-12)
     # A mirror image is another pattern: it is laid upon it as it is, and not turned over.
-    mirrored = _laid_upon(target, target * [-1.0, 1.0])
+    mirrored = laid_upon(target, target * [-1.0, 1.0])
     a, b = mirrored[1] - mirrored[0], mirrored[17] - mirrored[0]
     assert a[0] * b[1] - a[1] * b[0] < 0
 

@@ -17,7 +17,7 @@ from warpflat.flattening import Flattening, Progress
 from warpflat.scene import Scene, scene_cuts, scene_fabric, scene_relax_options, scene_wear, told_by
 from warpflat.surface.topology import border_loops
 
-__all__ = ["Comparison", "compare_fabrics", "comparison_table", "outline", "save_comparison"]
+__all__ = ["Comparison", "compare_fabrics", "comparison_table", "laid_upon", "outline", "save_comparison"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -156,7 +156,7 @@ def compare_fabrics(
             results[name] = _run(one, story, told, device)
     first = next(iter(results.values()))
     layouts = {
-        name: {piece: _laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
+        name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
         for name, pieces in results.items()
     }
     return Comparison(name=scene.name, results=results, layouts=layouts)
@@ -184,7 +184,7 @@ def _run(scene: Scene, story: Any, told: Callable[[Progress], None], device: str
     return {piece.surface.name: piece for piece in separate(result)}
 
 
-def _laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
+def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
     """The layout turned and shifted to lie as near as it can to the target (Kabsch 1976)."""
     centre, aim = layout.mean(axis=0), target.mean(axis=0)
     u, _, v = np.linalg.svd((layout - centre).T @ (target - aim))
