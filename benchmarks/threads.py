@@ -1,9 +1,8 @@
-"""One approximate implicit step on one, two, ... threads: microseconds, and nanoseconds per vertex; the least of many.
+"""Approximate implicit steps on one, two, ... threads: microseconds a step, and nanoseconds per vertex; the least of many.
 
     python benchmarks/threads.py [--sizes 256 1024 4096 10000 40000 160000] [--threads 1 2] [--shape bodice] [--triangles]
 
-`recorded` is the step by Warp's own recorded launches, one after the other; the others are a `launching.Sequence` over as many ranges as
-threads, however short. Where that begins to pay decides the shortest range of `warpflat.launching`.
+A sweep of four steps is measured, as the relaxation takes them.
 """
 
 from __future__ import annotations
@@ -12,59 +11,18 @@ import argparse
 import os
 import time
 from collections.abc import Callable
+from functools import partial
 
 import warp as wp
-from warpflat.kernels.implicit import advance, gather_forces
 
 from warpflat.develop import develop
 from warpflat.fabric import Fabric
-from warpflat.launching import Sequence, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.shapes import make_shape
 
+SWEEP = 4
 CLOTH = Fabric(name="cloth", stiffness_warp=1000.0, stiffness_weft=1000.0, shear_stiffness=375.0, areal_density=0.15)
-
-
-def step_on(state: Relaxation, threads: int) -> Sequence:
-    """The step's launches over so many ranges (the buffers are those of the relaxation)."""
-    net, h = state.network, state.options.time_step
-    evaluate_cells, _, parameters = net.cell_model
-    share = {"device": "cpu", "threads": threads, "least": 1}
-    cells = [state._cell_acting, state._cell_clearance, state._cell_force, state._cell_viscosity, state._cell_stiffness]
-    seams = [state._seam_force, state._seam_viscosity, state._seam_stiffness]
-    motion = [state._driving_force, state._first_guess, state._stiffness, state._reach]
-    at = [state.position, state.velocity]
-    return Sequence(
-        [
-            record(evaluate_cells, dim=net.cell_count, inputs=[*at, net.cells, parameters, h], outputs=cells, **share),
-            record(
-                gather_forces,
-                dim=net.vertex_count,
-                inputs=[
-                    *at,
-                    net.mass,
-                    net.spring_stiffness,
-                    net.springs,
-                    net.cells,
-                    *cells,
-                    net.bonds,
-                    *seams,
-                    state._load,
-                    h,
-                ],
-                outputs=[state.force, state._power, *motion],
-                **share,
-            ),
-            record(
-                advance,
-                dim=net.vertex_count,
-                inputs=[net.mass, net.springs, net.bonds, *motion, h],
-                outputs=at,
-                **share,
-            ),
-        ]
-    )
 
 
 def measure(shape: str, size: int, threads: list[int], triangles: bool, seconds: float) -> None:
@@ -72,14 +30,11 @@ def measure(shape: str, size: int, threads: list[int], triangles: bool, seconds:
     surface = make_shape(shape, resolution=max(5, round(size**0.5)), triangles=triangles)
     start = develop(surface, surface.lines["centre"]).positions
     network = SpringNetwork.build(surface, CLOTH, start, device="cpu")
-    state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
-
-    def recorded() -> None:
-        state._evaluate()
-        state._advance.launch()
-
-    steps: dict[str, Callable[[], None]] = {"recorded": recorded}
-    steps |= {f"{count} thr.": step_on(state, count).launch for count in threads}
+    steps: dict[str, Callable[[], None]] = {}
+    for count in threads:
+        os.environ["WARPFLAT_THREADS"] = str(count)
+        state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
+        steps[f"{count} thr."] = partial(state.sweep, SWEEP)
     least = dict.fromkeys(steps, float("inf"))
     until = time.perf_counter() + seconds
     # In turns, so that whatever else the machine does falls on all of them alike.
@@ -87,7 +42,7 @@ def measure(shape: str, size: int, threads: list[int], triangles: bool, seconds:
         for name, step in steps.items():
             begun = time.perf_counter()
             step()
-            least[name] = min(least[name], time.perf_counter() - begun)
+            least[name] = min(least[name], (time.perf_counter() - begun) / SWEEP)
     count = network.vertex_count
     texts = [f"{name} {1e6 * value:9.1f} us {1e9 * value / count:6.1f} ns" for name, value in least.items()]
     print(f"{count:9,d}  " + "   ".join(texts), flush=True)

@@ -59,6 +59,13 @@ def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
 
 
 @wp.func
+def is_beyond(worn: wp.vec2d, stretch: wp.float64):
+    """Whether the stretch of a worn thread, a unit vector mapped to `worn`, is more than this."""
+    length = wp.float64(1.0) + stretch
+    return length < wp.float64(0.0) or wp.dot(worn, worn) > length * length
+
+
+@wp.func
 def excess_stretch(worn: wp.vec2d, onset: wp.float64):
     """How far the stretch of a worn thread, a unit vector mapped to `worn`, lies beyond the onset."""
     return wp.max(wp.length(worn) - wp.float64(1.0) - onset, wp.float64(0.0))
@@ -90,6 +97,7 @@ def evaluate_guard(
     cells: Cells,
     guard: ThreadGuard,
     time_step: wp.float64,
+    watch: int,
     first: int,
     # outputs
     acting: wp.array(dtype=wp.int32),
@@ -104,29 +112,29 @@ def evaluate_guard(
     guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
     that moves as a whole is not held back.
 
-    position: #V [m]. velocity: #V [m/s]. acting: #C, 1 where the guard acts or is about to; elsewhere the last three are not written.
+    position: #V [m]. velocity: #V [m/s]. watch: 1 to look at all cells; with 0 those in which the guard did not act are passed over.
+    acting: #C, 1 where the guard acts or is about to; elsewhere the last three are not written.
     clearance: #C, the cell's least height in the plane [m], 0 once it is mirrored. force, viscosity: 3 #C [N].
     stiffness k: 3 #C, bound on the energy's second derivative by the corner's place [N/m].
     """
     c = wp.tid() + first
+    if watch == 0 and acting[c] == 0:
+        return
     corner = cells.corner[c]
     D = flat_edges(position, corner)
     det = wp.determinant(D)
     a = wp.vec2d(D[0, 0], D[1, 0])
     b = wp.vec2d(D[0, 1], D[1, 1])
-    longest = wp.max(wp.length(a), wp.max(wp.length(b), wp.length(b - a)))
+    longest = wp.sqrt(wp.max(wp.dot(a, a), wp.max(wp.dot(b, b), wp.dot(b - a, b - a))))
     acting[c] = 0
     clearance[c] = wp.float64(0.0)
     if det > wp.float64(0.0):
         clearance[c] = det / longest
         inv = wp.inverse(D)
-        F = cells.edges[c] * inv
         warp = guard.warp * cells.slack[c][0]
         weft = guard.weft * cells.slack[c][1]
-        worn_warp = F * warp
-        worn_weft = F * weft
-        y_warp = excess_stretch(worn_warp, guard.onset_warp)
-        y_weft = excess_stretch(worn_weft, guard.onset_weft)
+        worn_warp = cells.edges[c] * (inv * warp)
+        worn_weft = cells.edges[c] * (inv * weft)
         # The stiffness counts from half of the onset on, and always in slender cells: a step can take these from far
         # below the onset to far beyond it, and with the springs' stiffness alone they would swing to and fro for ever.
         early = wp.float64(0.5)
@@ -134,8 +142,11 @@ def evaluate_guard(
             early = -wp.float64(wp.inf)
         near_warp = early * guard.onset_warp
         near_weft = early * guard.onset_weft
-        if wp.length(worn_warp) - wp.float64(1.0) > near_warp or wp.length(worn_weft) - wp.float64(1.0) > near_weft:
+        if is_beyond(worn_warp, near_warp) or is_beyond(worn_weft, near_weft):
             acting[c] = 1
+            F = cells.edges[c] * inv
+            y_warp = excess_stretch(worn_warp, guard.onset_warp)
+            y_weft = excess_stretch(worn_weft, guard.onset_weft)
             area = wp.float64(0.5) * det * cells.weight[c]
             density = wp.float64(0.5) * (
                 guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
@@ -201,12 +212,15 @@ def compute_guard_energy(
     energy[c] = wp.float64(wp.inf)
     if det > wp.float64(0.0):
         inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        y_warp = excess_stretch(F * (guard.warp * cells.slack[c][0]), guard.onset_warp)
-        y_weft = excess_stretch(F * (guard.weft * cells.slack[c][1]), guard.onset_weft)
-        energy[c] = (
-            wp.float64(0.25)
-            * det
-            * cells.weight[c]
-            * (guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft)
-        )
+        energy[c] = wp.float64(0.0)
+        worn_warp = cells.edges[c] * (inv * (guard.warp * cells.slack[c][0]))
+        worn_weft = cells.edges[c] * (inv * (guard.weft * cells.slack[c][1]))
+        if is_beyond(worn_warp, guard.onset_warp) or is_beyond(worn_weft, guard.onset_weft):
+            y_warp = excess_stretch(worn_warp, guard.onset_warp)
+            y_weft = excess_stretch(worn_weft, guard.onset_weft)
+            energy[c] = (
+                wp.float64(0.25)
+                * det
+                * cells.weight[c]
+                * (guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft)
+            )

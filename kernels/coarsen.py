@@ -4,56 +4,104 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
-# 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a turned one.
-_EQUILATERAL = wp.constant(wp.float64(3.4641016151377544))
-# Least quality of a new triangle on the body and in the plane, and least cosine of the turn of a border at a vertex that may vanish.
-LEAST_QUALITY = wp.constant(wp.float64(0.15))
+# Quality is 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a turned one. This times a
+# parallelogram's area over half the sum.
+_EQUILATERAL = wp.constant(wp.float64(1.7320508075688772))
+# Least quality of a new triangle in the plane, and least cosine of the turn of a border at a vertex that may vanish.
 LEAST_FLAT_QUALITY = wp.constant(wp.float64(0.05))
 LEAST_STRAIGHT = wp.constant(wp.float64(0.7))
 
 
 @wp.struct
 class Ring:
-    """Triangles and where they are around each vertex.
+    """The neighbours around each vertex, anticlockwise: two that follow each other form a triangle with it, and so do the last and
+    the first. At the border the last is -1, which stands for what is outside.
 
-    vertices: #V, on the body [m]. layout: #V, in the plane [m]. corner: #T, anticlockwise.
-    offset: #V+1, where each vertex's entries in `slot` begin.
-    slot: 3 times the triangle plus the corner. before, after: #V, its neighbours along the border, -1 inside.
+    vertices: #V, on the body [m]. layout: #V, in the plane [m], or none.
+    offset: #V+1, where each vertex's place in `neighbor` begins. degree: #V, how much of its place is used.
+    neighbor: #N, vertices.
     """
 
     vertices: wp.array(dtype=wp.vec3d)
     layout: wp.array(dtype=wp.vec2d)
-    corner: wp.array(dtype=wp.vec3i)
     offset: wp.array(dtype=wp.int32)
-    slot: wp.array(dtype=wp.int32)
-    before: wp.array(dtype=wp.int32)
-    after: wp.array(dtype=wp.int32)
+    degree: wp.array(dtype=wp.int32)
+    neighbor: wp.array(dtype=wp.int32)
+
+
+# --- rings of triangles
+
+
+@wp.kernel
+def sort_corners(
+    triangles: wp.array(dtype=wp.vec3i),
+    offset: wp.array(dtype=wp.int32),
+    # outputs
+    degree: wp.array(dtype=wp.int32),
+    side: wp.array(dtype=wp.vec2i),
+):
+    """For one thread. side: #N, from `offset` on, the other two vertices of each triangle at a vertex; degree: #V, how many, 0 before."""
+    for t in range(triangles.shape[0]):
+        for k in range(3):
+            v = triangles[t][k]
+            side[offset[v] + degree[v]] = wp.vec2i(triangles[t][(k + 1) % 3], triangles[t][(k + 2) % 3])
+            degree[v] = degree[v] + 1
+
+
+@wp.kernel
+def order_rings(
+    offset: wp.array(dtype=wp.int32),
+    side: wp.array(dtype=wp.vec2i),
+    first: int,
+    # outputs
+    degree: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+):
+    """degree, neighbor: as in `Ring`; of `sort_corners`' triangles at each vertex, whose number is in `degree` before. A degree of -1
+    where they are more than one fan."""
+    v = wp.tid() + first
+    begin = offset[v]
+    end = begin + degree[v]
+    if begin == end:
+        return
+    # Along the border the first neighbour is one to which no triangle leads.
+    start = side[begin][0]
+    closed = int(1)
+    for e in range(begin, end):
+        led_to = int(0)
+        for f in range(begin, end):
+            if side[f][1] == side[e][0]:
+                led_to = 1
+        if led_to == 0:
+            start = side[e][0]
+            closed = 0
+    here = start
+    for i in range(begin, end):
+        neighbor[i] = here
+        after = int(-1)
+        for e in range(begin, end):
+            if side[e][0] == here:
+                after = side[e][1]
+        if after < 0 or (after == start and i + 1 < end):
+            degree[v] = -1
+            return
+        here = after
+    if closed == 0:
+        neighbor[end] = here
+        neighbor[end + 1] = -1
+        degree[v] = degree[v] + 2
+
+
+# --- which vertex may vanish into which
 
 
 @wp.func
-def corner_of(ring: Ring, slot: int, turn: int):
-    """The vertex of the slot's triangle that is `turn` corners on."""
-    return ring.corner[slot / 3][(slot % 3 + turn) % 3]
-
-
-@wp.func
-def quality(a: wp.vec3d, b: wp.vec3d, c: wp.vec3d, normal: wp.vec3d):
-    """Of a triangle as seen along the normal."""
-    ab = b - a
-    ac = c - a
-    bc = c - b
-    sides = wp.dot(ab, ab) + wp.dot(ac, ac) + wp.dot(bc, bc)
-    return _EQUILATERAL * wp.dot(wp.cross(ab, ac), normal) / wp.max(sides, wp.float64(1.0e-300))
-
-
-@wp.func
-def flat_quality(a: wp.vec2d, b: wp.vec2d, c: wp.vec2d):
-    """Of a triangle in the plane."""
-    ab = b - a
-    ac = c - a
-    bc = c - b
-    sides = wp.dot(ab, ab) + wp.dot(ac, ac) + wp.dot(bc, bc)
-    return _EQUILATERAL * (ab[0] * ac[1] - ab[1] * ac[0]) / wp.max(sides, wp.float64(1.0e-300))
+def at(ring: Ring, v: int, i: int):
+    """The i-th entry of a vertex's ring, from 0 up to twice its length."""
+    d = ring.degree[v]
+    if i >= d:
+        i -= d
+    return ring.neighbor[ring.offset[v] + i]
 
 
 @wp.func
@@ -61,178 +109,223 @@ def normal_at(v: int, ring: Ring):
     """Mean normal of the triangles around a vertex, by area."""
     n = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     here = ring.vertices[v]
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        a = ring.vertices[corner_of(ring, ring.slot[e], 1)]
-        b = ring.vertices[corner_of(ring, ring.slot[e], 2)]
-        n += wp.cross(a - here, b - here)
+    end = ring.offset[v] + ring.degree[v]
+    a = ring.neighbor[end - 1]
+    pa = ring.vertices[wp.max(a, 0)] - here
+    for e in range(ring.offset[v], end):
+        b = ring.neighbor[e]
+        if b >= 0:
+            pb = ring.vertices[b] - here
+            if a >= 0:
+                n += wp.cross(pa, pb)
+            pa = pb
+        a = b
     return wp.normalize(n)
 
 
 @wp.func
-def is_neighbor(v: int, w: int, ring: Ring):
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        if corner_of(ring, ring.slot[e], 1) == w or corner_of(ring, ring.slot[e], 2) == w:
-            return True
-    return False
-
-
-@wp.func
-def worst_after(v: int, u: int, normal: wp.vec3d, ring: Ring):
-    """Least quality of the triangles that are left where v vanishes into u: 2 where none is, -1 where one is bad in the plane."""
+def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
+    """Least quality of the triangles that are left where v vanishes into its j-th neighbour, seen along the normal; 2 where none is."""
+    u = ring.vertices[at(ring, v, j)]
     worst = wp.float64(2.0)
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        a = corner_of(ring, ring.slot[e], 1)
-        b = corner_of(ring, ring.slot[e], 2)
-        if a != u and b != u:
-            worst = wp.min(worst, quality(ring.vertices[u], ring.vertices[a], ring.vertices[b], normal))
-            if flat_quality(ring.layout[u], ring.layout[a], ring.layout[b]) < LEAST_FLAT_QUALITY:
-                worst = wp.min(worst, wp.float64(-1.0))
+    a = at(ring, v, j + 1)
+    ua = ring.vertices[wp.max(a, 0)] - u
+    aa = wp.dot(ua, ua)
+    for i in range(j + 2, j + ring.degree[v]):
+        b = at(ring, v, i)
+        if b >= 0:
+            ub = ring.vertices[b] - u
+            bb = wp.dot(ub, ub)
+            if a >= 0:
+                area = wp.dot(wp.cross(ua, ub), normal)
+                # The squared sides add up to twice this.
+                sides = wp.max(aa + bb - wp.dot(ua, ub), wp.float64(1.0e-300))
+                worst = wp.min(worst, _EQUILATERAL * area / sides)
+            ua = ub
+            aa = bb
+        a = b
     return worst
 
 
 @wp.func
-def common_neighbors(v: int, u: int, ring: Ring):
-    """How many vertices are neighbours of both, counted along the triangles around v."""
-    count = int(0)
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        a = corner_of(ring, ring.slot[e], 1)
-        b = corner_of(ring, ring.slot[e], 2)
-        if a != u and is_neighbor(u, a, ring):
-            count += 1
-        if b != u and b == ring.before[v] and is_neighbor(u, b, ring):
-            count += 1
-    return count
+def stays_upright(v: int, j: int, ring: Ring):
+    """Whether no triangle that is left where v vanishes into its j-th neighbour is mirrored, or nearly so, in the plane."""
+    if ring.layout.shape[0] == 0:
+        return True
+    u = ring.layout[at(ring, v, j)]
+    a = at(ring, v, j + 1)
+    for i in range(j + 2, j + ring.degree[v]):
+        b = at(ring, v, i)
+        if a >= 0 and b >= 0:
+            ua = ring.layout[a] - u
+            ub = ring.layout[b] - u
+            sides = wp.dot(ua, ua) + wp.dot(ub, ub) - wp.dot(ua, ub)
+            if _EQUILATERAL * (ua[0] * ub[1] - ua[1] * ub[0]) < LEAST_FLAT_QUALITY * wp.max(
+                sides, wp.float64(1.0e-300)
+            ):
+                return False
+        a = b
+    return True
 
 
-@wp.kernel
-def find_border(
-    ring: Ring,
-    first: int,
-    # outputs
-    before: wp.array(dtype=wp.int32),
-    after: wp.array(dtype=wp.int32),
-):
-    """before, after: #V, as in `Ring`; the same vertex in both where two borders touch, so that it stays."""
-    v = wp.tid() + first
-    before[v] = -1
-    after[v] = -1
-    ends = int(0)
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        a = corner_of(ring, ring.slot[e], 1)
-        b = corner_of(ring, ring.slot[e], 2)
-        a_lone = int(1)
-        b_lone = int(1)
-        for f in range(ring.offset[v], ring.offset[v + 1]):
-            if corner_of(ring, ring.slot[f], 2) == a:
-                a_lone = 0
-            if corner_of(ring, ring.slot[f], 1) == b:
-                b_lone = 0
-        if a_lone == 1:
-            after[v] = a
-            ends += 1
-        if b_lone == 1:
-            before[v] = b
-    if ends > 1:
-        before[v] = after[v]
+@wp.func
+def stays_mesh(v: int, j: int, ring: Ring):
+    """Whether v may vanish into its j-th neighbour: they share no neighbours but those of their triangles, and the ring has room."""
+    u = at(ring, v, j)
+    d = ring.degree[v]
+    begin = ring.offset[u]
+    end = begin + ring.degree[u]
+    if end + d - 4 > ring.offset[u + 1]:
+        return False
+    for i in range(j + 2, j + d - 1):
+        a = at(ring, v, i)
+        for e in range(begin, end):
+            if ring.neighbor[e] == a:
+                return False
+    return True
 
 
 @wp.kernel
 def find_targets(
     ring: Ring,
+    gone: wp.array(dtype=wp.int32),
+    least: wp.float64,
     first: int,
     # outputs
     target: wp.array(dtype=wp.int32),
+    left: wp.array(dtype=wp.float64),
+    blocked: wp.array(dtype=wp.int32),
 ):
-    """target: #V, the neighbour into which each vertex vanishes with the best triangles left; -1 where it has to stay.
+    """target: #V, where in its ring is the neighbour into which each vertex vanishes with the best triangles left; -1 where it has
+    to stay. left: #V, the worst one's quality, which is above `least`. blocked: #V, 0. Those that are gone are left alone.
 
     A vertex of the border vanishes along the border, where that is nearly straight. So corners stay, and the two sides of a crack,
     whose vertices are different ones at the same place, stay apart. No two vertices are joined that are joined already.
     """
     v = wp.tid() + first
+    if gone[v] != 0:
+        return
     target[v] = -1
-    before = ring.before[v]
-    after = ring.after[v]
-    shared = int(2)
-    if before >= 0:
-        shared = 1
-        back = wp.normalize(ring.vertices[v] - ring.vertices[before])
-        on = wp.normalize(ring.vertices[after] - ring.vertices[v])
-        if before == after or wp.dot(back, on) < LEAST_STRAIGHT:
+    blocked[v] = 0
+    d = ring.degree[v]
+    if d == 0:
+        return
+    step = int(1)
+    if at(ring, v, d - 1) < 0:
+        # The first and the last but one are those along the border; a lone triangle's corner stays.
+        if d == 3:
+            return
+        step = d - 2
+        back = wp.normalize(ring.vertices[v] - ring.vertices[at(ring, v, d - 2)])
+        on = wp.normalize(ring.vertices[at(ring, v, 0)] - ring.vertices[v])
+        if wp.dot(back, on) < LEAST_STRAIGHT:
             return
     normal = normal_at(v, ring)
-    best = wp.float64(LEAST_QUALITY)
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        for turn in range(1, 3):
-            u = corner_of(ring, ring.slot[e], turn)
-            # Inside, each neighbour comes once as the first of a triangle's two.
-            if (before < 0 and turn == 1) or u == before or u == after:  # noqa: SIM109
-                worst = worst_after(v, u, normal, ring)
-                if worst > best and worst < wp.float64(1.5) and common_neighbors(v, u, ring) == shared:
-                    best = worst
-                    target[v] = u
+    # The best one, and where it will not do the next best, until none is left.
+    bar = wp.float64(1.5)
+    best_j = int(0)
+    while best_j >= 0:
+        best = wp.float64(least)
+        best_j = int(-1)
+        for j in range(0, d, step):
+            worst = worst_after(v, j, normal, ring)
+            if worst > best and worst < bar:
+                best = worst
+                best_j = j
+        bar = best
+        if best_j >= 0 and stays_mesh(v, best_j, ring) and stays_upright(v, best_j, ring):
+            target[v] = best_j
+            left[v] = best
+            return
+
+
+# --- collapses
 
 
 @wp.func
-def scrambled(v: int):
-    """A number that looks random, the same in every run."""
-    x = wp.uint32(v + 1) * wp.uint32(73244475)
-    x = (x ^ (x >> wp.uint32(16))) * wp.uint32(73244475)
-    return x ^ (x >> wp.uint32(16))
+def find(v: int, w: int, ring: Ring):
+    """Where in a vertex's place its neighbour w is."""
+    e = ring.offset[v]
+    while ring.neighbor[e] != w:
+        e += 1
+    return e
+
+
+@wp.func
+def shift(ring: Ring, v: int, begin: int, by: int):
+    """Move the rest of a vertex's ring from `begin` on."""
+    end = ring.offset[v] + ring.degree[v]
+    if by > 0:
+        for k in range(end - begin):
+            ring.neighbor[end - 1 - k + by] = ring.neighbor[end - 1 - k]
+    if by < 0:
+        for e in range(begin, end):
+            ring.neighbor[e + by] = ring.neighbor[e]
+    ring.degree[v] = ring.degree[v] + by
 
 
 @wp.kernel
-def select(
+def collapse(
     ring: Ring,
     target: wp.array(dtype=wp.int32),
-    before: wp.array(dtype=wp.int32),
-    first: int,
+    left: wp.array(dtype=wp.float64),
+    good: wp.float64,
+    number: int,
     # outputs
-    after: wp.array(dtype=wp.int32),
+    blocked: wp.array(dtype=wp.int32),
+    gone: wp.array(dtype=wp.int32),
 ):
-    """One round in which vertices that may vanish are chosen, never two neighbours. States: 0 open, 1 chosen, 2 out."""
-    v = wp.tid() + first
-    after[v] = before[v]
-    if before[v] == 0:
-        if target[v] < 0:
-            after[v] = 2
-            return
-        mine = scrambled(v)
-        leads = int(1)
-        for e in range(ring.offset[v], ring.offset[v + 1]):
-            for turn in range(1, 3):
-                w = corner_of(ring, ring.slot[e], turn)
-                if before[w] == 1:
-                    after[v] = 2
-                elif before[w] == 0 and target[w] >= 0:
-                    other = scrambled(w)
-                    if other > mine or (other == mine and w > v):
-                        leads = 0
-        if after[v] == 0 and leads == 1:
-            after[v] = 1
+    """For one thread: vertices vanish one by one, never two neighbours, those first that leave triangles of good quality.
+    gone: #V, the number of the pass in which each did, 0 before."""
+    for turn in range(2):
+        for v in range(gone.shape[0]):
+            j = target[v]
+            if gone[v] == 0 and j >= 0 and blocked[v] == 0 and (turn == 1 or left[v] > good) and stays_mesh(v, j, ring):
+                d = ring.degree[v]
+                u = at(ring, v, j)
+                here = find(u, v, ring)
+                shift(ring, u, here + 1, d - 4)
+                for i in range(j + 1, j + d):
+                    a = at(ring, v, i)
+                    inner = i > j + 1 and i < j + d - 1
+                    if inner:
+                        ring.neighbor[here + i - j - 2] = a
+                    if a >= 0:
+                        e = find(a, v, ring)
+                        if inner:
+                            ring.neighbor[e] = u
+                        else:
+                            shift(ring, a, e + 1, -1)
+                        blocked[a] = 1
+                blocked[u] = 1
+                gone[v] = number
 
 
 @wp.kernel
 def place(
     ring: Ring,
+    gone: wp.array(dtype=wp.int32),
     target: wp.array(dtype=wp.int32),
-    chosen: wp.array(dtype=wp.int32),
     first: int,
     # outputs
     parent: wp.array(dtype=wp.vec3i),
     weight: wp.array(dtype=wp.vec3d),
 ):
-    """Where a vanished vertex lies in the triangles that are left: three vertices and its barycentric weights, none negative."""
-    i = wp.tid() + first
-    v = chosen[i]
-    u = target[v]
+    """Where a vanished vertex lay in the triangles that were left: three vertices and its barycentric weights, none negative."""
+    v = wp.tid() + first
+    if gone[v] == 0:
+        return
+    j = target[v]
+    u = at(ring, v, j)
     normal = normal_at(v, ring)
     here = ring.vertices[v]
+    pu = ring.vertices[u] - here
     best = -wp.float64(wp.inf)
-    for e in range(ring.offset[v], ring.offset[v + 1]):
-        a = corner_of(ring, ring.slot[e], 1)
-        b = corner_of(ring, ring.slot[e], 2)
-        if a != u and b != u:
-            pu = ring.vertices[u] - here
+    b = at(ring, v, j + 1)
+    for i in range(j + 2, j + ring.degree[v]):
+        a = b
+        b = at(ring, v, i)
+        if a >= 0 and b >= 0:
             pa = ring.vertices[a] - here
             pb = ring.vertices[b] - here
             w = wp.vec3d(
@@ -247,5 +340,5 @@ def place(
                     w = wp.vec3d(
                         wp.max(w[0], wp.float64(0.0)), wp.max(w[1], wp.float64(0.0)), wp.max(w[2], wp.float64(0.0))
                     )
-                    parent[i] = wp.vec3i(u, a, b)
-                    weight[i] = w / (w[0] + w[1] + w[2])
+                    parent[v] = wp.vec3i(u, a, b)
+                    weight[v] = w / (w[0] + w[1] + w[2])

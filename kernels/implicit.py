@@ -3,12 +3,12 @@
 import warp as wp
 
 from .cells import Cells
-from .springs import Springs, spring_forces_on, viscosity_forces_on
+from .springs import Springs, spring_forces_on
 
 wp.set_module_options({"enable_backward": False})
 
 # Every vertex may move this share of the least height of the cells around it: were all three corners of a cell to
-# approach each other, a fifth of its height would remain, so no step can mirror a cell.
+# approach each other, a fifth of its height would remain, so nothing can mirror a cell before all are looked at again.
 STEP_SHARE = wp.constant(wp.float64(0.4))
 
 
@@ -44,6 +44,7 @@ def gather_forces(
     bond_stiffness: wp.array(dtype=wp.float64),
     load: wp.array(dtype=wp.vec2d),
     time_step: wp.float64,
+    watch: int,
     first: int,
     # outputs
     force: wp.array(dtype=wp.vec2d),
@@ -51,28 +52,40 @@ def gather_forces(
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
+    anchor: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
+    guarded: wp.array(dtype=wp.int32),
 ):
     """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), and the neighbours' share, eq. (9).
 
     position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. cell_*: as `cells.evaluate_guard`. bond_*: as
-    `seams.evaluate_seams`. load: #V, constant forces [N].
+    `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all cells have been evaluated at these positions, 0 where only
+    those that act were; then anchor, reach and guarded stay what they were.
     force F [N], power F.v / K [m2/s], driving_force F~ [N], first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
-    the cells' around the vertex [N/m], reach: how far it may move in this step [m]. All #V.
+    the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all cells are evaluated again [m],
+    guarded: 1 where a cell around it acts. All #V.
     """
     i = wp.tid() + first
-    total = spring_forces_on(i, position, springs) + load[i]
-    driving = viscosity_forces_on(i, velocity, springs, time_step)
+    total, driving = spring_forces_on(i, position, velocity, springs, time_step)
+    total += load[i]
     k = spring_stiffness[i]
-    height = wp.float64(wp.inf)
-    for e in range(cells.offset[i], cells.offset[i + 1]):
-        slot = cells.slot[e]
-        cell = slot / 3
-        height = wp.min(height, cell_clearance[cell])
-        if cell_acting[cell] != 0:
-            total += cell_force[slot]
-            driving += cell_viscosity[slot]
-            k += cell_stiffness[slot]
+    if watch != 0:
+        height = wp.float64(wp.inf)
+        acting = int(0)
+        for e in range(cells.offset[i], cells.offset[i + 1]):
+            cell = cells.slot[e] / 3
+            height = wp.min(height, cell_clearance[cell])
+            acting = wp.max(acting, cell_acting[cell])
+        anchor[i] = position[i]
+        reach[i] = STEP_SHARE * height
+        guarded[i] = acting
+    if guarded[i] != 0:
+        for e in range(cells.offset[i], cells.offset[i + 1]):
+            slot = cells.slot[e]
+            if cell_acting[slot / 3] != 0:
+                total += cell_force[slot]
+                driving += cell_viscosity[slot]
+                k += cell_stiffness[slot]
     for b in range(bonds.offset[i], bonds.offset[i + 1]):
         bond = bonds.slot[b]
         total += bond_force[bond]
@@ -85,7 +98,25 @@ def gather_forces(
     driving_force[i] = driving
     first_guess[i] = driving * (time_step / (mass[i] + time_step * time_step * k))
     stiffness[i] = k
-    reach[i] = STEP_SHARE * height
+
+
+@wp.kernel
+def stop(
+    mass: wp.array(dtype=wp.float64),
+    force: wp.array(dtype=wp.vec2d),
+    stiffness: wp.array(dtype=wp.float64),
+    time_step: wp.float64,
+    first: int,
+    # outputs
+    velocity: wp.array(dtype=wp.vec2d),
+    driving_force: wp.array(dtype=wp.vec2d),
+    first_guess: wp.array(dtype=wp.vec2d),
+):
+    """Velocities become zero, and what `gather_forces` gave becomes what it gives there. Arguments as there, all #V."""
+    i = wp.tid() + first
+    velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    driving_force[i] = force[i]
+    first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
 
 
 @wp.kernel
@@ -96,6 +127,7 @@ def advance(
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
+    anchor: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
     time_step: wp.float64,
     first: int,
@@ -105,7 +137,7 @@ def advance(
 ):
     """Eq. (10): dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i), then eq. (4).
 
-    A vertex that would move further than its reach is stopped there. Arguments as in `gather_forces`, all #V.
+    A vertex that would come further from its anchor than its reach is stopped there. Arguments as in `gather_forces`, all #V.
     """
     i = wp.tid() + first
     coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
@@ -114,11 +146,13 @@ def advance(
     h2 = time_step * time_step
     dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] + dv
-    distance = wp.length(v) * time_step
+    here = position[i]
+    away = here - anchor[i] + v * time_step
+    distance = wp.length(away)
     if distance > reach[i]:
-        v = v * (reach[i] / distance)
+        v = (anchor[i] - here + away * (reach[i] / distance)) / time_step
     velocity[i] = v
-    position[i] = position[i] + v * time_step
+    position[i] = here + v * time_step
 
 
 @wp.kernel

@@ -170,6 +170,7 @@ def evaluate_membrane(
     cells: Cells,
     cloth: Cloth,
     time_step: wp.float64,
+    watch: int,
     first: int,
     # outputs
     acting: wp.array(dtype=wp.int32),
@@ -187,11 +188,14 @@ def evaluate_membrane(
     negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear. With
     the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and creep.
 
-    position: #V [m]. velocity: #V [m/s]. acting: #C, 0 in a mirrored cell, whose last three are not written.
+    position: #V [m]. velocity: #V [m/s]. watch: as in `cells.evaluate_guard`. acting: #C, 0 in a mirrored cell, whose last three
+    are not written.
     clearance: #C, the cell's least height in the plane [m], 0 once it is mirrored. force, viscosity: 3 #C [N].
     stiffness: 3 #C [N/m].
     """
     c = wp.tid() + first
+    if watch == 0 and acting[c] == 0:
+        return
     corner = cells.corner[c]
     D = flat_edges(position, corner)
     det = wp.determinant(D)

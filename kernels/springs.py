@@ -33,23 +33,26 @@ def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
 
 
 @wp.func
-def spring_forces_on(i: int, position: wp.array(dtype=wp.vec2d), springs: Springs):
-    """Sum of the spring forces on vertex i [N]."""
-    here = position[i]
+def spring_forces_on(
+    i: int,
+    position: wp.array(dtype=wp.vec2d),
+    velocity: wp.array(dtype=wp.vec2d),
+    springs: Springs,
+    time_step: wp.float64,
+):
+    """Sum of the spring forces on vertex i, and paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]; a
+    membrane has forces and viscosity of its own."""
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        force += spring_force(position[springs.neighbor[s]] - here, springs.rest_length[s], springs.stiffness[s])
-    return springs.pull * force
-
-
-@wp.func
-def viscosity_forces_on(i: int, velocity: wp.array(dtype=wp.vec2d), springs: Springs, time_step: wp.float64):
-    """Paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]; a membrane has its own."""
-    here = velocity[i]
-    force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        force += springs.stiffness[s] * (velocity[springs.neighbor[s]] - here)
-    return springs.pull * time_step * force
+    viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    if springs.pull != wp.float64(0.0):
+        here = position[i]
+        moving = velocity[i]
+        for s in range(springs.offset[i], springs.offset[i + 1]):
+            there = springs.neighbor[s]
+            stiffness = springs.stiffness[s]
+            force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
+            viscosity += stiffness * (velocity[there] - moving)
+    return force, time_step * viscosity
 
 
 @wp.kernel
@@ -59,15 +62,21 @@ def compute_spring_energy(
     first: int,
     # outputs
     energy: wp.array(dtype=wp.float64),
+    pull: wp.array(dtype=wp.float64),
 ):
-    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's.
+    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's; and half of
+    k |l - L| likewise, whether springs pull or are but the step's matrix.
 
-    position: #V [m]. energy: #V [J].
+    position: #V [m]. energy: #V [J]. pull: #V [N].
     """
     i = wp.tid() + first
     here = position[i]
     total = wp.float64(0.0)
+    pulled = wp.float64(0.0)
     for s in range(springs.offset[i], springs.offset[i + 1]):
         stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
-        total += wp.float64(0.25) * springs.stiffness[s] * stretch * stretch
+        half = wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
+        pulled += half
+        total += wp.float64(0.5) * half * wp.abs(stretch)
     energy[i] = springs.pull * total
+    pull[i] = pulled

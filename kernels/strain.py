@@ -23,6 +23,19 @@ class Membrane:
 
 
 @wp.kernel
+def measure_flat_cells(
+    position: wp.array(dtype=wp.vec2d),
+    corner: wp.array(dtype=wp.vec3i),
+    first: int,
+    # outputs
+    area: wp.array(dtype=wp.float64),
+):
+    """position: #V [m]. corner: #C. area: #C, signed [m2]; 0 or less where a cell is mirrored or collapsed."""
+    c = wp.tid() + first
+    area[c] = wp.float64(0.5) * wp.determinant(flat_edges(position, corner[c]))
+
+
+@wp.kernel
 def compute_worn_strain(
     position: wp.array(dtype=wp.vec2d),
     cells: Cells,
@@ -64,3 +77,40 @@ def compute_worn_strain(
     strain[c] = e
     stress[c] = s
     energy[c] = wp.float64(0.5) * wp.dot(s, e) * area[c]
+
+
+@wp.kernel
+def average_over_faces(
+    offset: wp.array(dtype=wp.int32),
+    strain: wp.array(dtype=wp.vec3d),
+    stress: wp.array(dtype=wp.vec3d),
+    energy: wp.array(dtype=wp.float64),
+    area: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    face_strain: wp.array(dtype=wp.vec3d),
+    face_stress: wp.array(dtype=wp.vec3d),
+    face_energy: wp.array(dtype=wp.float64),
+    face_area: wp.array(dtype=wp.float64),
+):
+    """Energies and areas added up, strains and stresses averaged by area, 0 where a face has none.
+
+    offset: #F+1, where each face's cells begin. strain, stress, energy, area: #C. The same with face_: #F.
+    """
+    f = wp.tid() + first
+    total = wp.float64(0.0)
+    stored = wp.float64(0.0)
+    for c in range(offset[f], offset[f + 1]):
+        total += area[c]
+        stored += energy[c]
+    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    s = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if total > wp.float64(0.0):
+        for c in range(offset[f], offset[f + 1]):
+            share = area[c] / total
+            e += share * strain[c]
+            s += share * stress[c]
+    face_strain[f] = e
+    face_stress[f] = s
+    face_energy[f] = stored
+    face_area[f] = total

@@ -9,12 +9,18 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.coarsen import Coarser, coarser
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
-from warpflat.surface.topology import border_loops, components, non_manifold_edges
+from warpflat.surface.topology import (
+    border_loops,
+    components,
+    euler_characteristic,
+    non_manifold_edges,
+    non_manifold_vertices,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -126,6 +132,169 @@ def test_any_mesh_becomes_a_mesh_without_mirrored_triangles(seed: int, relief: f
     assert (signed_cell_areas(step.surface.faces[:, :3], layout[step.kept]) > 0).all()
     assert np.isfinite(step.prolongation.data).all()
     np.testing.assert_allclose(step.prolongation.sum(axis=1), 1.0, atol=1e-12)
+
+
+def jittered(side: int, *, hole: bool = False, seed: int = 0) -> Surface:
+    """A dome of irregular triangles over the unit square, with even borders; with a square hole in the middle."""
+    rng = np.random.default_rng(seed)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side)))
+    inner = (np.minimum(x, y) > 0) & (np.maximum(x, y) < 1)
+    points = np.column_stack([x, y]) + np.where(inner[:, None], rng.uniform(-0.3, 0.3, (len(x), 2)) / side, 0.0)
+    faces = Delaunay(points).simplices
+    corners = points[faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    # Delaunay leaves needles along straight borders.
+    kept = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > 0.05 / side**2
+    if hole:
+        kept &= (np.abs(corners.mean(axis=1) - 0.5) > 0.15).any(axis=1)
+    height = np.sqrt(1.0 - ((points - 0.5) ** 2).sum(axis=1))
+    return make_surface(np.column_stack([points, height]), faces[kept])
+
+
+def qualities(surface: Surface) -> FloatArray:
+    """Of its triangles: 1 where equilateral, 0 where they are flat."""
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return 4 * np.sqrt(3) * area / sum(((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a)))
+
+
+def normals(surface: Surface) -> FloatArray:
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("planned", [True, False], ids=["with a layout", "without"])
+def test_each_level_has_about_a_quarter_of_the_vertices_and_good_triangles(planned: bool):
+    surface = jittered(71)
+    while not is_coarsest(surface):
+        step = coarser(surface, flat(surface) if planned else None)
+        assert step is not None
+        assert 0.18 * len(surface.vertices) < len(step.kept) < 0.28 * len(surface.vertices)
+        surface = step.surface
+        assert qualities(surface).min() > 0.25
+        assert np.median(qualities(surface)) > 0.78
+
+
+def test_corners_and_holes_stay():
+    surface = jittered(51, hole=True)
+    corners = {tuple(place) for place in np.array([[0, 0], [0, 1], [1, 0], [1, 1]], dtype=float)}
+    steps = coarser_surfaces(surface)
+    assert len(steps) >= 2
+    for step in steps:
+        assert len(border_loops(step.surface.faces)) == 2
+        assert corners <= {tuple(place) for place in flat(step.surface)}
+
+
+def test_levels_of_a_surface_are_made_once_the_finest_first():
+    surface = jittered(51)
+    steps = coarser_surfaces(surface)
+    assert steps is coarser_surfaces(surface)
+    assert coarser_surfaces(steps[-1].surface) == ()
+    assert is_coarsest(steps[-1].surface)
+    for finer, step in zip([surface, *(step.surface for step in steps)], steps, strict=False):
+        assert not is_coarsest(finer)
+        np.testing.assert_array_equal(step.surface.vertices, finer.vertices[step.kept])
+        again = coarser(finer)
+        assert again is not None
+        np.testing.assert_array_equal(again.surface.faces, step.surface.faces)
+        assert (again.prolongation != step.prolongation).nnz == 0
+
+
+def test_levels_of_a_grid_go_down_to_fewer_vertices():
+    steps = coarser_surfaces(sheet(65, 65))
+    assert [len(step.kept) for step in steps] == [33**2, 17**2, 9**2]
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_without_a_layout_faces_lie_like_those_of_the_body(triangles: bool):
+    """A tube that is almost closed: seen from any side some of it is turned."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.9 * 2 * np.pi, 81), np.linspace(0.0, 4.0, 41))
+    flat_faces = sheet(81, 41, triangles=triangles).faces[:-1]  # without its last face it is no grid
+    surface = make_surface(np.stack([np.cos(x), np.sin(x), y], axis=-1).reshape(-1, 3), flat_faces)
+    for step in coarser_surfaces(surface):
+        outward = step.surface.vertices[step.surface.faces[:, :3]].mean(axis=1) * [1.0, 1.0, 0.0]
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        assert (np.einsum("ij,ij->i", normals(step.surface), outward) > 0.5).all()
+        assert components(step.surface.faces).max() == 0
+        assert len(border_loops(step.surface.faces)) == 1
+
+
+def test_a_layout_keeps_triangles_from_being_mirrored_in_it():
+    surface = jittered(41)
+    x, y = flat(surface).T
+    layout = np.column_stack([x, y + 0.25 * np.sin(16.0 * x)])
+    assert (signed_cell_areas(surface.faces[:, :3], layout) > 0).all()
+    heedless, heedful = coarser(surface), coarser(surface, layout)
+    assert heedless is not None
+    assert heedful is not None
+    assert (signed_cell_areas(heedless.surface.faces[:, :3], layout[heedless.kept]) <= 0).any()
+    assert (signed_cell_areas(heedful.surface.faces[:, :3], layout[heedful.kept]) > 0).all()
+
+
+@pytest.mark.parametrize("around", [3, 4, 5])
+def test_a_thin_tube_stays_one(around: int):
+    """Neighbours across it may have a third one in common, on its far side."""
+    angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, np.arange(41.0))
+    vertices = np.stack([np.cos(angle), np.sin(angle), 0.8 * height], axis=-1).reshape(-1, 3)
+    i = np.arange(len(vertices)).reshape(angle.shape)
+    j = np.roll(i, -1, axis=1)
+    lower, upper = [i[:-1], j[:-1], j[1:]], [i[:-1], j[1:], i[1:]]
+    surface = make_surface(vertices, np.vstack([np.stack(half, axis=-1).reshape(-1, 3) for half in (lower, upper)]))
+    step = coarser(surface)
+    coarse = surface if step is None else step.surface
+    assert not len(non_manifold_edges(coarse.faces))
+    assert not len(non_manifold_vertices(coarse.faces))
+    assert len(border_loops(coarse.faces)) == 2
+    assert euler_characteristic(coarse.faces) == 0
+
+
+def test_a_vertex_with_very_many_neighbours_is_no_obstacle():
+    around, rings = 60, 12
+    angle = np.tile(np.linspace(0, 2 * np.pi, around, endpoint=False), rings)
+    radius = np.repeat(np.arange(1, rings + 1), around)
+    points = np.vstack([[0.0, 0.0], np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])])
+    k = np.arange(around)
+    fan = np.column_stack([np.zeros(around, dtype=int), 1 + k, 1 + (k + 1) % around])
+    bands = []
+    for r in range(rings - 1):
+        a, b = 1 + r * around + k, 1 + r * around + (k + 1) % around
+        bands += [np.column_stack([a, a + around, b + around]), np.column_stack([a, b + around, b])]
+    surface = make_surface(np.column_stack([points, 0 * points[:, 0]]), np.vstack([fan, *bands]))
+    step = made(surface)
+    assert len(step.kept) < 0.5 * len(points)
+    assert not len(non_manifold_edges(step.surface.faces))
+    areas = signed_cell_areas(step.surface.faces[:, :3], flat(step.surface))
+    assert (areas > 0).all()
+    # Nothing overlaps, nothing is missing inside the border.
+    assert areas.sum() == pytest.approx(np.pi * rings**2, rel=0.05)
+
+
+def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch):
+    surface = jittered(61)
+    results = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("WARPFLAT_THREADS", threads)
+        results.append(made(surface))
+    one, three = results
+    np.testing.assert_array_equal(one.surface.faces, three.surface.faces)
+    np.testing.assert_array_equal(one.face_of, three.face_of)
+    assert (one.prolongation != three.prolongation).nnz == 0
+
+
+def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
+    left = sheet(9, 9, triangles=True)
+    count = len(left.vertices)
+    number = np.append(count - 1, np.arange(count, 2 * count - 1))  # its first vertex is the other one's last
+    faces = np.where(left.faces >= 0, number[left.faces], -1)
+    vertices = np.vstack([left.vertices, left.vertices[1:] + left.vertices[-1]])
+    touching = Surface(
+        vertices=vertices,
+        faces=np.vstack([left.faces, faces]).astype(np.int32),
+        input_vertices=vertices,
+        input_index=np.arange(len(vertices), dtype=np.int32),
+    )
+    assert coarser(touching) is None
 
 
 def test_what_cannot_be_made_coarser_says_so():

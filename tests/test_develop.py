@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpflat.develop import choose_datum, develop, geodesic_layout, harmonic_layout, profile_layout
+from warpflat.develop import _winds_twice, choose_datum, develop, geodesic_layout, harmonic_layout, profile_layout
 from warpflat.errors import InputError
 from warpflat.network import cells_of
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, line_from_indices, make_surface, mesh_edges, triangulate
 from warpflat.surface.cut import cut_along
+from warpflat.surface.untangle import untangle
 
 FloatArray = NDArray[np.float64]
 
@@ -84,6 +85,19 @@ def test_profiles_may_end_at_different_places():
     np.testing.assert_allclose(positions, whole[ragged.input_index], rtol=1e-12)
     assert develop(ragged, ragged.lines["centre"]).method == "profiles"
     assert mirrored(ragged, positions) == 0
+
+
+def test_profiles_go_on_past_holes():
+    """What lies beyond the second hole is reached only along the row of the first."""
+    surface = make_shape("bodice", resolution=9)
+    holes = make_surface(surface.vertices, np.delete(surface.faces, [8 * 3 + 3, 8 * 4 + 1], axis=0))
+    line = surface.lines["centre"]
+    np.testing.assert_array_equal(profile_layout(holes, line), profile_layout(surface, line))
+
+
+def test_profiles_around_a_tube_have_no_end():
+    tube = ring(0.1, 0.1, height=0.3)
+    assert profile_layout(tube, line_from_indices(tube, [24 * k for k in range(5)])) is None
 
 
 def test_a_datum_at_the_side_or_an_upside_down_one_gives_the_same_piece():
@@ -158,6 +172,28 @@ def test_the_development_of_triangles_is_by_geodesics():
     assert not development.mended
 
 
+def test_a_large_layout_is_smoothed_by_coarser_meshes_before_it_is_given_up(monkeypatch: pytest.MonkeyPatch):
+    surface = make_shape("dome", resolution=81, triangles=True)
+    datum = surface.lines["centre"]
+    exact = geodesic_layout(surface, datum)
+    edge = np.linalg.norm(exact[1] - exact[0])
+    noisy = exact + 0.25 * edge * np.random.default_rng(0).normal(size=exact.shape)
+    assert 100 < crushed_faces(surface, noisy) < 0.1 * len(surface.faces)
+    monkeypatch.setattr("warpflat.develop.geodesic_layout", lambda *_: noisy)
+    # that the faces themselves cannot be turned back
+    monkeypatch.setattr(
+        "warpflat.develop.untangle",
+        lambda surface, flat, **given: (flat, 1) if flat is noisy else untangle(surface, flat, **given),
+    )
+    development = develop(surface, datum)
+    assert development.method == "geodesic"
+    assert "smoothed by a coarser mesh" in development.notes[-1]
+    assert crushed_faces(surface, development.positions) == 0
+    assert np.linalg.norm(development.positions - exact, axis=1).max() < 2 * edge
+    monkeypatch.setattr("warpflat.develop._LARGE", len(surface.vertices))
+    assert develop(surface, datum).method == "harmonic"
+
+
 # --- the map that cannot fold
 
 
@@ -194,7 +230,16 @@ def test_whatever_the_mesh_the_first_layout_is_unfolded_and_says_how_it_came_abo
     development = develop(surface, datum)
     assert mirrored(surface, development.positions) == 0
     assert np.isfinite(development.positions).all()
-    assert (development.method == "geodesic" and not development.mended) == (not development.notes)
+    folded = crushed_faces(surface, geodesic_layout(surface, datum))
+    assert (development.notes == ()) == (folded == 0)
+    # of 400 faces more than five are too many
+    assert development.mended == (folded > 5)
+
+
+def crushed_faces(surface: Surface, positions: FloatArray) -> int:
+    cells = cells_of(surface)
+    crushed = signed_cell_areas(cells.corner, positions) * cells.weight <= 0.01 * cells.area
+    return len(np.unique(cells.face[crushed]))
 
 
 def test_a_layout_that_winds_twice_is_not_taken_for_unfolded():
@@ -207,6 +252,32 @@ def test_a_layout_that_winds_twice_is_not_taken_for_unfolded():
     surface = make_surface(np.stack([x, y, z], axis=-1).reshape(-1, 3), quads, lines={"inside": i[:, 0]})
     development = develop(surface, surface.lines["inside"])
     assert mirrored(surface, development.positions) == 0
+
+
+def fan(turns: float, *, closed: bool) -> tuple[Surface, FloatArray]:
+    """Twelve triangles around vertex 0, and a layout in which they go around it so many times."""
+    rim = 2 * np.pi * np.arange(12 if closed else 13) / 12
+    points = np.column_stack([np.cos(rim), np.sin(rim), 0.2 * np.cos(3 * rim)])
+    if not closed:
+        points[-1] += [0.0, -0.1, 0.5]
+    k = np.arange(1, len(rim) + 1)
+    faces = np.column_stack([np.zeros_like(k), k, np.roll(k, -1)])[: 12 if closed else -1]
+    surface = make_surface(np.vstack([[[0.0, 0.0, 0.1]], points]), faces)
+    return surface, np.vstack([[[0.0, 0.0]], np.column_stack([np.cos(turns * rim + 0.1), np.sin(turns * rim + 0.1)])])
+
+
+@pytest.mark.parametrize(("turns", "closed", "twice"), [(1, True, False), (2, True, True)])
+def test_faces_that_go_around_a_vertex_twice_are_found(turns: float, closed: bool, twice: bool):
+    surface, positions = fan(turns, closed=closed)
+    assert mirrored(surface, positions) == 0
+    assert _winds_twice(surface, cells_of(surface), positions) == twice
+
+
+@pytest.mark.parametrize("turns", [0.9, 1.05, 1.6, 2.4])
+def test_faces_that_go_around_a_border_vertex_by_more_than_a_turn_are_found(turns: float):
+    surface, positions = fan(turns, closed=False)
+    assert mirrored(surface, positions) == 0
+    assert _winds_twice(surface, cells_of(surface), positions) == (turns > 1)
 
 
 # --- rings and tubes

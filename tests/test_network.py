@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import warp as wp
@@ -9,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.kernels.springs import compute_spring_energy
 
 from warpflat.fabric import Fabric
-from warpflat.network import SpringNetwork, cells_of, grain_axes, springs_of, vertex_masses
+from warpflat.network import SpringNetwork, cells_of, grain_axes, springs_of
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, make_surface
 
@@ -49,11 +51,10 @@ def equilateral(rings: int, side: float) -> Surface:
 
 
 def spring_energy(network: SpringNetwork, positions: NDArray[np.float64]) -> float:
-    energy = wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu")
+    energy, pull = (wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu") for _ in range(2))
     at = wp.array(positions, dtype=wp.vec2d, device="cpu")
-    wp.launch(
-        compute_spring_energy, dim=network.vertex_count, inputs=[at, network.springs, 0], outputs=[energy], device="cpu"
-    )
+    count = network.vertex_count
+    wp.launch(compute_spring_energy, dim=count, inputs=[at, network.springs, 0], outputs=[energy, pull], device="cpu")
     return float(energy.numpy().sum())
 
 
@@ -179,9 +180,83 @@ def test_every_spring_once_with_positive_stiffness_and_the_sum_around_each_verte
 def test_masses_add_up_to_the_cloth_and_none_is_zero(triangles: bool):
     surface = make_shape("dome", resolution=9, triangles=triangles)
     cells = cells_of(surface)
-    mass = vertex_masses(cells, cloth(), len(surface.vertices))
+    mass = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu").mass.numpy()
     assert (mass > 0).all()
     assert mass.sum() == pytest.approx(0.15 * cells.area.sum(), rel=1e-12)
+    shares = np.bincount(cells.corner.ravel(), np.repeat(0.15 * cells.area / 3.0, 3))
+    np.testing.assert_allclose(mass, shares, rtol=1e-12)
+
+
+def copied(arrays):
+    """The same arrays in another place, so that nobody knows them for the surface's own."""
+    return replace(arrays, **{name: np.array(v) for name, v in vars(arrays).items() if isinstance(v, np.ndarray)})
+
+
+@pytest.mark.parametrize("split", [0, 7, 25])
+def test_networks_of_one_surface_share_what_no_fabric_changes(split: int):
+    surface = sheet(5, 5, 0.01, 0.012, split=split)
+    flat = surface.vertices[:, :2]
+    one = SpringNetwork.build(surface, cloth(), flat, device="cpu")
+    other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device="cpu")
+    for struct, names in (
+        ("springs", ("offset", "neighbor", "rest_length")),
+        ("cells", ("corner", "edges", "offset", "slot")),
+    ):
+        for name in names:
+            assert getattr(getattr(one, struct), name).ptr == getattr(getattr(other, struct), name).ptr, name
+    assert not np.allclose(one.spring_arrays.stiffness, other.spring_arrays.stiffness)
+    for shared in (one.spring_arrays.rest_length, one.spring_arrays.ends, one.cell_arrays.edges):
+        with pytest.raises(ValueError, match="read-only"):
+            shared[:] = 0
+
+
+@pytest.mark.parametrize("split", [0, 7, 25])
+def test_a_network_of_other_arrays_lists_them_as_the_surfaces_own(split: int):
+    surface = sheet(5, 5, 0.01, 0.012, split=split)
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    other = replace(network, spring_arrays=copied(network.spring_arrays), cell_arrays=copied(network.cell_arrays))
+    assert other.springs.neighbor.ptr != network.springs.neighbor.ptr
+    for struct, names in (
+        ("springs", ("offset", "neighbor", "rest_length", "stiffness")),
+        ("cells", ("corner", "edges", "weight", "offset", "slot", "slack")),
+    ):
+        for name in names:
+            one, two = getattr(getattr(network, struct), name), getattr(getattr(other, struct), name)
+            np.testing.assert_array_equal(one.numpy(), two.numpy(), err_msg=name)
+    np.testing.assert_array_equal(network.mass.numpy(), other.mass.numpy())
+
+
+def test_a_network_of_longer_springs_and_larger_cells_has_these():
+    surface = sheet(5, 5, 0.01, 0.012, split=7)
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    s, c = network.spring_arrays, network.cell_arrays
+    larger = replace(
+        network,
+        spring_arrays=replace(s, rest_length=1.5 * s.rest_length),
+        cell_arrays=replace(c, edges=1.5 * c.edges, area=2.25 * c.area),
+    )
+    for name, factor in (("rest_length", 1.5), ("stiffness", 1.0)):
+        one, two = (getattr(n.springs, name).numpy() for n in (network, larger))
+        np.testing.assert_allclose(two, factor * one, rtol=1e-14, err_msg=name)
+    np.testing.assert_allclose(larger.cells.edges.numpy(), 1.5 * network.cells.edges.numpy(), rtol=1e-14)
+    np.testing.assert_allclose(larger.mass.numpy(), 2.25 * network.mass.numpy(), rtol=1e-14)
+
+
+def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
+    surface = sheet(4, 3, 0.01, 0.01, split=5)
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    before, lists = network.spring_arrays.stiffness.copy(), network.springs.stiffness.ptr
+    wished = np.random.default_rng(2).uniform(1.0, 9.0, network.spring_count)
+    network.weigh(wished)
+    assert network.springs.stiffness.ptr == lists
+    np.testing.assert_array_equal(network.spring_arrays.stiffness, before)
+    offset, neighbor = network.springs.offset.numpy(), network.springs.neighbor.numpy()
+    between = {(int(i), int(j)): k for (i, j), k in zip(network.spring_arrays.ends, wished, strict=True)}
+    for i in range(network.vertex_count):
+        there, k_ij = (a[offset[i] : offset[i + 1]] for a in (neighbor, network.springs.stiffness.numpy()))
+        assert (np.diff(there) > 0).all()
+        assert k_ij.tolist() == [between.get((i, int(j)), between.get((int(j), i))) for j in there]
+        assert network.spring_stiffness.numpy()[i] == pytest.approx(k_ij.sum() + 0.5 * k_ij.max(), rel=1e-14)
 
 
 def test_the_guard_begins_where_the_shear_springs_lose_their_hold():

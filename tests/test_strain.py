@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from warpflat.fabric import Fabric
+from warpflat.membrane import Model
 from warpflat.network import SpringNetwork
 from warpflat.shapes import make_shape
-from warpflat.strain import layout_errors, signed_cell_areas, worn_strain
+from warpflat.strain import layout_errors, signed_cell_areas, strain_energy, worn_strain
 from warpflat.surface import Surface, make_surface
 
 CLOTH = Fabric(
@@ -51,6 +52,34 @@ def test_uniform_strain_is_exact_on_any_mesh(triangles: bool):
     np.testing.assert_allclose(worn.energy_density, 0.5 * np.dot(stress, e), rtol=1e-12)
     assert worn.area.sum() == pytest.approx(1 / np.linalg.det(to_body), rel=1e-12)
     assert worn.energy.sum() == pytest.approx(0.5 * np.dot(stress, e) * worn.area.sum(), rel=1e-12)
+
+
+@pytest.mark.parametrize("model", ["springs", "membrane"])
+def test_faces_have_the_mean_of_their_cells_by_area_and_their_energy_adds_up(model: Model):
+    flat = square(triangles=False)
+    bent = flat.vertices + np.column_stack([np.zeros((9, 2)), 0.2 * np.sin(3 * flat.vertices[:, 0])])
+    surface = make_surface(bent, [[0, 1, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
+    positions = bent[:, :2] * [1.0, 1.05] + 0.03 * np.random.default_rng(2).normal(size=(9, 2))
+    network = SpringNetwork.build(surface, CLOTH, positions, grain_angle=20.0, device="cpu", model=model)
+    worn = worn_strain(network, positions)
+    assert strain_energy(network, positions) == pytest.approx(worn.energy.sum(), rel=1e-12)
+    assert worn.energy.sum() > 0
+    cells = network.cell_arrays
+    area = cells.weight * signed_cell_areas(cells.corner, positions)
+    for face in range(len(surface.faces)):
+        of_face = cells.face == face
+        each = []
+        for corner in cells.corner[of_face]:
+            # alone, the cell is a triangle
+            single = make_surface(surface.vertices[corner], [[0, 1, 2]])
+            lone = SpringNetwork.build(single, CLOTH, positions[corner], grain_angle=20.0, device="cpu", model=model)
+            each.append(worn_strain(lone, positions[corner]))
+        share = area[of_face] / area[of_face].sum()
+        assert worn.area[face] == pytest.approx(area[of_face].sum(), rel=1e-12)
+        np.testing.assert_allclose(worn.strain[face], share @ [lone.strain[0] for lone in each], rtol=1e-9, atol=1e-12)
+        np.testing.assert_allclose(worn.stress[face], share @ [lone.stress[0] for lone in each], rtol=1e-9, atol=1e-9)
+        density = share @ [lone.energy_density[0] for lone in each]
+        assert worn.energy_density[face] == pytest.approx(density, rel=1e-9)
 
 
 def test_the_grain_turns_the_axes():

@@ -15,7 +15,7 @@ from warpflat._version import __version__
 if TYPE_CHECKING:
     from warpflat.errors import InputError
     from warpflat.fabric import Fabric, find_fabric, load_library
-    from warpflat.flattening import Flattening, Progress, flatten
+    from warpflat.flattening import Flattening, Progress, change_fabric, flatten
     from warpflat.relax import RelaxOptions
     from warpflat.surface import Surface, make_surface, read_surface
 
@@ -31,6 +31,7 @@ _HOME = {
     "Progress": "flattening",
     "RelaxOptions": "relax",
     "Surface": "surface",
+    "change_fabric": "flattening",
     "find_fabric": "fabric",
     "flatten": "flattening",
     "load_library": "fabric",
@@ -46,6 +47,7 @@ __all__ = [
     "RelaxOptions",
     "Surface",
     "__version__",
+    "change_fabric",
     "find_fabric",
     "flatten",
     "load_library",

@@ -1,34 +1,49 @@
 """One coarser level of a piece: a quarter of its vertices, faces between them, and how layouts go between the two.
 
 The vertices of the coarser level are vertices of the finer one. A rectangular grid of quads keeps every second row and column.
-Any other mesh loses vertices by edges that collapse, an independent set of them at a time, until a quarter is left: a vertex vanishes
-into the neighbour that leaves the best triangles, on the border only along the border. So corners, holes and cracks stay what they
-are: two sides of a crack have different vertices, and nothing joins them.
+Any other mesh loses vertices by edges that collapse, an independent set of them at a time, until about a quarter is left: a vertex
+vanishes into the neighbour that leaves the best triangles, on the border only along the border. So corners, holes and cracks stay
+what they are: two sides of a crack have different vertices, and nothing joins them.
+
+In a pass all vertices look for the neighbour that is best, on all cores; then one goes after the other, while the rings of neighbours
+that stay are kept up to date. The triangles are made at the end, of those that have three different corners left.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, kron
+from scipy.sparse import csr_array, eye, vstack
 
-from warpflat.kernels.coarsen import Ring, find_border, find_targets, place, select
-from warpflat.surface.mesh import Surface
+from warpflat.carry import GridCarry
+from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
+from warpflat.launching import record
+from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import HalfEdges, half_edges, triangulate
 
-__all__ = ["Coarser", "coarser"]
+__all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# Passes of collapses to one level, rounds in which a pass chooses its vertices, and the least share of vertices that a level
-# must lose to be worth having.
+# A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
+# piece.
+_COARSEST = 250
+_COARSEST_GRID = 100
+# Passes of collapses to one level, and the least share of vertices that a level must lose to be worth having.
 _PASSES = 10
-_ROUNDS = 3
 _LEAST_GAIN = 0.3
+# A pass takes first the vertices that leave triangles of this quality (1: equilateral), then the others down to the least; where
+# that does not make them fewer, worse ones.
+_GOOD = 0.6
+_LEAST_QUALITIES = (0.3, 0.15)
+# Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
+_ROOM = 16
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,23 +55,49 @@ class Coarser:
         kept: #C, the finer level's vertices that it has.
         prolongation: #V by #C, rows add up to 1.
         face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
+        smooth_carry: of a grid, what carries layouts up by cubics.
     """
 
     surface: Surface
     kept: IntArray
     prolongation: csr_array
     face_of: IntArray
+    smooth_carry: GridCarry | None = None
+
+    @cached_property
+    def restriction(self) -> csr_array:
+        """#C by #V, the prolongation's transpose."""
+        return csr_array(self.prolongation.T.tocsr())
 
 
-def coarser(surface: Surface, layout: FloatArray) -> Coarser | None:
+def is_coarsest(surface: Surface) -> bool:
+    """Whether a level is small enough to have no coarser one."""
+    return len(surface.vertices) <= (_COARSEST_GRID if surface.is_quad.all() else _COARSEST)
+
+
+def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | None:
     """The next coarser level, or None where none is to be had.
 
     Args:
-        surface: the finer one.
-        layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either.
+        surface: the finer one, of any size.
+        layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either. Without,
+            they are good on the body only.
     """
     grid = _rows_and_columns(surface)
     return _every_second(surface, grid) if grid is not None else _collapsed(surface, layout)
+
+
+@once_per_surface
+def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
+    """All coarser levels of a surface, good on the body, the finest first, down to the coarsest; made once for each surface."""
+    steps: list[Coarser] = []
+    while not is_coarsest(surface):
+        step = coarser(surface)
+        if step is None:
+            break
+        steps.append(step)
+        surface = step.surface
+    return tuple(steps)
 
 
 def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surface:
@@ -83,8 +124,9 @@ def _rows_and_columns(surface: Surface) -> IntArray | None:
     if columns >= 2 and count % columns == 0:
         # Most grids are numbered row by row, which is seen at once.
         grid = np.arange(count, dtype=np.int32).reshape(-1, columns)
-        blocks = np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, :-1], grid[1:, 1:]], axis=-1).reshape(-1, 4)
-        if blocks.shape == faces.shape and np.array_equal(np.sort(faces, axis=1), blocks):
+        corner = faces[0] - faces[0].min()
+        in_order = sorted(corner.tolist()) == [0, 1, columns, columns + 1]
+        if in_order and np.array_equal(faces, grid[:-1, :-1].reshape(-1, 1) + corner):
             return grid
     he = half_edges(faces)
     twin = _twins(he)
@@ -140,18 +182,23 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
         return None
     keep = [_second(rows), _second(columns)]
     kept = grid[np.ix_(*keep)]
-    number = np.arange(kept.size).reshape(kept.shape)
+    number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
-    weights = kron(_between(rows, keep[0]), _between(columns, keep[1]), format="csr")
-    back = np.empty(grid.size, dtype=np.int64)
-    back[grid.ravel()] = np.arange(grid.size)
-    prolongation = csr_array(weights)[back]
-    first = grid[keep[0][:-1]][:, keep[1][:-1]].ravel()
+    # Of each vertex the four kept ones around it, two rows by two columns.
+    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
+    parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
+    for k, (i, j) in enumerate(np.ndindex(2, 2)):
+        parents[grid, k] = np.add.outer(row[:, i] * kept.shape[1], column[:, j])
+        weights[grid, k] = np.multiply.outer(row_share[:, i], column_share[:, j])
+    offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
+    prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, kept.size))
+    prolongation.eliminate_zeros()
     return Coarser(
         surface=_part(surface, kept.ravel(), faces),
-        kept=np.ascontiguousarray(kept.ravel()),
-        prolongation=csr_array(prolongation),
-        face_of=_some_face(surface, first),
+        kept=kept.ravel(),
+        prolongation=prolongation,
+        face_of=_some_face(surface, kept[:-1, :-1].ravel()),
+        smooth_carry=GridCarry(grid, keep[0], keep[1]),
     )
 
 
@@ -163,120 +210,106 @@ def _second(count: int) -> IntArray:
     return keep.astype(np.int32)
 
 
-def _between(count: int, keep: IntArray) -> csr_array:
-    """#count by #keep, linear interpolation by index."""
-    place = np.searchsorted(keep, np.arange(count), side="right") - 1
-    place = np.minimum(place, len(keep) - 2)
-    share = (np.arange(count) - keep[place]) / (keep[place + 1] - keep[place])
-    rows = np.repeat(np.arange(count), 2)
-    matrix = csr_array(
-        (np.column_stack([1.0 - share, share]).ravel(), (rows, np.column_stack([place, place + 1]).ravel())),
-        shape=(count, len(keep)),
-    )
-    matrix.eliminate_zeros()
-    return matrix
+def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
+    """#count by 2, of each index the places in `keep` before and after, and their shares, linear by index."""
+    index = np.arange(count, dtype=np.int32)
+    place = np.minimum(index // 2, len(keep) - 2)
+    share = (index - keep[place]) / (keep[place + 1] - keep[place])
+    return np.column_stack([place, place + 1]), np.column_stack([1.0 - share, share])
 
 
 def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
-    """For each vertex a face that has it."""
-    used = surface.faces >= 0
-    face = np.zeros(len(surface.vertices), dtype=np.int32)
-    face[surface.faces[used]] = np.repeat(np.arange(len(surface.faces), dtype=np.int32), used.sum(axis=1))
+    """For each of a grid's vertices a face that has it."""
+    face = np.empty(len(surface.vertices), dtype=np.int32)
+    face[surface.faces] = np.arange(len(surface.faces), dtype=np.int32)[:, None]
     return face[vertices]
 
 
 # --- any other mesh
 
 
-def _collapsed(surface: Surface, layout: FloatArray) -> Coarser | None:
+def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     count = len(surface.vertices)
-    triangles, face = triangulate(surface.faces)
-    triangles = np.ascontiguousarray(triangles[:, :3], dtype=np.int32)
-    live = np.arange(count)
-    steps: list[csr_array] = []
-    for _ in range(_PASSES):
-        if len(live) <= 0.27 * count:
-            break
-        passed = _pass(surface.vertices[live], layout[live], triangles)
-        if passed is None:
-            break
-        triangles, kept_faces, kept, weights = passed
-        face, live = face[kept_faces], live[kept]
-        steps.append(weights)
-    if len(live) > (1.0 - _LEAST_GAIN) * count:
+    triangles, face = surface.faces[:, :3], np.arange(len(surface.faces), dtype=np.int32)
+    if surface.is_quad.any():
+        triangles, face = triangulate(surface.faces)
+    ring = _ring_of(surface.vertices, layout, triangles)
+    if ring.degree.numpy().min() < 0:
         return None
-    prolongation = steps[0]
-    for weights in steps[1:]:
-        prolongation = prolongation @ weights
-    return Coarser(
-        surface=_part(surface, live.astype(np.int32), np.column_stack([triangles, np.full(len(triangles), -1)])),
-        kept=live.astype(np.int32),
-        prolongation=csr_array(prolongation),
-        face_of=np.asarray(face, dtype=np.int32),
-    )
-
-
-def _pass(
-    vertices: FloatArray, layout: FloatArray, triangles: IntArray
-) -> tuple[IntArray, NDArray[np.int64], NDArray[np.int64], csr_array] | None:
-    """One independent set of collapses: triangles left (new numbers), which they were, vertices left, and the weights."""
-    count = len(vertices)
-    ring = _ring_of(vertices, layout, triangles)
-    target = wp.empty(count, dtype=wp.int32, device="cpu")
-    wp.launch(find_targets, dim=count, inputs=[ring, 0], outputs=[target], device="cpu")
-    state, other = wp.zeros(count, dtype=wp.int32, device="cpu"), wp.zeros(count, dtype=wp.int32, device="cpu")
-    for _ in range(_ROUNDS):
-        wp.launch(select, dim=count, inputs=[ring, target, state, 0], outputs=[other], device="cpu")
-        state, other = other, state
-    chosen = np.flatnonzero(state.numpy() == 1).astype(np.int32)
-    if len(chosen) < 0.02 * count:
+    target, blocked, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
+    left = wp.zeros(count, dtype=wp.float64, device="cpu")
+    remain, number = count, 0
+    for least in _LEAST_QUALITIES:
+        look = record(
+            find_targets, dim=count, inputs=[ring, gone, least], outputs=[target, left, blocked], device="cpu"
+        )
+        lost = remain
+        while remain > 0.27 * count and lost >= 0.02 * remain and number < _PASSES:
+            number += 1
+            look.launch()
+            wp.launch(
+                collapse, dim=1, inputs=[ring, target, left, _GOOD, number], outputs=[blocked, gone], device="cpu"
+            )
+            lost = remain - (count - int(np.count_nonzero(gone.numpy())))
+            remain -= lost
+    if remain > (1.0 - _LEAST_GAIN) * count:
         return None
-    parent = wp.empty(len(chosen), dtype=wp.vec3i, device="cpu")
-    weight = wp.empty(len(chosen), dtype=wp.vec3d, device="cpu")
-    wp.launch(
-        place,
-        dim=len(chosen),
-        inputs=[ring, target, wp.array(chosen, dtype=wp.int32, device="cpu"), 0],
-        outputs=[parent, weight],
-        device="cpu",
-    )
-    into = np.arange(count)
-    into[chosen] = target.numpy()[chosen]
-    stays = np.ones(count, dtype=bool)
-    stays[chosen] = False
-    kept = np.flatnonzero(stays)
-    number = np.full(count, -1, dtype=np.int64)
-    number[kept] = np.arange(len(kept))
-    corners = into[triangles]
+    parent = wp.empty(count, dtype=wp.vec3i, device="cpu")
+    weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
+    record(place, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
+    kept = np.flatnonzero(gone.numpy() == 0).astype(np.int32)
+    corners = _ends(gone.numpy(), parent.numpy()[:, 0])[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
-    left = number[corners[whole]].astype(np.int32)
-    if not _is_manifold(left, len(kept)):
-        return None
-    rows = np.concatenate([kept, np.repeat(chosen, 3)])
-    columns = np.concatenate([np.arange(len(kept)), number[parent.numpy().ravel()]])
-    values = np.concatenate([np.ones(len(kept)), weight.numpy().ravel()])
-    weights = csr_array((values, (rows, columns)), shape=(count, len(kept)))
-    return left, np.flatnonzero(whole), kept, weights
+    corners = corners[whole]
+    return Coarser(
+        surface=_part(surface, kept, np.column_stack([corners, np.full(len(corners), -1)])),
+        kept=kept,
+        prolongation=_prolongation(gone.numpy(), parent.numpy(), weight.numpy()),
+        face_of=face[whole],
+    )
 
 
-def _ring_of(vertices: FloatArray, layout: FloatArray, triangles: IntArray) -> Ring:
+def _ends(gone: IntArray, into: IntArray) -> IntArray:
+    """#V, the number among those kept of where each has vanished in the end. into: #V, where at first, in pass `gone`."""
+    end = np.where(gone == 0, np.arange(len(gone), dtype=np.int32), into)
+    for _ in range(int(gone.max()).bit_length()):
+        end = end[end]
+    return (np.cumsum(gone == 0, dtype=np.int32) - 1)[end]
+
+
+def _prolongation(gone: IntArray, parent: IntArray, weight: FloatArray) -> csr_array:
+    """#V by #C: the row of a vertex that is gone is the sum of its parents' rows by its weights; those that went last come first,
+    since parents stay longer."""
+    last = int(gone.max())
+    order = np.argsort(np.where(gone == 0, 0, last + 1 - gone).astype(np.int8), kind="stable").astype(np.int32)
+    rank = np.empty_like(order)
+    rank[order] = np.arange(len(order), dtype=np.int32)
+    ends = np.cumsum(np.bincount(gone, minlength=last + 1)[[0, *range(last, 0, -1)]])
+    rows = csr_array(eye(ends[0], format="csr"))
+    for begin, end in pairwise(ends.tolist()):
+        which = order[begin:end]
+        offset = np.arange(0, 3 * len(which) + 1, 3, dtype=np.int32)
+        step = csr_array((weight[which].ravel(), rank[parent[which]].ravel(), offset), shape=(len(which), begin))
+        step.eliminate_zeros()
+        rows = vstack([rows, step @ rows], format="csr")
+    return csr_array(rows[rank])
+
+
+def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArray) -> Ring:
     count = len(vertices)
     ring = Ring()
     ring.vertices = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3d, device="cpu")
-    ring.layout = wp.array(np.ascontiguousarray(layout), dtype=wp.vec2d, device="cpu")
-    ring.corner = wp.array(triangles, dtype=wp.vec3i, device="cpu")
+    ring.layout = wp.array([] if layout is None else np.ascontiguousarray(layout), dtype=wp.vec2d, device="cpu")
     offset = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(triangles.ravel(), minlength=count), out=offset[1:])
+    np.cumsum(np.maximum(np.bincount(triangles.ravel(), minlength=count) + 2, _ROOM), out=offset[1:])
     ring.offset = wp.array(offset, dtype=wp.int32, device="cpu")
-    slot = np.argsort(triangles.ravel(), kind="stable").astype(np.int32)
-    ring.slot = wp.array(slot, dtype=wp.int32, device="cpu")
-    before, after = wp.empty(count, dtype=wp.int32, device="cpu"), wp.empty(count, dtype=wp.int32, device="cpu")
-    wp.launch(find_border, dim=count, inputs=[ring, 0], outputs=[before, after], device="cpu")
-    ring.before, ring.after = before, after
+    ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
+    ring.neighbor = wp.empty(int(offset[-1]), dtype=wp.int32, device="cpu")
+    side = wp.empty(int(offset[-1]), dtype=wp.vec2i, device="cpu")
+    corners = wp.array(np.ascontiguousarray(triangles), dtype=wp.vec3i, device="cpu")
+    wp.launch(sort_corners, dim=1, inputs=[corners, ring.offset], outputs=[ring.degree, side], device="cpu")
+    order = record(
+        order_rings, dim=count, inputs=[ring.offset, side], outputs=[ring.degree, ring.neighbor], device="cpu"
+    )
+    order.launch()
     return ring
-
-
-def _is_manifold(triangles: IntArray, count: int) -> bool:
-    """Whether no edge is run through twice in one direction."""
-    keys = np.sort((triangles.astype(np.int64) * count + np.roll(triangles, -1, axis=1)).ravel())
-    return not (keys[1:] == keys[:-1]).any()

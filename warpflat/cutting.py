@@ -21,7 +21,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.flattening import Flattening, Progress, relax_cut
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
-from warpflat.strain import worn_strain
+from warpflat.strain import strain_energy
 from warpflat.surface.cut import Cut, Seam, cut_along_many
 from warpflat.surface.dart import dart_measure
 from warpflat.surface.mesh import Surface
@@ -430,7 +430,7 @@ def _part(result: Flattening, piece: Piece) -> Flattening:
         result.stages[-1],
         spring_energy_j=energies.spring,
         guard_energy_j=energies.guard,
-        strain_energy_j=float(worn_strain(network, positions).energy.sum()),
+        strain_energy_j=strain_energy(network, positions),
     )
     return replace(
         result,

@@ -1,7 +1,8 @@
 """Development: the first, unrelaxed layout of a piece, from a datum line (paper, section IV.B).
 
 Three ways, the first that leaves no face mirrored: along the profiles of a quad grid, by geodesic distance from the datum
-line, and, where both fold, a harmonic map onto a disk, which cannot. Cracks are closed for the first two, where that helps.
+line, and, where both fold too much to be mended, a harmonic map onto a disk, which cannot. Cracks are closed for the first two,
+where that helps.
 """
 
 from __future__ import annotations
@@ -12,21 +13,25 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.coarsen import Coarser, coarser_surfaces
 from warpflat.errors import InputError
 from warpflat.network import CellArrays, cells_of
 from warpflat.strain import signed_cell_areas
 from warpflat.surface.geodesic import signed_distance_and_station
 from warpflat.surface.lines import line_between, line_on_plane
 from warpflat.surface.mesh import Surface
+from warpflat.surface.paths import chain_positions
 from warpflat.surface.topology import (
     border_loops,
     euler_characteristic,
     half_edges,
+    half_edges_of,
     non_manifold_vertices,
     places_of,
     triangulate,
 )
 from warpflat.surface.untangle import untangle
+from warpflat.surface.vectors import norm, points_at
 
 __all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmonic_layout", "profile_layout"]
 
@@ -37,6 +42,11 @@ IntArray = NDArray[np.int32]
 _LEAST_AREA = 0.01
 # Up to this share of the faces may be mirrored for a development to be mended rather than given up.
 _FEW = 0.1
+# Up to so many, or this share, turned back do not matter to the directions of the whole.
+_MENDED = 5
+_MENDED_SHARE = 1e-3
+# Pieces of more vertices than this are smoothed by coarser meshes before they are given up.
+_LARGE = 5000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -46,7 +56,7 @@ class Development:
     Attributes:
         positions: #V by 2 [m], the datum along +y.
         method: "profiles", "geodesic" or "harmonic".
-        mended: whether faces had to be turned back, so that it says little of directions.
+        mended: whether so many faces had to be turned back that it says little of directions.
         notes: why a way was not taken, one sentence each.
     """
 
@@ -111,26 +121,50 @@ def develop(surface: Surface, datum: IntArray) -> Development:
         whole, index = closed
         for method, layout in ways:
             positions = layout(whole, index[datum])
-            if positions is not None and _mirrored(cells, positions[index]) == 0:
+            if positions is not None and len(_mirrored(cells, positions[index])) == 0:
                 notes.append("developed with its cracks closed")
                 return Development(positions=positions[index], method=method, notes=tuple(notes))
     for method, layout in ways:
         positions = layout(surface, datum)
         if positions is None:
             continue
-        folded = _mirrored(cells, positions)
+        mirrored = _mirrored(cells, positions)
+        folded = len(np.unique(cells.face[mirrored]))
         if folded == 0:
             return Development(positions=positions, method=method, notes=tuple(notes))
         notes.append(f"the {method} development mirrors or crushes {folded:,} of {len(surface.faces):,} faces")
-        if folded <= _FEW * len(surface.faces):
-            mended, left = untangle(surface, positions, least_area=_LEAST_AREA)
-            if left == 0 and not _winds_twice(cells, mended):
-                notes.append("they were turned back, with a few faces around them")
-                return Development(positions=mended, method=method, mended=True, notes=tuple(notes))
+        if folded > _FEW * len(surface.faces):
+            continue
+        for start in _smoother(surface, positions):
+            mirrored = _mirrored(cells, start)
+            mended, left = untangle(surface, start, least_area=_LEAST_AREA, suspects=mirrored)
+            if left == 0 and not _winds_twice(surface, cells, mended):
+                smoothed = "" if start is positions else "smoothed by a coarser mesh and "
+                notes.append(f"they were {smoothed}turned back, with a few faces around them")
+                turned = len(np.unique(cells.face[mirrored]))
+                much = turned > max(_MENDED, _MENDED_SHARE * len(surface.faces))
+                return Development(positions=mended, method=method, mended=much, notes=tuple(notes))
     _refuse_tubes(surface)
     positions = _upright(harmonic_layout(surface), datum)
     notes.append("started from a harmonic map onto a disk instead, which cannot fold")
     return Development(positions=positions, method="harmonic", mended=True, notes=tuple(notes))
+
+
+def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
+    """A layout, and on a large piece the same as it goes between the vertices of coarser and coarser meshes.
+
+    From neighbour to neighbour stations waver, by a larger share of an edge the finer the mesh is; that may fold many small faces.
+    """
+    yield positions
+    if len(surface.vertices) > _LARGE:
+        kept, steps = positions, list[Coarser]()
+        for step in coarser_surfaces(surface):
+            kept = kept[step.kept]
+            steps.insert(0, step)
+            smooth = kept
+            for way_up in steps:
+                smooth = way_up.prolongation @ smooth
+            yield smooth
 
 
 def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] | None:
@@ -139,41 +173,62 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
     that do not belong together.
     """
-    lowest, inverse = np.unique(places_of(surface.vertices, surface.faces), return_inverse=True)
-    index = inverse.reshape(-1).astype(np.int32)
-    if len(lowest) == len(surface.vertices) or len(np.unique(index[datum])) < len(datum):
+    place = places_of(surface.vertices, surface.faces, sides=half_edges_of(surface))
+    here = np.arange(len(place))
+    moves = place != here
+    if not moves.any() or len(np.unique(place[datum])) < len(datum):
         return None
-    faces = np.where(surface.faces >= 0, index[surface.faces], np.int32(-1))
-    he = half_edges(faces)
-    runs_once = len(np.unique(he.tail * np.int64(len(lowest)) + he.head)) == len(he.tail)
-    if not runs_once or len(non_manifold_vertices(faces)):
+    joined = np.zeros(len(place), dtype=bool)
+    joined[place[moves]] = joined[moves] = True
+    # Elsewhere nothing changes, so faces around these tell everything.
+    before = surface.faces[joined[surface.faces].any(axis=1)]
+    after = np.where(before >= 0, place[before], -1).astype(np.int32)
+    he = half_edges(after)
+    runs_once = len(np.unique(he.tail * np.int64(len(place)) + he.head)) == len(he.tail)
+    if not runs_once or joined[non_manifold_vertices(after)].any():
         return None
-    if euler_characteristic(faces) < euler_characteristic(surface.faces):
+    if euler_characteristic(after) < euler_characteristic(before):
         return None
+    kept = here[~moves]
+    number = np.empty(len(place), dtype=np.int32)
+    number[kept] = np.arange(len(kept))
+    index = number[place]
     whole = replace(
-        surface, vertices=surface.vertices[lowest], faces=faces, lines={}, input_index=surface.input_index[lowest]
+        surface,
+        vertices=surface.vertices[kept],
+        faces=np.where(surface.faces >= 0, index[surface.faces], np.int32(-1)),
+        lines={},
+        input_index=surface.input_index[kept],
     )
     return whole, index
 
 
-def _mirrored(cells: CellArrays, positions: FloatArray) -> int:
-    body = cells.area / cells.weight
-    return len(np.unique(cells.face[signed_cell_areas(cells.corner, positions) <= _LEAST_AREA * body]))
+def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
+    """The cells that are mirrored or as good as that."""
+    return np.flatnonzero(signed_cell_areas(cells.corner, positions) * cells.weight <= _LEAST_AREA * cells.area)
 
 
-def _winds_twice(cells: CellArrays, positions: FloatArray) -> bool:
+def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
     """Whether the faces go around some inner vertex more than once, or around a border vertex by more than a full turn.
 
     Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
     """
-    p = positions[cells.corner]
-    whole = cells.weight == 1.0
+    he = half_edges_of(surface)
+    # Around an inner vertex, once is one corner through which a ray to the right passes.
+    in_question = np.zeros(len(positions), dtype=bool)
+    in_question[he.edges[he.count == 1]] = True
+    y = positions[:, 1][cells.corner]
+    ahead, behind = np.roll(y, -1, axis=1) - y, np.roll(y, 1, axis=1) - y
+    whole = np.column_stack([cells.weight == 1.0, np.ones(len(y), dtype=bool), cells.weight == 1.0])
+    passed = cells.corner[whole & (ahead < 0) & (behind >= 0)]
+    in_question |= np.bincount(passed, minlength=len(positions)) > 1
     turn = np.zeros(len(positions))
     for k in range(3):
-        u, v = p[:, (k + 1) % 3] - p[:, k], p[:, (k + 2) % 3] - p[:, k]
+        rows = np.flatnonzero(in_question[cells.corner[:, k]] & whole[:, k])
+        p = positions[np.roll(cells.corner[rows], -k, axis=1)]
+        u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
         angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
-        counts = whole | (k == 1)
-        turn += np.bincount(cells.corner[counts, k], angle[counts], minlength=len(turn))
+        turn += np.bincount(cells.corner[rows, k], angle, minlength=len(turn))
     return bool((turn > 2 * np.pi + 1e-6).any())
 
 
@@ -188,57 +243,67 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """
     if not surface.is_quad.all() or datum[0] == datum[-1]:
         return None
-    steps = np.linalg.norm(np.diff(surface.vertices[datum], axis=0), axis=1)
-    station = np.concatenate([[0.0], np.cumsum(steps)])
+    station = chain_positions(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
-    for side in (1.0, -1.0):
-        x = np.zeros(len(datum))
-        before = datum
-        for line in _grid_lines(surface, datum if side < 0 else datum[::-1]):
-            current = line if side < 0 else line[::-1]
-            on = (current >= 0) & (before >= 0)
-            if not np.isnan(positions[current[on], 0]).all():
-                return None
-            x[on] += np.linalg.norm(surface.vertices[current[on]] - surface.vertices[before[on]], axis=1)
-            positions[current[on]] = np.column_stack([side * x[on], station[on]])
-            before = current
-    return None if np.isnan(positions).any() else positions
+    lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
+    stations = np.stack([station, station[::-1]])
+    p = points_at(surface.vertices, lines)
+    on = lines[1:] >= 0
+    x = np.cumsum(np.where(on, norm(p[:, 1:] - p[:, :-1]), 0.0), axis=0) * np.array([[-1.0], [1.0]])
+    positions[lines[1:][on]] = np.column_stack([x[on], np.broadcast_to(stations, x.shape)[on]])
+    whole = len(datum) + np.count_nonzero(on) == len(positions)
+    return positions if whole and not np.isnan(positions).any() else None
 
 
-def _grid_lines(surface: Surface, line: IntArray) -> Iterator[IntArray]:
-    """The grid lines to the left of a line of a quad mesh, one after the other; -1 where the grid has ended."""
-    he = half_edges(surface.faces)
+def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
+    """#L by #K by #N: K lines of a quad mesh (`start`), and the grid lines to the left of each, -1 where the grid has ended.
+
+    No more lines than there are vertices for: where profiles meet again, or go around a tube, they would have no end.
+    """
+    he = half_edges_of(surface)
+    here = np.arange(len(he.tail))
+    twin = np.where(he.count[he.edge] == 2, np.bincount(he.edge, here).astype(np.int64)[he.edge] - here, -1)
+    # The last entry is where there is none, -1.
+    twin, tail, head = (np.append(index, -1) for index in (twin, he.tail, he.head))
+    some = np.empty(len(he.edges), dtype=np.int64)
+    some[he.edge] = here
     size = np.int64(len(surface.vertices))
-    keys = he.tail.astype(np.int64) * size + he.head
-    order = np.argsort(keys)
-    sorted_keys = keys[order]
-    current = np.asarray(line, dtype=np.int64)
-    for _ in range(len(surface.faces)):
-        both = (current[:-1] >= 0) & (current[1:] >= 0)
-        wanted = np.where(both, current[:-1] * size + current[1:], -1)
-        place = np.minimum(np.searchsorted(sorted_keys, wanted), len(keys) - 1)
-        found = both & (sorted_keys[place] == wanted)
-        ahead = he.next[he.next[order[place]]]
-        over_head = np.where(found, he.tail[ahead], -1)
-        over_tail = np.where(found, he.head[ahead], -1)
-        following = np.full(len(current), -1, dtype=np.int64)
-        following[:-1] = over_tail
-        clash = (following[1:] >= 0) & (over_head >= 0) & (following[1:] != over_head)
-        following[1:] = np.where(over_head >= 0, over_head, following[1:])
-        if clash.any() or not (following >= 0).any():
-            return
-        current = following
-        yield current.astype(np.int32)
+    keys = he.edges[:, 0] * size + he.edges[:, 1]
+
+    def along(a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int64]:
+        wanted = np.minimum(a, b) * size + np.maximum(a, b)
+        place = np.minimum(np.searchsorted(keys, wanted), len(keys) - 1)
+        h = some[place]
+        return np.where((a < 0) | (b < 0) | (keys[place] != wanted), -1, np.where(tail[h] == a, h, twin[h]))
+
+    lines = [start]
+    edge, left = along(start[:, :-1], start[:, 1:]), len(surface.vertices)
+    while left > 0:
+        # Of the four sides of a quad, numbered in a row, the one opposite.
+        ahead = np.where(edge >= 0, edge ^ 2, -1)
+        over_tail, over_head = head[ahead], tail[ahead]
+        following = np.empty_like(start)
+        following[:, :1], following[:, -1:] = over_tail[:, :1], over_head[:, -1:]
+        following[:, 1:-1] = np.where(over_head[:, :-1] >= 0, over_head[:, :-1], over_tail[:, 1:])
+        clash = (over_tail[:, 1:] != following[:, 1:-1]) & (over_tail[:, 1:] >= 0)
+        following[clash.any(axis=1)] = -1
+        reached = int(np.count_nonzero(following >= 0))
+        if reached == 0:
+            break
+        lines.append(following)
+        left -= reached
+        edge = twin[ahead]
+        if (edge < 0).any():
+            # Past a hole the line goes on.
+            edge = along(following[:, :-1], following[:, 1:])
+    return np.stack(lines)
 
 
 def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """Any mesh: x is the signed geodesic distance from the datum, y the arc length of the nearest datum point. #V by 2 [m]."""
-    try:
-        distance, station = signed_distance_and_station(surface, datum)
-    except RuntimeError:  # a singular system: the ways to the datum go in circles on faces without height
-        return None
-    return np.column_stack([distance, station])
+    positions = np.column_stack(signed_distance_and_station(surface, datum))
+    return positions if np.isfinite(positions).all() else None
 
 
 def harmonic_layout(surface: Surface) -> FloatArray:

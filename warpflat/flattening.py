@@ -18,84 +18,22 @@ from warpflat.develop import Development, choose_datum, develop
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric
 from warpflat.membrane import Model, check_model
-from warpflat.multilevel import levels_pay, relax_multilevel
-from warpflat.network import SpringNetwork, grain_axes
-from warpflat.relax import Energies, Outcome, Relaxation, RelaxOptions, Upright, relax
+from warpflat.network import SpringNetwork
+from warpflat.progress import Progress, Stage
+from warpflat.relax import RelaxOptions
+from warpflat.running import Run
 from warpflat.strain import WornStrain, layout_errors, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, components, line_from_indices, read_surface
-from warpflat.tightness import Wear, WornFit, assess_fit, meant_stretch
+from warpflat.tightness import Wear, WornFit, assess_fit
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
 
-__all__ = ["Flattening", "Progress", "Stage", "flatten", "relax_cut"]
+__all__ = ["Flattening", "Progress", "Stage", "change_fabric", "flatten", "relax_cut"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-
-# A first round only turns and shapes the layout; its directions are measured again after it.
-_FIRST_ROUND = 30.0
-
-
-@dataclass(frozen=True, kw_only=True)
-class Stage:
-    """A line of the history: energies [J] when a stage had ended, and what it took.
-
-    `residual` is the largest force on a vertex over the mean spring force; `work_units` counts approximate implicit
-    steps over all vertices.
-    """
-
-    name: str
-    spring_energy_j: float
-    guard_energy_j: float
-    strain_energy_j: float
-    steps: int
-    work_units: float
-    seconds: float
-    converged: bool
-    residual: float | None
-
-    def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
-        return dict(self.__dict__)
-
-
-class Progress:
-    """Where a run stands; what a callback gets after every step.
-
-    Attributes:
-        stage: "develop", "relax" or "cut:NAME".
-        step: approximate implicit steps so far, on the piece's own mesh.
-        work_units: all work so far, in such steps.
-        max_steps: at most so many.
-        spring_energy: [J], of the last look (see `RelaxOptions.check_every`).
-        residual: largest force over mean spring force, likewise.
-    """
-
-    def __init__(self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int) -> None:
-        """Hold on to the running state; nothing is copied before it is asked for."""
-        self.stage = stage
-        self.step = state.steps
-        self.work_units = state.work_units
-        self.max_steps = max_steps
-        self.spring_energy = energies.spring
-        self.guard_energy = energies.guard
-        self.residual = residual
-        self._state = state
-
-    @property
-    def surface(self) -> Surface:
-        """The surface with the present topology: after a cut its vertices are doubled."""
-        return self._state.network.surface
-
-    def positions(self) -> FloatArray:
-        """#V by 2, the layout [m], a copy."""
-        return self._state.positions()
-
-    def face_energy_density(self) -> FloatArray:
-        """#F, strain energy per flat area [J/m2]."""
-        return worn_strain(self._state.network, self.positions()).energy_density
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -296,11 +234,12 @@ def flatten(
     line, line_name, notes = _datum(surface, datum)
 
     begun = time.perf_counter()
-    run = _Run(surface, cloth, grain_angle, where, options, callback, line, model=model, wear=wear)
+    run = Run(surface, cloth, grain_angle, where, options, callback, line, model=model, wear=wear)
     development = run.let_go(develop(surface, line))
     state = run.state_at(development.positions)
     stages = [run.stage("develop", state, seconds=time.perf_counter() - begun)]
-    state, outcome = run.relax(state, mended=development.mended)
+    measure_again = development.mended or run.directions_matter()
+    state, outcome = run.relax(state, measure_again=measure_again)
     stages.append(run.stage("relax", state, outcome=outcome, seconds=outcome.seconds))
     return Flattening(
         surface=surface,
@@ -339,145 +278,69 @@ def relax_cut(
         options: of the relaxation.
         callback: called with a `Progress` before the first step and after every step.
     """
+    run = _later_run(result, surface, result.fabric, stage, options, callback)
+    # What opens turns, and its threads with it.
+    return replace(_gone_on(result, run, positions, measure_again=run.directions_matter()), cuts=tuple(cuts))
+
+
+def change_fabric(
+    result: Flattening,
+    fabric: Fabric | str,
+    *,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """The same piece in another cloth, relaxed from where it lies: a fraction of what `flatten` takes.
+
+    Args:
+        result: the piece, with the cuts it has; it stays as it is.
+        fabric: a `Fabric`, or a name of the library.
+        relax: options of the relaxation.
+        callback: called with a `Progress` before the first step and after every step; the stage is "fabric:NAME".
+
+    Raises:
+        InputError: an unknown fabric or an option out of its bounds.
+    """
+    cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
+    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", relax or RelaxOptions(), callback)
+    return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
+
+
+def _later_run(
+    result: Flattening,
+    surface: Surface,
+    fabric: Fabric,
+    stage: str,
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None,
+) -> Run:
+    """A run that goes on from a result."""
     options.validate()
-    part = components(surface.faces)
-    part_of = np.full(len(surface.vertices), -1)
-    used = surface.faces >= 0
-    part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
-    # A cut may part the datum: then the first part of it stays upright.
-    datum = result.datum[part_of[result.datum] == part_of[result.datum[0]]]
-    run = _Run(surface, result.fabric, result.grain_angle, result.network.device, options, callback, datum, stage)
-    run.model, run.wear = result.network.model, result.wear
-    state, outcome = run.relax(run.state_at(positions), mended=False)
+    datum = result.datum
+    if surface is not result.surface:
+        # A cut may part the datum: then the first part of it stays upright.
+        part = components(surface.faces)
+        part_of = np.full(len(surface.vertices), -1)
+        used = surface.faces >= 0
+        part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
+        datum = datum[part_of[datum] == part_of[datum[0]]]
+    device, model = result.network.device, result.network.model
+    return Run(
+        surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
+    )
+
+
+def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
+    """The result of a run from a layout, with what it adds to the history."""
+    state, outcome = run.relax(run.state_at(positions), measure_again=measure_again)
     return replace(
         result,
         network=state.network,
         positions=state.positions(),
-        stages=(*result.stages, run.stage(stage, state, outcome=outcome, seconds=outcome.seconds)),
+        stages=(*result.stages, run.stage(run.stage_name, state, outcome=outcome, seconds=outcome.seconds)),
         history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
         notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
-        cuts=tuple(cuts),
     )
-
-
-@dataclass
-class _Run:
-    """A run under way: what it was asked for, and the history it leaves."""
-
-    surface: Surface
-    fabric: Fabric
-    grain_angle: float
-    device: wp.Device
-    options: RelaxOptions
-    callback: Callable[[Progress], None] | None
-    datum: IntArray
-    stage_name: str = "relax"
-    model: Model = "springs"
-    wear: Wear | None = None
-
-    def __post_init__(self) -> None:
-        self.history: list[tuple[float, float, float, float]] = []
-        self.notes: list[str] = []
-
-    def let_go(self, development: Development) -> Development:
-        """The development made smaller by the mean stretch that is meant: the cloth as it was on the body, let go."""
-        stretch, _ = self._meant(development.positions)
-        if stretch is None:
-            return development
-        shrink = sum(
-            np.outer(axis, axis) / s for axis, s in zip(grain_axes(self.grain_angle), stretch.mean(0), strict=True)
-        )
-        return replace(development, positions=development.positions @ shrink)
-
-    def _meant(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
-        if self.wear is None:
-            return None, ()
-        return meant_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
-
-    def state_at(self, positions: FloatArray, *, after: Relaxation | None = None) -> Relaxation:
-        """A relaxation that starts at a layout, with directions measured in it."""
-        stretch, notes = self._meant(positions)
-        self.notes += [note for note in notes if note not in self.notes]
-        network = SpringNetwork.build(
-            self.surface,
-            self.fabric,
-            positions,
-            grain_angle=self.grain_angle,
-            device=self.device,
-            model=self.model,
-            stretch=stretch,
-        )
-        ends = Upright(lower=int(self.datum[0]), upper=int(self.datum[-1]))
-        state = Relaxation(network, self.options, start=positions, upright=[ends])
-        if after is not None:
-            state.steps, state.restarts, state.work_units = after.steps, after.restarts, after.work_units
-        return state
-
-    def relax(self, state: Relaxation, *, mended: bool) -> tuple[Relaxation, Outcome]:
-        """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
-        first = "develop" if self.stage_name == "relax" else self.stage_name
-        self._tell(first, state, state.energies(), float("nan"))
-        begun = time.perf_counter()
-        clamped = state.network.spring_arrays.clamped_cells
-        if clamped:
-            self.notes.append(
-                f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them; their "
-                "structural springs were kept at 5 % of it"
-            )
-        isotropic = _is_isotropic(self.fabric)
-        if mended or (not isotropic and not self.surface.is_quad.all()):
-            state.options = replace(
-                self.options,
-                energy_tolerance=_FIRST_ROUND * self.options.energy_tolerance,
-                residual_tolerance=_FIRST_ROUND * self.options.residual_tolerance,
-            )
-            self._relax(state)
-            state = self.state_at(state.positions(), after=state)
-        state.options = self.options
-        outcome = self._relax(state)
-        seconds = time.perf_counter() - begun
-        return state, replace(outcome, steps=state.steps, work_units=state.work_units, seconds=seconds)
-
-    def _relax(self, state: Relaxation) -> Outcome:
-        each_step = None if self.callback is None else self._each_step
-        if self.options.solver == "plain" or not levels_pay(state.network):
-            return relax(state, watch=self._watch, each_step=each_step)
-        # After a cut the layout is near the minimum already.
-        nested = self.stage_name == "relax" and state.steps == 0
-        return relax_multilevel(state, nested=nested, watch=self._watch, each_step=each_step)
-
-    def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self.history.append((float(state.steps), energies.spring, energies.guard, residual))
-
-    def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self._tell(self.stage_name, state, energies, residual)
-
-    def _tell(self, stage: str, state: Relaxation, energies: Energies, residual: float) -> None:
-        if self.callback is not None:
-            self.callback(
-                Progress(stage, state, energies=energies, residual=residual, max_steps=self.options.max_steps)
-            )
-
-    def stage(self, name: str, state: Relaxation, *, seconds: float, outcome: Outcome | None = None) -> Stage:
-        """The line of the history for a stage that ended in this state."""
-        energies = state.energies() if outcome is None else outcome.energies
-        steps = 0 if outcome is None else outcome.steps
-        return Stage(
-            name=name,
-            spring_energy_j=energies.spring,
-            guard_energy_j=energies.guard,
-            strain_energy_j=float(worn_strain(state.network, state.positions()).energy.sum()),
-            steps=steps,
-            work_units=0.0 if outcome is None else outcome.work_units,
-            seconds=seconds,
-            converged=True if outcome is None else outcome.converged,
-            residual=None if outcome is None else outcome.residual,
-        )
-
-
-def _is_isotropic(fabric: Fabric) -> bool:
-    same = np.isclose(fabric.stiffness_warp, fabric.stiffness_weft, rtol=1e-9)
-    return bool(same and np.isclose(fabric.shear_stiffness, fabric.stiffness_warp / 2 / (1 + fabric.poisson_ratio)))
 
 
 def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:

@@ -15,11 +15,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.flattening import Flattening, Stage
+from warpflat.flattening import Flattening
 from warpflat.membrane import step_matrix
 from warpflat.network import CellArrays, SpringArrays, SpringNetwork, grain_axes, with_stiffness
+from warpflat.progress import Stage
 from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
-from warpflat.strain import worn_strain
+from warpflat.strain import strain_energy
 from warpflat.surface.topology import border_loops, mesh_edges
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
@@ -69,7 +70,7 @@ def give_fullness(
         name="fullness",
         spring_energy_j=outcome.energies.spring,
         guard_energy_j=outcome.energies.guard,
-        strain_energy_j=float(worn_strain(network, positions).energy.sum()),
+        strain_energy_j=strain_energy(network, positions),
         steps=outcome.steps,
         work_units=float(outcome.steps),
         seconds=outcome.seconds,

@@ -22,11 +22,12 @@ from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
 from typing import Any
 
+import numpy as np
 import warp as wp
 
 from warpflat.errors import InputError
 
-__all__ = ["Launch", "Sequence", "record", "split_range", "thread_count"]
+__all__ = ["Launch", "Sequence", "launch_each", "record", "split_range", "thread_count"]
 
 Command = Callable[[], None]
 
@@ -34,6 +35,8 @@ Command = Callable[[], None]
 _LEAST_RANGE = 512
 # Ranges begin at multiples of this, so that no two threads write to one cache line.
 _ALIGNMENT = 64
+# Shorter launches are over before they could be recorded for several threads.
+_WORTH_RECORDING = 2048
 # Releases of Warp whose recorded launches are laid out as `_packed` takes them to be.
 _PACKED_RELEASES = ("1.19.",)
 
@@ -52,8 +55,9 @@ def thread_count() -> int:
     return int(wished)
 
 
-def split_range(size: int, parts: int, *, least: int = _LEAST_RANGE) -> list[tuple[int, int]]:
+def split_range(size: int, parts: int, *, least: int | None = None) -> list[tuple[int, int]]:
     """At most `parts` ranges (begin, end) that cover 0 to `size` in order, none but the last shorter than `least`."""
+    least = _LEAST_RANGE if least is None else least
     parts = max(1, min(parts, size // max(least, 1)))
     stride = -(-size // parts)
     if parts > 1:
@@ -103,7 +107,7 @@ def record(
     outputs: SequenceOf[Any] = (),
     device: str | wp.Device | None = None,
     threads: int | None = None,
-    least: int = _LEAST_RANGE,
+    least: int | None = None,
 ) -> Launch:
     """Record a launch of a kernel whose last input is ``first: int``. All values are fixed; arrays may change in place.
 
@@ -135,6 +139,30 @@ def record(
         for begin, end in ranges
     ]
     return Launch(commands, keep=(inputs, outputs))
+
+
+def launch_each(
+    kernel: wp.Kernel,
+    count: int,
+    inputs: SequenceOf[Any],
+    outputs: SequenceOf[Any],
+    *,
+    device: str | wp.Device = "cpu",
+) -> None:
+    """Run a kernel, whose last input is ``first: int``, once: on all cores where it is long enough.
+
+    Args:
+        kernel: writes at its own index only.
+        count: number of its threads.
+        inputs: all but `first`; arrays of Warp on the device, or on the CPU of NumPy.
+        outputs: arrays it writes, likewise.
+        device: Warp device.
+    """
+    inputs = [np.ascontiguousarray(given) if isinstance(given, np.ndarray) else given for given in inputs]
+    if count < _WORTH_RECORDING:
+        wp.launch(kernel, dim=count, inputs=[*inputs, 0], outputs=outputs, device=device)
+    else:
+        record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device).launch()
 
 
 def _packed(recorded: wp.Launch) -> Command:

@@ -27,34 +27,47 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.coarsen import Coarser, coarser
+from warpflat.carry import GridCarry
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
+from warpflat.fabric import Fabric
 from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
+from warpflat.surface.untangle import untangle
 
-__all__ = ["Levels", "levels_pay", "relax_multilevel"]
+__all__ = ["Levels", "levels_pay", "relax_multilevel", "softness"]
 
 FloatArray = NDArray[np.float64]
 
-# A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
-# piece. The coarsest is relaxed with so many steps for each vertex along its side, three times as many at the very first.
-_COARSEST = 250
-_COARSEST_GRID = 100
-_COARSEST_STEPS = 6.0
-# Cycles on each level on the way up, before the finest.
-_CYCLES_ON_THE_WAY = 1
-# Steps before and after, at least, and at most where cycles gain little; a cycle that leaves more than this share of what the one
-# before gained gets twice the steps.
+# The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
+# the very first, or so many times the vertices along its side: a crack that opens is slow there too.
+_BOTTOM_STEPS = 8
+_AT_REST = 0.1
+_AT_REST_FIRST = 1e-3
+_MOST_BOTTOM_STEPS = 24.0
+# Grids of more vertices are not cycled on the way up: cubics from this size on leave a few hundredths of a per cent.
+_CYCLED = int(__import__("os").environ.get("CYC", 5_000))
+# Steps before and after, at least, and at most where cycles gain little: after one that gains more than this share of what the one
+# before gained, they are twice as many.
 _LEAST_STEPS = 4
 _MOST_STEPS = 256
-_SLOW = 0.35
-# K/G from which coarse triangles are of little use.
+_VERY_SLOW = 0.6
+# From this share on, cycles are followed by a leap, from what is remembered of so many of them.
+_SLOW = 0.05
+_DEPTH = 6
+# K/G from which coarse triangles are of little use; likewise on a piece of more than so many vertices.
 _SOFT = 35.0
+_MANY = 2_000
+_SOFT_OF_MANY = 100.0
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
 # Of a correction, the least share that is tried.
 _LEAST_SHARE = 0.05
+# Steps between two looks at all cells.
+_WATCH_EVERY = 4
+# Least curvature, over what its parts would have apart, of a direction that cycles leave to be followed.
+_SOUND = 1e-3
 # In units of a step: evaluating the forces, evaluating the energy.
 _FORCE_WORK = 1.0
 _ENERGY_WORK = 0.5
@@ -79,6 +92,7 @@ class _Way:
     carry: Launch
     base: wp.array
     correction: wp.array
+    smooth_carry: GridCarry | None
 
 
 @dataclass
@@ -133,29 +147,32 @@ class Levels:
         self._levels = [_Level(finest)]
         self.stale = False
         layout = finest.positions()
-        while True:
-            fine = self._levels[-1].state
-            if fine.network.vertex_count <= (_COARSEST_GRID if fine.network.surface.is_quad.all() else _COARSEST):
-                break
-            step = coarser(fine.network.surface, layout)
-            if step is None:
-                break
-            coarse = self._coarse(fine, step, layout)
+        # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
+        ready = iter(coarser_surfaces(finest.network.surface))
+        while not is_coarsest(self._levels[-1].state.network.surface):
+            step = next(ready, None)
+            if step is None or not self._go_down(step, layout):
+                ready = iter(())
+                step = coarser(self._levels[-1].state.network.surface, layout)
+                if step is None or not self._go_down(step, layout):
+                    break
             layout = layout[step.kept]
-            coarse.evaluate_at_rest()
-            if coarse.mirrored_cells():
-                break
-            self._levels[-1].way = self._way(fine, step, coarse)
-            self._levels.append(_Level(coarse))
+
+    def _go_down(self, step: Coarser, layout: FloatArray) -> bool:
+        """Add a level, unless some of its cells are mirrored where it lies."""
+        fine = self._levels[-1]
+        coarse = self._coarse(fine.state, step, layout)
+        coarse.evaluate_at_rest()
+        if coarse.mirrored_cells():
+            return False
+        fine.way = self._way(fine.state, step, coarse)
+        self._levels.append(_Level(coarse))
+        return True
 
     @property
     def sizes(self) -> list[int]:
         """Vertices of each level, finest first."""
         return [level.state.network.vertex_count for level in self._levels]
-
-    @property
-    def _steps_at_the_bottom(self) -> int:
-        return round(_COARSEST_STEPS * math.sqrt(self.sizes[-1]))
 
     @staticmethod
     def _coarse(fine: Relaxation, step: Coarser, fine_layout: FloatArray) -> Relaxation:
@@ -179,7 +196,7 @@ class Levels:
         device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
         kept = wp.array(step.kept, dtype=wp.int32, device=device)
         prolongation = _weights(step.prolongation, device)
-        restriction = _weights(csr_array(step.prolongation.T.tocsr()), device)
+        restriction = _weights(step.restriction, device)
         base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
         difference = wp.zeros(c, dtype=wp.vec2d, device=device)
         return _Way(
@@ -197,6 +214,7 @@ class Levels:
             ),
             base=base,
             correction=correction,
+            smooth_carry=step.smooth_carry,
         )
 
     # --- the parts of a cycle
@@ -209,11 +227,20 @@ class Levels:
         """Some steps from rest."""
         state = self._levels[level].state
         state.velocity.zero_()
-        for _ in range(steps):
-            state.step()
-            if each_step is not None:
-                each_step()
+        state.sweep(steps, each_step, watch_every=_WATCH_EVERY)
         self._count(level, steps)
+
+    def _settle(self, share: float) -> None:
+        """Relax the coarsest level until its forces have come down to a share of what they were."""
+        last = len(self._levels) - 1
+        state = self._levels[last].state
+        state.evaluate_at_rest()
+        aim = share * float(np.linalg.norm(state.force.numpy()))
+        for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(self.sizes[last]) / _BOTTOM_STEPS)):
+            state.sweep(_BOTTOM_STEPS, watch_every=_WATCH_EVERY)
+            self._count(last, _BOTTOM_STEPS)
+            if float(np.linalg.norm(state.force.numpy())) <= aim:
+                break
 
     def _objective(self, level: int) -> float:
         self._count(level, _ENERGY_WORK)
@@ -224,7 +251,7 @@ class Levels:
         """One cycle from this level down and up again."""
         state, way = self._levels[level].state, self._levels[level].way
         if way is None:
-            self.smooth(level, self._steps_at_the_bottom)
+            self._settle(_AT_REST)
             return
         self.smooth(level, steps, each_step)
         state.evaluate_at_rest()
@@ -256,51 +283,121 @@ class Levels:
             share *= 0.5
         wp.copy(state.position, way.base)
 
+    def leap(self, memory: CycleMemory, begin: FloatArray, force: FloatArray) -> None:
+        """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, if it is lower
+        there.
+
+        Args:
+            memory: of the cycles before; gets this one.
+            begin: #V by 2, where the cycle began [m].
+            force: #V by 2, of the cloth there [N].
+        """
+        state = self._levels[0].state
+        end = state.positions()
+        energy = self._objective(0)
+        self._count(0, _FORCE_WORK)
+        further = memory.lowest(begin, force, end, state.forces())
+        if further is not None:
+            state.position.assign(further)
+            if not self._objective(0) < energy:
+                state.position.assign(end)
+
     def follow(self) -> None:
         """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
         for level in self._levels:
             if level.state.matrix is not None:
                 level.state.matrix.follow(level.state.position)
 
-    def rise(self, steps: int, arrived: Callable[[], None] | None = None) -> None:
+    def rise(self, steps: int) -> None:
         """Nested iteration: relax the coarsest level, and move each finer one as far as it went; the finest is not cycled yet."""
         last = len(self._levels) - 1
         for level in self._levels[1:]:
             level.state.load.zero_()
-        self.smooth(last, 3 * self._steps_at_the_bottom)
+        self._settle(_AT_REST_FIRST)
         for number in range(last - 1, -1, -1):
-            self._rise_to(number)
-            if number == 0 and arrived is not None:
-                arrived()
-            for _ in range(_CYCLES_ON_THE_WAY if number else 0):
+            smooth = self._rise_to(number)
+            if number and (self.sizes[number] <= _CYCLED or not smooth):
                 self.cycle(number, steps)
 
-    def _rise_to(self, level: int) -> None:
-        """Start a level where the coarser one ended, or moved as far as it went: the former is smoother, the latter keeps
-        what only the finer mesh has. Where neither lowers the energy, it stays where it is."""
+    def _rise_to(self, level: int) -> bool:
+        """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
+        what only the finer mesh has. Where neither lowers the energy, it stays where it is.
+
+        Returns:
+            Whether it starts where cubics carried it.
+        """
         state, way = self._levels[level].state, self._levels[level].way
         assert way is not None
+        before, energy = state.positions(), self._objective(level)
+        if way.smooth_carry is None:
+            way.carry.launch()
+        else:
+            state.position.assign(way.smooth_carry(way.coarse.positions()))
+        carried = self._objective(level)
+        if math.isinf(carried):
+            # Turned faces, the odd one at a border, say.
+            mended, left = untangle(state.network.surface, state.positions())
+            state.position.assign(mended)
+            carried = math.inf if left else self._objective(level)
+        if carried < energy:
+            return way.smooth_carry is not None
+        state.position.assign(before)
         self._correct(level, way)
-        moved, energy = state.position.numpy().copy(), self._objective(level)
-        way.carry.launch()
-        if not self._objective(level) < energy:
-            state.position.assign(moved)
+        return False
+
+
+class CycleMemory:
+    """The last few cycles: how far they led, and how much the forces fell on the way. In the plane of these ways the energy is known,
+    to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
+
+    A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
+    share with each cycle.
+    """
+
+    def __init__(self, depth: int) -> None:
+        """Of so many cycles."""
+        self._depth = depth
+        self._ways: list[FloatArray] = []
+        self._falls: list[FloatArray] = []
+
+    def lowest(self, begin: FloatArray, force: FloatArray, end: FloatArray, left: FloatArray) -> FloatArray | None:
+        """#V by 2, where the energy is least [m]; None where that cannot be told.
+
+        Args:
+            begin, end: #V by 2, of the last cycle [m].
+            force, left: #V by 2, forces at its begin and end [N].
+        """
+        self._ways.append((end - begin).ravel())
+        self._falls.append((force - left).ravel())
+        del self._ways[: -self._depth], self._falls[: -self._depth]
+        ways = np.stack(self._ways)
+        curvature = ways @ np.stack(self._falls).T
+        curvature = 0.5 * (curvature + curvature.T)
+        size = np.sqrt(np.abs(np.diag(curvature)))
+        if not (size > 0.0).all():
+            return None
+        values, axes = np.linalg.eigh(curvature / np.outer(size, size))
+        sound = values > _SOUND
+        share = axes[:, sound] @ ((axes[:, sound].T @ (ways @ left.ravel() / size)) / values[sound]) / size
+        return end + (share @ ways).reshape(end.shape)
 
 
 def levels_pay(network: SpringNetwork) -> bool:
-    """Whether cycles take less work than plain steps: on grids always, on triangles unless the shear is softer than a 35th of
-    the stiffness. There coarse triangles carry little: denim on the scans took two to three times the plain steps."""
-    return bool(network.surface.is_quad.all()) or _softness(network) < _SOFT
+    """Whether cycles take less work than plain steps: on grids always; on triangles, of which coarse ones carry less the softer the shear
+    is, the more vertices there are."""
+    if network.surface.is_quad.all():
+        return True
+    return softness(network.fabric) < (_SOFT_OF_MANY if network.vertex_count > _MANY else _SOFT)
 
 
-def _softness(network: SpringNetwork) -> float:
-    fabric = network.fabric
+def softness(fabric: Fabric) -> float:
+    """K/G: how much stiffer the fabric is along its threads than in shear."""
     return max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
 
 
 def first_steps(network: SpringNetwork) -> int:
     """Steps before and after, for a fabric: a soft shear leaves errors along threads that only accelerated steps smooth."""
-    return int(min(max(round(1.7 * math.sqrt(_softness(network))), _LEAST_STEPS), 16))
+    return int(min(max(round(1.7 * math.sqrt(softness(network.fabric))), _LEAST_STEPS), 16))
 
 
 def relax_multilevel(
@@ -308,6 +405,7 @@ def relax_multilevel(
     *,
     levels: Levels | None = None,
     nested: bool = True,
+    enough: float | None = None,
     watch: Watch | None = None,
     each_step: Watch | None = None,
 ) -> Outcome:
@@ -317,6 +415,7 @@ def relax_multilevel(
         state: where to start; holds the relaxed layout afterwards.
         levels: of this state, if they are there already.
         nested: start from the coarsest level; without, cycles begin at the present layout, as after an edit.
+        enough: it is over, at rest or not, after a cycle that takes no more than this share of the energy away; if given.
         watch: called after every cycle with the state, its energies and the residual.
         each_step: called after every step on the finest level, with the energies and the residual of the last look.
     """
@@ -328,7 +427,7 @@ def relax_multilevel(
         return relax(state, watch=watch, each_step=each_step)
     first, start, renewals = state.steps, state.work_units, 0
     before = state.energies()
-    change, residual, gained = math.inf, math.inf, math.inf
+    change, residual, gained, slow = math.inf, math.inf, math.inf, False
     steps = first_steps(state.network)
 
     def look() -> None:
@@ -336,16 +435,22 @@ def relax_multilevel(
             each_step(state, before, residual)
 
     if nested:
-        levels.rise(steps, look)
+        levels.rise(steps)
         state.hold_upright()
         before = state.energies()
-    converged = False
-    while not converged and state.work_units - start < options.max_steps:
+        look()
+    converged, near, memory = False, False, CycleMemory(_DEPTH)
+    state.evaluate_at_rest()
+    state.work_units += _FORCE_WORK
+    while not converged and state.work_units - start < options.max_steps and not near:
         if levels.stale and renewals < _RENEWALS:
             levels, renewals = Levels(state), renewals + 1
         work = state.work_units
         levels.follow()
+        begin, force = state.positions(), state.cloth_force()
         levels.cycle(0, steps, look)
+        if slow:
+            levels.leap(memory, begin, force)
         state.hold_upright()
         state.evaluate_at_rest()
         now = state.energies()
@@ -355,7 +460,9 @@ def relax_multilevel(
         gain = before.potential - now.potential
         change = 0.0 if at_rest else abs(gain) / ((state.work_units - work) * now.potential)
         converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
-        if abs(gain) > _SLOW * gained:
+        near = enough is not None and gain <= enough * now.potential
+        slow = abs(gain) > _SLOW * gained
+        if abs(gain) > _VERY_SLOW * gained:
             steps = min(2 * steps, _MOST_STEPS)
         before, gained = now, abs(gain)
         if watch is not None:

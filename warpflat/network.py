@@ -34,13 +34,31 @@ from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
+from warpflat.kernels.stiffness import (
+    Lattice,
+    find_directions,
+    find_sides,
+    list_springs,
+    measure_edges,
+    measure_hold,
+    spread_stiffness,
+    weigh_quads,
+    weigh_triangles,
+)
+from warpflat.kernels.surface_cells import add_areas
+from warpflat.launching import launch_each
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
-from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import corner_triangles, half_edges, stable_order, unfold_quad_diagonals
-from warpflat.surface.unfold import lay_quads_flat, quad_creases
-from warpflat.surface.vectors import cross, dot, norm, points_at
+from warpflat.surface.mesh import Surface, once_per_surface, read_only
+from warpflat.surface.topology import (
+    corner_triangles,
+    half_edges_of,
+    order_by,
+    rows_of,
+    unfold_quad_diagonals,
+)
+from warpflat.surface.unfold import lay_cells, quad_creases
 
-__all__ = ["SpringNetwork", "cells_of", "grain_axes", "springs_of", "vertex_masses"]
+__all__ = ["SpringNetwork", "cells_of", "grain_axes", "springs_of"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -62,16 +80,6 @@ def grain_axes(grain_angle: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
     angle = np.deg2rad(grain_angle)
     return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
-
-
-def thread_stiffness(fabric: Fabric, angle: FloatArray) -> FloatArray:
-    """Stiffness [N/m] of a strip of the cloth cut at `angle` [rad] from the warp and pulled along itself.
-
-    1/K = cos^4/K_warp + sin^4/K_weft + sin^2 cos^2 (1/G - 2 nu/K_warp).
-    """
-    c2, s2 = np.cos(angle) ** 2, np.sin(angle) ** 2
-    cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
-    return 1.0 / (c2 * c2 / fabric.stiffness_warp + s2 * s2 / fabric.stiffness_weft + s2 * c2 * cross)
 
 
 def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
@@ -118,31 +126,109 @@ class CellArrays:
     area: FloatArray
 
 
+@dataclass(frozen=True, kw_only=True)
+class ByVertex:
+    """Lists of what is around each vertex: `offset` #V+1, where the entries of each vertex begin, and what is there."""
+
+    offset: IntArray
+    entry: IntArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringsAround(ByVertex):
+    """The springs around each vertex, and for each entry the vertex at the far end, by which they are sorted."""
+
+    neighbor: IntArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Unweighed:
+    """Of a surface's springs what no fabric changes: `ends`, `rest_length` and `edge_count` as in SpringArrays, which are around
+    each vertex, and their rest lengths in that order."""
+
+    ends: IntArray
+    rest_length: FloatArray
+    edge_count: int
+    around: SpringsAround
+    listed_length: FloatArray
+
+
 @once_per_surface
-def _creases_of(surface: Surface) -> tuple[NDArray[np.int8], IntArray]:
-    return quad_creases(surface.vertices, surface.faces)
+def _creases_of(surface: Surface) -> NDArray[np.int8]:
+    return quad_creases(surface.vertices, surface.faces, sides=half_edges_of(surface))
 
 
 @once_per_surface
 def cells_of(surface: Surface) -> CellArrays:
     """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
     corner, face, weight = corner_triangles(surface.faces)
-    p = points_at(surface.vertices, corner.T)
-    flat, creased, _ = lay_quads_flat(surface.vertices, surface.faces, creases=_creases_of(surface))
-    is_creased = np.zeros(len(surface.faces), dtype=bool)
-    is_creased[creased] = True
-    around = np.flatnonzero(is_creased[face])
-    laid = flat[:, [[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]]].reshape(-1, 3, 2)
-    p[:2, :, around] = laid.T
-    p[2, :, around] = 0.0
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    length, twice = norm(a), norm(cross(a, b))
-    safe = np.where(length > 0, length, 1.0)
-    edges = np.zeros((len(corner), 2, 2))
-    edges[:, 0, 0] = length
-    edges[:, 0, 1] = dot(a, b) / safe
-    edges[:, 1, 1] = twice / safe
-    return CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=0.5 * weight * twice)
+    edges, area = lay_cells(surface.vertices, surface.faces, _creases_of(surface), _first_of(surface, 4, 1))
+    if len(weight) and (weight == weight[0]).all():
+        weight = np.broadcast_to(weight[0], weight.shape)
+    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area))
+
+
+def _first_of(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
+    """#F, the first of each face's cells or sides, where a quad and a triangle have so many."""
+    counts = np.where(surface.is_quad, np.int32(of_quad), np.int32(of_triangle))
+    return np.cumsum(counts, dtype=np.int32) - counts
+
+
+@once_per_surface
+def _cells_around(surface: Surface) -> ByVertex:
+    return _corners_at(cells_of(surface).corner, len(surface.vertices))
+
+
+def _corners_at(corner: IntArray, count: int) -> ByVertex:
+    """Of triples or other tuples of vertices, where each vertex is among them, counted through."""
+    entry, offset = order_by(corner.ravel(), count)
+    return read_only(ByVertex(offset=offset, entry=entry))
+
+
+@once_per_surface
+def _areas_at(surface: Surface) -> FloatArray:
+    return vertex_areas(cells_of(surface), _cells_around(surface))
+
+
+def vertex_areas(cells: CellArrays, around: ByVertex) -> FloatArray:
+    """#V [m2], a third of each cell's share of the cloth at each of its corners."""
+    total = np.empty(len(around.offset) - 1)
+    launch_each(add_areas, len(total), [around.offset, around.entry, cells.area], [total])
+    return total
+
+
+@once_per_surface
+def _unweighed(surface: Surface) -> _Unweighed:
+    vertices, edges = surface.vertices, half_edges_of(surface).edges
+    diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=_creases_of(surface))
+    corner = rows_of(surface.faces, surface.is_quad)
+    ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
+    rest_length = np.empty(len(ends))
+    rest_length[len(edges) :] = diagonal.T.ravel()
+    launch_each(measure_edges, len(edges), [vertices, ends], [rest_length])
+    around = _springs_at(ends, len(vertices))
+    return read_only(
+        _Unweighed(
+            ends=ends,
+            rest_length=rest_length,
+            edge_count=len(edges),
+            around=around,
+            listed_length=np.take(rest_length, around.entry),
+        )
+    )
+
+
+def _springs_at(ends: IntArray, count: int) -> SpringsAround:
+    end, offset = order_by(ends[:, ::-1].T.ravel(), count)
+    neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
+    launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
+    return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
+
+
+def springs_around(surface: Surface, springs: SpringArrays) -> SpringsAround:
+    """The springs around each vertex of the surface."""
+    own = _unweighed(surface)
+    return own.around if springs.ends is own.ends else _springs_at(springs.ends, len(surface.vertices))
 
 
 def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
@@ -155,77 +241,55 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
             straight in the cloth and not on the body.
         grain_angle: of the warp against +y, degrees.
     """
-    he = half_edges(surface.faces)
-    edges, vertices = he.edges, surface.vertices
-    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    own, faces, is_quad = _unweighed(surface), surface.faces, surface.is_quad
     warp, _ = grain_axes(grain_angle)
-    stiffness = np.zeros(len(edges))
-
-    is_quad = surface.faces[he.face, 3] >= 0
-    triangles = np.flatnonzero(~surface.is_quad)
-    if len(triangles):
-        p = vertices[surface.faces[triangles, :3]]
-        area = np.zeros(len(surface.faces))
-        area[triangles] = 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
-        beside = np.bincount(he.edge[~is_quad], area[he.face[~is_quad]], minlength=len(edges))
-        d = positions[edges[:, 1]] - positions[edges[:, 0]]
-        angle = np.arctan2(warp[0] * d[:, 1] - warp[1] * d[:, 0], d @ warp)
-        stiffness += thread_stiffness(fabric, angle) * beside / np.where(length > 0, length, 1.0) ** 2
-
-    quads = np.flatnonzero(surface.is_quad)
-    ends = [edges]
-    rest = [length]
-    stiff = [stiffness]
-    clamped = 0
-    if len(quads):
-        corner = surface.faces[quads]
-        sides = np.linalg.norm(vertices[np.roll(corner, -1, axis=1)] - vertices[corner], axis=2)
-        ha, hb = 0.5 * (sides[:, 0] + sides[:, 2]), 0.5 * (sides[:, 1] + sides[:, 3])
-        ka, kb, shear = _cell_stiffness(fabric, corner, positions, warp)
-        ratio = hb / ha
-        half_a = 0.5 * np.maximum(ka - shear / ratio**2, _LEAST_STRUCTURAL_SHARE * ka) * ratio
-        half_b = 0.5 * np.maximum(kb - shear * ratio**2, _LEAST_STRUCTURAL_SHARE * kb) / ratio
-        least = 1.0 - _LEAST_STRUCTURAL_SHARE
-        clamped = int(((shear / ratio**2 > least * ka) | (shear * ratio**2 > least * kb)).sum())
-        row = np.full(len(surface.faces), -1)
-        row[quads] = np.arange(len(quads))
-        of_quad = np.flatnonzero(is_quad)
-        share = np.where(he.slot[of_quad] % 2 == 0, half_a[row[he.face[of_quad]]], half_b[row[he.face[of_quad]]])
-        stiffness += np.bincount(he.edge[of_quad], share, minlength=len(edges))
-        diagonal, _ = unfold_quad_diagonals(vertices, surface.faces)
-        creased, _ = _creases_of(surface)
-        for k in (0, 1):
-            # A crease is straight itself.
-            along = corner[creased == k][:, [k, k + 2]]
-            diagonal[creased == k, k] = np.linalg.norm(vertices[along[:, 1]] - vertices[along[:, 0]], axis=1)
-        k = shear * (ha**2 + hb**2) / (2.0 * ha * hb)
-        ends += [corner[:, [0, 2]], corner[:, [1, 3]]]
-        rest += [diagonal[:, 0], diagonal[:, 1]]
-        stiff += [k, k]
+    first = _first_of(surface, 4, 3)
+    sides = half_edges_of(surface).edge
+    of_side, stiffness = np.empty(len(sides)), np.empty(len(own.ends))
+    position, clamped = np.ascontiguousarray(positions, dtype=np.float64), 0
+    if not is_quad.all():
+        triangles = rows_of(faces, ~is_quad)
+        given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
+        launch_each(weigh_triangles, len(triangles), given, [of_side])
+    if is_quad.any():
+        quads = rows_of(faces, is_quad)
+        diagonal, over = np.empty(len(quads)), np.empty(len(quads), dtype=np.int8)
+        given = [surface.vertices, position, quads, rows_of(first, is_quad), _lattice(fabric, quads, position, warp)]
+        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, over])
+        stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
+        clamped = int(np.count_nonzero(over))
+    stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
-        ends=np.concatenate(ends).astype(np.int32),
-        rest_length=np.concatenate(rest),
-        stiffness=np.concatenate(stiff),
-        edge_count=len(edges),
+        ends=own.ends,
+        rest_length=own.rest_length,
+        stiffness=stiffness,
+        edge_count=own.edge_count,
         clamped_cells=clamped,
     )
 
 
-def _cell_stiffness(
-    fabric: Fabric, corner: IntArray, positions: FloatArray, warp: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """K along edges 0-1 and 2-3, K along edges 1-2 and 3-0, and G, per quad.
+def _compliance(fabric: Fabric) -> wp.vec3d:
+    """1/K [m/N] of a strip of the cloth cut at an angle from the warp and pulled along itself, as coefficients of cos^4, sin^4 and
+    sin^2 cos^2: 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp."""
+    cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
+    return wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
+
+
+def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> Lattice:
+    """The fabric along the quads' edges.
 
     The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
-    symmetry of a grid), and which pair of edges is nearer to the warp is each cell's own.
+    symmetry of a grid).
     """
-    p = positions[corner]
-    first = (p[:, 1] - p[:, 0]) + (p[:, 2] - p[:, 3])
-    angle = np.arctan2(warp[0] * first[:, 1] - warp[1] * first[:, 0], first @ warp)
-    mean = np.angle(np.exp(4j * angle).sum()) / 4.0
-    along, across, shear = quad_stiffness(fabric, float(mean))
-    swapped = np.round((angle - mean) / (np.pi / 2)).astype(int) % 2 == 1
-    return np.where(swapped, across, along), np.where(swapped, along, across), np.full(len(corner), shear)
+    fourfold = np.empty((len(quads), 2))
+    launch_each(find_directions, len(quads), [positions, quads, wp.vec2d(*warp)], [fourfold])
+    cosine, sine = fourfold.sum(axis=0)
+    lattice = Lattice()
+    lattice.warp = wp.vec2d(*warp)
+    lattice.angle = float(np.arctan2(sine, cosine)) / 4.0
+    lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, lattice.angle)
+    lattice.least = _LEAST_STRUCTURAL_SHARE
+    return lattice
 
 
 def _shortened(
@@ -253,13 +317,13 @@ def _shortened(
     return replace(springs, rest_length=springs.rest_length / np.where(worn > 0.0, worn, 1.0))
 
 
-def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> NDArray[np.int64]:
+def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
     """3 #C, the spring along each cell's edges 0-1, 1-2, 2-0."""
-    size = np.int64(springs.ends.max()) + 1
-    keys = np.sort(springs.ends, axis=1).astype(np.int64) @ np.array([size, 1])
-    order = np.argsort(keys)
-    sides = np.sort(np.stack([cells.corner, np.roll(cells.corner, -1, axis=1)], axis=-1), axis=-1).astype(np.int64)
-    return np.asarray(order[np.searchsorted(keys[order], (sides @ np.array([size, 1])).ravel())])
+    around = _springs_at(springs.ends, int(springs.ends.max()) + 1)
+    side = np.empty_like(cells.corner)
+    given = [cells.corner, around.offset, around.neighbor, around.entry]
+    launch_each(find_sides, len(side), given, [side])
+    return side.ravel()
 
 
 def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
@@ -269,23 +333,7 @@ def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray
     return replace(springs, stiffness=stiffness, clamped_cells=0)
 
 
-def stiffness_around(ends: IntArray, stiffness: FloatArray, count: int) -> FloatArray:
-    """#V, the sum of the k_ij around each vertex, and a half of the stiffest [N/m]; of springs `ends` (#S by 2)."""
-    at, twice = ends.T.ravel(), np.tile(stiffness, 2)
-    stiffest = np.zeros(count)
-    np.maximum.at(stiffest, at, twice)
-    return np.asarray(np.bincount(at, twice, minlength=count) + _PAIR_SHARE * stiffest)
-
-
-def vertex_masses(cells: CellArrays, fabric: Fabric, vertex_count: int) -> FloatArray:
-    """#V [kg], a third of each cell's share of the cloth at each of its corners."""
-    share = np.repeat(fabric.areal_density * cells.area / 3.0, 3)
-    return np.bincount(cells.corner.ravel(), share, minlength=vertex_count).astype(np.float64)
-
-
-def shear_hold(
-    surface: Surface, springs: SpringArrays, cells: CellArrays, positions: FloatArray, warp: FloatArray
-) -> float:
+def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:
     """Shear stiffness [N/m] that the springs between triangles really have against warp and weft.
 
     They shear as their directions happen to lie: split squares have K(45 degrees)/4, and threads between them kink at
@@ -293,19 +341,21 @@ def shear_hold(
     and of these three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
 
     Args:
-        surface, springs, cells: of the piece.
+        surface, springs: of the piece.
         positions: #V by 2, a layout [m].
         warp: unit vector in the plane.
     """
-    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
-    along, across = d @ warp, d @ np.array([warp[1], -warp[0]])
-    length2 = np.maximum(along**2 + across**2, np.finfo(np.float64).tiny)
-    half = 0.5 * springs.stiffness * springs.rest_length**2 * (along * across / length2) ** 2
-    count = len(surface.vertices)
-    held = np.bincount(springs.ends[:, 0], half, count) + np.bincount(springs.ends[:, 1], half, count)
-    hold = held / np.bincount(cells.corner.ravel(), np.repeat(cells.area / 3.0, 3), count)
-    hold[surface.faces[surface.is_quad].ravel()] = np.inf
-    return _HOLD_SHARE * float(np.sort(hold)[count // 4])
+    is_quad = surface.is_quad
+    if is_quad.all():
+        return np.inf
+    around, count = springs_around(surface, springs), len(surface.vertices)
+    hold = np.empty(count)
+    layout = np.ascontiguousarray(positions, dtype=np.float64)
+    lists = [around.offset, around.neighbor, around.entry]
+    given = [layout, *lists, springs.rest_length, springs.stiffness, _areas_at(surface), wp.vec2d(*warp)]
+    launch_each(measure_hold, count, given, [hold])
+    hold[surface.faces[is_quad].ravel()] = np.inf
+    return _HOLD_SHARE * float(np.partition(hold, count // 4)[count // 4])
 
 
 @dataclass(kw_only=True)
@@ -342,6 +392,7 @@ class SpringNetwork:
     bonds: Bonds = field(init=False)
     mass: wp.array = field(init=False)
     spring_stiffness: wp.array = field(init=False)
+    _listed: wp.array = field(init=False, repr=False)
 
     @classmethod
     def build(
@@ -375,7 +426,7 @@ class SpringNetwork:
             springs = _shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
         held, hold = None, np.inf
         if model == "springs":
-            hold = shear_hold(surface, springs, cells, positions, grain_axes(grain_angle)[0])
+            hold = shear_hold(surface, springs, positions, grain_axes(grain_angle)[0])
         else:
             meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
             weights, held = step_matrix(
@@ -396,32 +447,33 @@ class SpringNetwork:
         )
 
     def __post_init__(self) -> None:
-        count, s, c = len(self.surface.vertices), self.spring_arrays, self.cell_arrays
-        here = np.concatenate([s.ends[:, 0], s.ends[:, 1]])
-        there = np.concatenate([s.ends[:, 1], s.ends[:, 0]])
-        order, offset = _by_vertex(here, there, count)
-        both = np.tile(np.arange(len(s.ends)), 2)[order]
-        device = self.device
+        s, c, surface, device = self.spring_arrays, self.cell_arrays, self.surface, self.device
+        count = len(surface.vertices)
+        at, own = springs_around(surface, s), _unweighed(surface)
+        listed = own.listed_length if s.rest_length is own.rest_length else np.take(s.rest_length, at.entry)
         springs = Springs()
-        springs.offset = wp.array(offset, dtype=wp.int32, device=device)
-        springs.neighbor = wp.array(there[order], dtype=wp.int32, device=device)
-        springs.rest_length = wp.array(s.rest_length[both], dtype=wp.float64, device=device)
-        springs.stiffness = wp.array(s.stiffness[both], dtype=wp.float64, device=device)
+        springs.offset = _on(device, at.offset, wp.int32)
+        springs.neighbor = _on(device, at.neighbor, wp.int32)
+        springs.rest_length = _on(device, listed, wp.float64)
+        springs.stiffness = wp.empty(len(listed), dtype=wp.float64, device=device)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
-        around = stiffness_around(s.ends, s.stiffness, count)
-        self.spring_stiffness = wp.array(around, dtype=wp.float64, device=device)
-        self.mass = wp.array(vertex_masses(c, self.fabric, count), dtype=wp.float64, device=device)
+        self.spring_stiffness = wp.empty(count, dtype=wp.float64, device=device)
+        self._listed = _on(device, at.entry, wp.int32)
+        self.weigh(s.stiffness)
 
-        slot, cell_offset = _by_vertex(c.corner.ravel(), np.zeros(c.corner.size, dtype=np.int32), count)
+        own_cells = cells_of(surface)
+        corners = _cells_around(surface) if c.corner is own_cells.corner else _corners_at(c.corner, count)
+        area = _areas_at(surface) if c is own_cells else vertex_areas(c, corners)
+        self.mass = _on(device, self.fabric.areal_density * area, wp.float64)
         cells = Cells()
-        cells.corner = wp.array(c.corner, dtype=wp.vec3i, device=device)
-        cells.edges = wp.array(c.edges, dtype=wp.mat22d, device=device)
-        cells.weight = wp.array(c.weight, dtype=wp.float64, device=device)
-        cells.offset = wp.array(cell_offset, dtype=wp.int32, device=device)
-        cells.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=device)
-        slack = np.ones((len(c.corner), 2)) if self.stretch is None else 1.0 / self.stretch[c.face]
-        cells.slack = wp.array(slack, dtype=wp.vec2d, device=device)
+        cells.corner = _on(device, c.corner, wp.vec3i)
+        cells.edges = _on(device, c.edges, wp.mat22d)
+        cells.weight = _on(device, c.weight, wp.float64)
+        cells.offset = _on(device, corners.offset, wp.int32)
+        cells.slot = _on(device, corners.entry, wp.int32)
+        slack = np.broadcast_to(np.ones(2), (len(c.corner), 2)) if self.stretch is None else 1.0 / self.stretch[c.face]
+        cells.slack = _on(device, slack, wp.vec2d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
@@ -439,6 +491,12 @@ class SpringNetwork:
         if self.held is not None:
             # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
             self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
+
+    def weigh(self, stiffness: FloatArray) -> None:
+        """Give the springs (#S) these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
+        given = [self.springs.offset, self._listed, _on(self.device, stiffness, wp.float64), _PAIR_SHARE]
+        made = [self.springs.stiffness, self.spring_stiffness]
+        launch_each(spread_stiffness, self.vertex_count, given, made, device=self.device)
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
@@ -493,9 +551,9 @@ class SpringNetwork:
         seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=device)
         seams.offset = wp.zeros(count, dtype=wp.float64, device=device)
         self.seams = seams
-        slot, offset = _by_vertex(ends.ravel(), np.zeros(ends.size, dtype=np.int32), self.vertex_count)
-        self.bonds.offset = wp.array(offset, dtype=wp.int32, device=device)
-        self.bonds.slot = wp.array(slot.astype(np.int32), dtype=wp.int32, device=device)
+        at = _corners_at(ends, self.vertex_count)
+        self.bonds.offset = _on(device, at.offset, wp.int32)
+        self.bonds.slot = _on(device, at.entry, wp.int32)
 
     def guide(self, vertices: IntArray) -> None:
         """Let these vertices move up and down only, as on a fold or a straight centre front."""
@@ -509,11 +567,7 @@ class SpringNetwork:
         return len(self.spring_arrays.ends)
 
 
-def _by_vertex(
-    vertex: NDArray[np.integer], then_by: NDArray[np.integer], count: int
-) -> tuple[NDArray[np.int64], IntArray]:
-    """Order that sorts entries by vertex, and #count+1, where each vertex's begin."""
-    order = stable_order(vertex * (np.int64(then_by.max(initial=0)) + 1) + then_by)
-    offset = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.bincount(vertex, minlength=count), out=offset[1:])
-    return order, offset
+def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:
+    """The values on the device; on the CPU these very ones, one number for all rows included."""
+    there = values if device.is_cpu else np.ascontiguousarray(values)
+    return wp.array(there, dtype=dtype, device=device, copy=False)

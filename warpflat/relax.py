@@ -18,12 +18,12 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
-from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
+from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
 from warpflat.kernels.transfer import correct
+from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
-from warpflat.launching import record
 from warpflat.network import SpringNetwork
 from warpflat.tangent import TangentMatrix
 
@@ -170,7 +170,9 @@ class Relaxation:
         self._first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._power = wp.zeros(n, dtype=wp.float64, device=device)
         self._stiffness = wp.zeros(n, dtype=wp.float64, device=device)
+        self._anchor = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._reach = wp.zeros(n, dtype=wp.float64, device=device)
+        self._guarded = wp.zeros(n, dtype=wp.int32, device=device)
         self._cell_acting = wp.zeros(c, dtype=wp.int32, device=device)
         self._cell_force = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
         self._cell_viscosity = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
@@ -180,10 +182,12 @@ class Relaxation:
         self._seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self._seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
         self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
+        self._vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
         self._cell_energy = wp.zeros(c, dtype=wp.float64, device=device)
         springs = self.network.spring_arrays
         # What a strain of 1e-9 everywhere stores: below it a layout counts as free of strain.
         self.negligible_energy = 0.5e-18 * float(np.sum(springs.stiffness * springs.rest_length**2))
+        self._mean_stiffness_force = float(np.mean(springs.stiffness * springs.rest_length))
         self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
         self.work_units = 0.0
@@ -195,11 +199,23 @@ class Relaxation:
         net, h = self.network, self.options.time_step
         n, c, device = net.vertex_count, net.cell_count, net.device
         evaluate_cells, compute_cell_energy, parameters = net.cell_model
-        launches = [
-            record(
+        seams = []
+        if net.seams is not None:
+            seams.append(
+                record(
+                    evaluate_seams,
+                    dim=net.seam_count,
+                    inputs=[self.position, self.velocity, net.seams, h],
+                    outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
+                    device=device,
+                )
+            )
+
+        def cells(watch: int) -> Launch:
+            return record(
                 evaluate_cells,
                 dim=c,
-                inputs=[self.position, self.velocity, net.cells, parameters, h],
+                inputs=[self.position, self.velocity, net.cells, parameters, h, watch],
                 outputs=[
                     self._cell_acting,
                     self._cell_clearance,
@@ -209,57 +225,55 @@ class Relaxation:
                 ],
                 device=device,
             )
-        ]
-        if net.seams is not None:
-            launches.append(
-                record(
-                    evaluate_seams,
-                    dim=net.seam_count,
-                    inputs=[self.position, self.velocity, net.seams, h],
-                    outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
-                    device=device,
-                )
+
+        def gather(watch: int) -> Launch:
+            return record(
+                gather_forces,
+                dim=n,
+                inputs=[
+                    self.position,
+                    self.velocity,
+                    net.mass,
+                    net.spring_stiffness,
+                    net.springs,
+                    net.cells,
+                    self._cell_acting,
+                    self._cell_clearance,
+                    self._cell_force,
+                    self._cell_viscosity,
+                    self._cell_stiffness,
+                    net.bonds,
+                    self._seam_force,
+                    self._seam_viscosity,
+                    self._seam_stiffness,
+                    self.load,
+                    h,
+                    watch,
+                ],
+                outputs=[
+                    self.force,
+                    self._power,
+                    self._driving_force,
+                    self._first_guess,
+                    self._stiffness,
+                    self._anchor,
+                    self._reach,
+                    self._guarded,
+                ],
+                device=device,
             )
-        gather = record(
-            gather_forces,
-            dim=n,
-            inputs=[
-                self.position,
-                self.velocity,
-                net.mass,
-                net.spring_stiffness,
-                net.springs,
-                net.cells,
-                self._cell_acting,
-                self._cell_clearance,
-                self._cell_force,
-                self._cell_viscosity,
-                self._cell_stiffness,
-                net.bonds,
-                self._seam_force,
-                self._seam_viscosity,
-                self._seam_stiffness,
-                self.load,
-                h,
-            ],
-            outputs=[
-                self.force,
-                self._power,
-                self._driving_force,
-                self._first_guess,
-                self._stiffness,
-                self._reach,
-            ],
-            device=device,
-        )
-        self._evaluate = LaunchSequence([*launches, gather])
+
+        self._evaluate = LaunchSequence([cells(1), *seams, gather(1)])
+        on = gather(0)
+        self._evaluate_on = LaunchSequence([cells(0), *seams, on])
+        self._evaluate_unguarded = LaunchSequence([*seams, on])
         self._measure = LaunchSequence(
             [
                 record(
                     compute_spring_energy,
                     dim=n,
                     inputs=[self.position, net.springs],
-                    outputs=[self._vertex_energy],
+                    outputs=[self._vertex_energy, self._vertex_pull],
                     device=device,
                 ),
                 record(
@@ -288,22 +302,48 @@ class Relaxation:
                 self._driving_force,
                 self._first_guess,
                 self._stiffness,
+                self._anchor,
                 self._reach,
                 h,
             ],
             outputs=[self.position, self.velocity],
             device=device,
         )
+        self._stop = record(
+            stop,
+            dim=n,
+            inputs=[net.mass, self.force, self._stiffness, h],
+            outputs=[self.velocity, self._driving_force, self._first_guess],
+            device=device,
+        )
 
     def step(self) -> None:
         """One approximate implicit step."""
-        self._evaluate.launch()
-        if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
-            self.velocity.zero_()
-            self._evaluate.launch()
-            self.restarts += 1
-        self._advance.launch()
-        self.steps += 1
+        self.sweep(1)
+
+    def sweep(self, steps: int, each_step: Callable[[], None] | None = None, *, watch_every: int = 1) -> None:
+        """Some steps in a row.
+
+        Args:
+            steps: how many.
+            each_step: called after each; must change neither places nor velocities.
+            watch_every: all cells are looked at before one step of so many. In between only those in which the guard acts are
+                evaluated, and no vertex leaves the reach that it had: three times as fast, and as good where steps are to smooth.
+        """
+        evaluate_on = self._evaluate_on
+        for number in range(steps):
+            if number % watch_every == 0:
+                self._evaluate.launch()
+                evaluate_on = self._evaluate_on if self._guarded.numpy().any() else self._evaluate_unguarded
+            else:
+                evaluate_on.launch()
+            if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
+                self._stop.launch()
+                self.restarts += 1
+            self._advance.launch()
+            self.steps += 1
+            if each_step is not None:
+                each_step()
 
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""
@@ -352,19 +392,19 @@ class Relaxation:
             return
         position, velocity = self.positions(), np.array(self.velocity.numpy())
         load = np.zeros_like(position)
-        force = self._cloth_force()
+        force = self.cloth_force()
         for piece in self.upright:
             here = piece.vertices
             chord = position[piece.upper] - position[piece.lower]
             length = float(np.hypot(chord[0], chord[1]))
             turn = np.array([[chord[1], chord[0]], [-chord[0], chord[1]]]) / length if length > 0.0 else np.eye(2)
             centre = position[here].mean(axis=0)
-            position[here] = (position[here] - centre) @ turn + centre
+            position[here] = position[here] @ turn + (centre - centre @ turn)
             velocity[here] = velocity[here] @ turn
-            arm, weight = self._arms(position, here)
-            inertia = self._inertia(arm, weight)
-            velocity[here] -= (np.einsum("ij,ij,i->", arm, velocity[here], weight) / inertia) * arm
-            load[here] = -(np.einsum("ij,ij->", arm, force[here] @ turn) / inertia) * weight[:, None] * arm
+            arm, weighted = self._arms(position, here)
+            inertia = max(float(np.vdot(arm, weighted)), 1e-300)
+            velocity[here] -= (float(np.vdot(weighted, velocity[here])) / inertia) * arm
+            load[here] = (-float(np.vdot(arm, force[here] @ turn)) / inertia) * weighted
         self.position.assign(position)
         self.velocity.assign(velocity)
         self.load.assign(load)
@@ -373,21 +413,20 @@ class Relaxation:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
         self.velocity.zero_()
         self._evaluate.launch()
-        return self._cloth_force()
+        return self.cloth_force()
 
-    def _cloth_force(self) -> NDArray[np.float64]:
+    def cloth_force(self) -> NDArray[np.float64]:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
         return np.array(self.force.numpy()) - self.load.numpy()
 
     def _arms(self, position: NDArray[np.float64], vertices: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Velocities of a rigid turn by 1 rad/s, and the weights by which motion is averaged: the stiffnesses."""
+        """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
         weight = np.asarray(self.network.spring_stiffness.numpy(), dtype=np.float64)[vertices]
-        offset = position[vertices] - np.average(position[vertices], axis=0, weights=weight)
-        return np.column_stack([-offset[:, 1], offset[:, 0]]), weight
-
-    @staticmethod
-    def _inertia(arm: NDArray[np.float64], weight: NDArray[np.float64]) -> float:
-        return max(float(np.einsum("ij,ij,i->", arm, arm, weight)), 1e-300)
+        at = position[vertices]
+        centre = weight @ at / weight.sum()
+        arm = np.empty_like(at)
+        arm[:, 0], arm[:, 1] = centre[1] - at[:, 1], at[:, 0] - centre[0]
+        return arm, weight[:, None] * arm
 
     def residual(self) -> float:
         """Largest force on a vertex, at the last evaluated state, over the mean force of the springs.
@@ -395,16 +434,15 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        s = self.network.spring_arrays
         position = self.position.numpy()
-        d = position[s.ends[:, 1]] - position[s.ends[:, 0]]
-        mean = float(np.mean(s.stiffness * np.abs(np.sqrt(np.einsum("ij,ij->i", d, d)) - s.rest_length)))
-        floor = 1e-9 * float(np.mean(s.stiffness * s.rest_length))
-        force = self._cloth_force()
+        self._measure.launches[0].launch()
+        mean = float(self._vertex_pull.numpy().sum()) / self.network.spring_count
+        floor = 1e-9 * self._mean_stiffness_force
+        force = self.cloth_force()
         for piece in self.upright:
-            arm, weight = self._arms(position, piece.vertices)
-            turning = np.einsum("ij,ij->", arm, force[piece.vertices]) / self._inertia(arm, weight)
-            force[piece.vertices] -= turning * weight[:, None] * arm
+            arm, weighted = self._arms(position, piece.vertices)
+            turning = float(np.vdot(arm, force[piece.vertices])) / max(float(np.vdot(arm, weighted)), 1e-300)
+            force[piece.vertices] -= turning * weighted
         return float(np.sqrt(np.einsum("ij,ij->i", force, force).max())) / max(mean, floor)
 
     def positions(self) -> NDArray[np.float64]:
@@ -428,13 +466,15 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
     first = state.steps
     before = state.energies()
     change, residual, converged = math.inf, math.inf, False
+
+    def stepped() -> None:
+        state.work_units += 1.0
+        if each_step is not None:
+            each_step(state, before, residual)
+
     while not converged and state.steps < options.max_steps:
         chunk = min(options.check_every, options.max_steps - state.steps)
-        for _ in range(chunk):
-            state.step()
-            state.work_units += 1.0
-            if each_step is not None:
-                each_step(state, before, residual)
+        state.sweep(chunk, stepped)
         now = state.energies()
         residual = state.residual()
         state.hold_upright()

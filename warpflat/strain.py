@@ -14,13 +14,23 @@ from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric
 from warpflat.kernels.membrane import compute_membrane_strain
-from warpflat.kernels.strain import Membrane, compute_worn_strain
+from warpflat.kernels.strain import Membrane, average_over_faces, compute_worn_strain
+from warpflat.launching import record
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges
+from warpflat.surface.topology import half_edges_of
+from warpflat.surface.untangle import signed_cell_areas
 
-__all__ = ["LayoutErrors", "WornStrain", "layout_errors", "membrane_of", "signed_cell_areas", "worn_strain"]
+__all__ = [
+    "LayoutErrors",
+    "WornStrain",
+    "layout_errors",
+    "membrane_of",
+    "signed_cell_areas",
+    "strain_energy",
+    "worn_strain",
+]
 
 FloatArray = NDArray[np.float64]
 
@@ -62,43 +72,35 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
 
     Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
     """
-    count, device = network.cell_count, network.device
+    face, device = network.cell_arrays.face, network.device
+    # A face's cells follow each other.
+    offset = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
+    cells = [wp.array(offset, dtype=wp.int32, device=device), *_worn_cells(network, positions)]
+    strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
+    record(average_over_faces, dim=len(offset) - 1, inputs=cells, outputs=faces, device=device).launch()
+    return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
+
+
+def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
+    """Strain energy [J] of a layout (#V by 2 [m]), the sum of what `worn_strain` gives per face."""
+    return float(_worn_cells(network, positions)[2].numpy().sum())
+
+
+def _worn_cells(network: SpringNetwork, positions: FloatArray) -> list[wp.array]:
+    """Strain and stress (#C by 3), energy [J] and area [m2] (#C), see `kernels.strain`."""
+    device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    strain = wp.empty(count, dtype=wp.vec3d, device=device)
-    stress = wp.empty(count, dtype=wp.vec3d, device=device)
-    energy = wp.empty(count, dtype=wp.float64, device=device)
-    area = wp.empty(count, dtype=wp.float64, device=device)
+    cells = _worn_arrays(network.cell_count, device)
     kernel, cloth = compute_worn_strain, membrane_of(network.fabric, network.grain_angle)
     if network.model == "membrane":
         kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
-    wp.launch(
-        kernel,
-        dim=count,
-        inputs=[at, network.cells, cloth, 0],
-        outputs=[strain, stress, energy, area],
-        device=device,
-    )
-    face, faces = network.cell_arrays.face, len(network.surface.faces)
-    cell_area: FloatArray = np.array(area.numpy(), dtype=np.float64)
-    face_area = np.bincount(face, cell_area, minlength=faces).astype(np.float64)
-    share = cell_area / np.where(face_area > 0, face_area, np.inf)[face]
-
-    def mean(values: FloatArray) -> FloatArray:
-        return np.stack([np.bincount(face, share * values[:, k], minlength=faces) for k in range(3)], axis=1)
-
-    return WornStrain(
-        strain=mean(strain.numpy()),
-        stress=mean(stress.numpy()),
-        energy=np.bincount(face, energy.numpy(), minlength=faces).astype(np.float64),
-        area=face_area,
-    )
+    inputs = [at, network.cells, cloth]
+    record(kernel, dim=network.cell_count, inputs=inputs, outputs=cells, device=device).launch()
+    return cells
 
 
-def signed_cell_areas(corner: NDArray[np.int32], positions: FloatArray) -> FloatArray:
-    """#C, signed areas of triangles (#C by 3) in the plane [m2]; 0 or less where one is mirrored or collapsed."""
-    p = positions[corner]
-    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
-    return 0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+def _worn_arrays(count: int, device: wp.Device) -> list[wp.array]:
+    return [wp.empty(count, dtype=kind, device=device) for kind in (wp.vec3d, wp.vec3d, wp.float64, wp.float64)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +123,7 @@ class LayoutErrors:
 def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
     """Errors of a layout (#V by 2 [m]) of the network's surface."""
     cells = network.cell_arrays
-    he = half_edges(surface.faces)
+    he = half_edges_of(surface)
     edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
     signed = signed_cell_areas(cells.corner, positions)

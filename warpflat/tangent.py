@@ -7,7 +7,7 @@ import warp as wp
 
 from warpflat.kernels.membrane import bound_membrane
 from warpflat.membrane import corner_sums
-from warpflat.network import SpringNetwork, springs_of_sides, stiffness_around
+from warpflat.network import SpringNetwork, springs_of_sides
 
 __all__ = ["TangentMatrix"]
 
@@ -22,11 +22,8 @@ class TangentMatrix:
 
     def __init__(self, network: SpringNetwork) -> None:
         """Of this network; nothing is changed before `follow` is called."""
-        ends = network.spring_arrays.ends
-        here, there = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
         self._network = network
         self._side = springs_of_sides(network.spring_arrays, network.cell_arrays)
-        self._spring = np.tile(np.arange(len(ends)), 2)[np.lexsort((there, here))]
         self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
 
     def follow(self, position: wp.array) -> None:
@@ -42,7 +39,5 @@ class TangentMatrix:
         )
         weight = np.array(self._weight.numpy())
         stiffness = np.bincount(self._side, weight, minlength=network.spring_count).astype(np.float64)
-        network.springs.stiffness.assign(stiffness[self._spring])
-        ends = network.spring_arrays.ends
-        network.spring_stiffness.assign(stiffness_around(ends, stiffness, network.vertex_count))
+        network.weigh(stiffness)
         network.cloth.held.assign(corner_sums(weight.reshape(-1, 3)).ravel())

@@ -8,10 +8,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.flattening import Flattening, Stage
+from warpflat.flattening import Flattening
 from warpflat.network import CellArrays, SpringArrays, SpringNetwork
+from warpflat.progress import Stage
 from warpflat.relax import Relaxation, Upright
-from warpflat.strain import worn_strain
+from warpflat.strain import strain_energy
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import components
 
@@ -124,7 +125,7 @@ class Together:
                 name="sew",
                 spring_energy_j=energies.spring,
                 guard_energy_j=energies.guard,
-                strain_energy_j=float(worn_strain(piece.network, own).energy.sum()),
+                strain_energy_j=strain_energy(piece.network, own),
                 steps=state.steps,
                 work_units=float(state.steps),
                 seconds=seconds,

@@ -9,7 +9,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
-from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces
+from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.springs import compute_spring_energy
 
 from warpflat.fabric import Fabric
@@ -63,6 +63,7 @@ class Launched:
     velocities: NDArray[np.float64] | None = None
     time_step: float = 0.01
     pieces: int = 1
+    watch: int = 1
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -82,7 +83,10 @@ class Launched:
             "driving_force": zeros(n, wp.vec2d),
             "first_guess": zeros(n, wp.vec2d),
             "stiffness": zeros(n),
+            "anchor": zeros(n, wp.vec2d),
             "reach": zeros(n),
+            "guarded": zeros(n, wp.int32),
+            "pull": zeros(n),
             "energy": zeros(n),
         }
 
@@ -93,7 +97,7 @@ class Launched:
         given = {
             name: getattr(self.network, name) for name in ("springs", "cells", "guard", "mass", "spring_stiffness")
         }
-        given |= {"bonds": getattr(self.network, "bonds", None), "time_step": self.time_step}
+        given |= {"bonds": getattr(self.network, "bonds", None), "time_step": self.time_step, "watch": self.watch}
         # no seam binds this network
         given |= {"bond_force": zeros(0, wp.vec2d), "bond_viscosity": zeros(0, wp.vec2d), "bond_stiffness": zeros(0)}
         given |= {"load": zeros(self.network.vertex_count, wp.vec2d)}
@@ -112,6 +116,10 @@ class Launched:
 
     def gather_forces(self) -> Launched:
         self._launch(gather_forces, self.network.vertex_count)
+        return self
+
+    def stop(self) -> Launched:
+        self._launch(stop, self.network.vertex_count)
         return self
 
     def advance(self) -> Launched:

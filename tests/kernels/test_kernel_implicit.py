@@ -96,6 +96,50 @@ def test_no_velocity_can_mirror_a_cell(seed: int):
     assert moved.max() > 0
 
 
+def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_its_reach():
+    network = small_network()
+    velocities = np.random.default_rng(3).normal(scale=1e3, size=(network.vertex_count, 2))
+    at = Launched(network, shaken(network, scale=0.99), velocities, 0.1).evaluate_guard().gather_forces()
+    idle = at["cell_acting"] == 0
+    assert idle.any()
+    reach, anchor, clearance = at["reach"], at["anchor"], at["cell_clearance"]
+    assert np.array_equal(anchor, at["position"])
+    at.watch = 0
+    for _ in range(5):
+        at.advance()
+        away = np.linalg.norm(at["position"] - anchor, axis=1)
+        assert (away <= reach * (1 + 1e-9)).all()
+        at.arrays["velocity"].assign(velocities)
+        at.evaluate_guard().gather_forces()
+        assert np.array_equal(at["cell_clearance"][idle], clearance[idle])
+        assert np.array_equal(at["anchor"], anchor)
+        assert np.array_equal(at["reach"], reach)
+    assert away.max() > 0.5 * reach.max()
+    at.watch = 1
+    assert (at.evaluate_guard()["cell_clearance"] > 0).all()
+
+
+def test_two_looks_at_one_layout_give_the_same_forces():
+    network = small_network()
+    at = Launched(network, shaken(network, scale=0.8)).evaluate_guard().gather_forces()
+    whole = {name: at[name] for name in ("force", "driving_force", "stiffness", "first_guess")}
+    at.watch = 0
+    at.evaluate_guard().gather_forces()
+    for name, values in whole.items():
+        assert np.array_equal(at[name], values), name
+
+
+def test_stopping_gives_what_forces_at_rest_are():
+    network = small_network()
+    velocities = np.random.default_rng(8).normal(size=(network.vertex_count, 2))
+    moving = Launched(network, shaken(network, scale=0.8), velocities).evaluate_guard().gather_forces()
+    assert np.abs(moving["driving_force"] - moving["force"]).max() > 0
+    moving.stop()
+    still = Launched(network, shaken(network, scale=0.8)).evaluate_guard().gather_forces()
+    for name in ("velocity", "force", "driving_force", "first_guess", "stiffness"):
+        np.testing.assert_allclose(moving[name], still[name], rtol=1e-12, atol=1e-15, err_msg=name)
+
+
 def test_a_vertex_of_a_mirrored_cell_stays():
     network = small_network()
     positions = shaken(network, scale=1.0, noise=0.0)

@@ -61,7 +61,7 @@ def evaluated(
     wp.launch(
         evaluate_membrane,
         dim=c,
-        inputs=[at, moving, network.cells, network.cloth, 0.01, 0],
+        inputs=[at, moving, network.cells, network.cloth, 0.01, 1, 0],
         outputs=list(out.values()),
         device=DEVICE,
     )

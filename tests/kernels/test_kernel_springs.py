@@ -19,6 +19,16 @@ def test_energy_is_half_k_stretch_squared_of_every_spring_once():
     np.testing.assert_allclose(per_vertex, shared, rtol=1e-12)
 
 
+def test_pull_is_k_times_stretch_of_every_spring_once():
+    network = small_network()
+    positions = shaken(network, scale=1.1)
+    s = network.spring_arrays
+    length = np.linalg.norm(positions[s.ends[:, 1]] - positions[s.ends[:, 0]], axis=1)
+    at = Launched(network, positions)
+    at.spring_energy()
+    assert at["pull"].sum() == pytest.approx((s.stiffness * np.abs(length - s.rest_length)).sum(), rel=1e-13)
+
+
 @pytest.mark.parametrize("scale", [0.8, 1.0, 1.3])
 def test_forces_are_minus_the_gradient_of_the_energy(scale: float):
     network = small_network()

@@ -22,7 +22,8 @@ from warpflat.surface import (
     triangulate,
     unfold_quad_diagonals,
 )
-from warpflat.surface.topology import stable_order
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import half_edges_of, order_by, places_of, stable_order
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 
@@ -248,3 +249,42 @@ def test_stable_order_is_that_of_a_stable_sort(greatest):
     keys[::7] = keys[0]
     assert np.array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
     assert len(stable_order(keys[:0])) == 0
+
+
+def test_order_by_is_that_of_a_stable_sort_and_says_where_each_number_begins():
+    keys = np.random.default_rng(4).integers(0, 20, 300, dtype=np.int32)
+    keys[keys == 7] = 8
+    order, offset = order_by(keys, 22)
+    assert np.array_equal(order, np.argsort(keys, kind="stable"))
+    assert np.array_equal(offset, np.searchsorted(np.sort(keys), np.arange(23)))
+    none, offset = order_by(keys[:0], 3)
+    assert len(none) == 0
+    assert offset.tolist() == [0, 0, 0, 0]
+
+
+def test_half_edges_of_a_surface_are_made_once_and_not_to_be_changed():
+    vertices, quads = grid(3, 3)
+    surface = Surface(vertices=vertices, faces=quads, input_vertices=vertices, input_index=np.arange(9, dtype=np.int32))
+    he = half_edges_of(surface)
+    assert half_edges_of(surface) is he
+    for name, values in vars(half_edges(quads)).items():
+        assert np.array_equal(getattr(he, name), values), name
+    with pytest.raises(ValueError, match="read-only"):
+        he.tail[0] = 1
+    assert surface.faces.flags.writeable
+
+
+def test_the_two_sides_of_a_crack_are_at_one_place():
+    vertices, quads = grid(4, 4)
+    assert np.array_equal(places_of(vertices, quads), np.arange(16))
+    # The faces right of the line 1, 5, 9 get vertices 16, 17, 18 there, in the very same places.
+    cut = quads.copy()
+    right = np.isin(np.arange(9) % 3, [1, 2])
+    for new, old in enumerate((1, 5, 9)):
+        cut[right] = np.where(cut[right] == old, 16 + new, cut[right])
+    # Another one inside, at the place of vertex 6, is no side of a crack.
+    both = np.concatenate([vertices, vertices[[1, 5, 9]]])
+    both[10] = both[6]
+    assert places_of(both, cut)[16:].tolist() == [1, 5, 9]
+    assert np.array_equal(places_of(both, cut)[:16], np.arange(16))
+    assert np.array_equal(places_of(both, cut, sides=half_edges(cut)), places_of(both, cut))

@@ -10,7 +10,9 @@ from warpflat.fabric import find_fabric
 from warpflat.network import cells_of, springs_of
 from warpflat.shapes import make_shape
 from warpflat.surface import make_surface
-from warpflat.surface.unfold import lay_quads_flat, quad_creases
+from warpflat.surface.cut import cut_along
+from warpflat.surface.topology import unfold_quad_diagonals
+from warpflat.surface.unfold import lay_cells, quad_creases
 
 FloatArray = NDArray[np.float64]
 
@@ -28,43 +30,63 @@ def tilted_tube(angle: float, *, skew: float = 0.0) -> tuple[FloatArray, FloatAr
     return flat, body, faces.astype(np.int32)
 
 
+def distances(
+    body: FloatArray, faces: NDArray[np.int32], crease: NDArray[np.int8]
+) -> dict[tuple[int, int], FloatArray]:
+    """Of quads, the distances between their corners as their cells, laid flat, have them."""
+    edges, _ = lay_cells(body, faces, crease, np.arange(0, 4 * len(faces), 4, dtype=np.int32))
+    length = np.linalg.norm(edges, axis=1).reshape(-1, 4, 2)
+    opposite = np.linalg.norm(edges[..., 1] - edges[..., 0], axis=1).reshape(-1, 4)
+    between: dict[tuple[int, int], FloatArray] = {}
+    for k in range(4):
+        # Each side and each diagonal is in two cells, and of one length there.
+        before, after = (k - 1) % 4, (k + 1) % 4
+        for (a, b), here in (
+            ((before, k), length[:, k, 0]),
+            ((k, after), opposite[:, k]),
+            ((before, after), length[:, k, 1]),
+        ):
+            known = between.setdefault((min(a, b), max(a, b)), here)
+            np.testing.assert_allclose(here, known, rtol=1e-13)
+    return between
+
+
 @pytest.mark.parametrize("turned_over", [False, True])
 def test_on_a_tube_the_ruling_is_the_crease(turned_over: bool):
     ruling = np.arctan2(0.01, 0.012)
     flat, body, faces = tilted_tube(-ruling if turned_over else ruling)
-    crease, face = quad_creases(body, faces)
-    np.testing.assert_array_equal(face, np.arange(len(faces)))
+    crease = quad_creases(body, faces)
+    assert len(crease) == len(faces)
     along = (0, 2) if crease[0] == 0 else (1, 3)
     d = body[faces[0][along[1]]] - body[faces[0][along[0]]]
     assert abs(d[1]) == pytest.approx(np.linalg.norm(d), rel=1e-9)
     assert (crease == crease[0]).all()
     # Sides across the tube are chords; with those, every quad unfolds into the same one, and no more is missing than chords do.
-    laid, _, _ = lay_quads_flat(body, faces)
-    np.testing.assert_allclose(laid, np.broadcast_to(laid[:1], laid.shape), atol=1e-12)
-    for a, b in ((0, 1), (1, 2), (2, 3), (3, 0), (0, 2), (1, 3)):
+    for (a, b), laid in distances(body, faces, crease).items():
+        np.testing.assert_allclose(laid, laid[0], rtol=1e-12)
         in_plane = np.linalg.norm(flat[faces[:, a]] - flat[faces[:, b]], axis=1)
-        np.testing.assert_allclose(np.linalg.norm(laid[:, a] - laid[:, b], axis=1), in_plane, rtol=1e-2)
+        np.testing.assert_allclose(laid, in_plane, rtol=1e-2)
 
 
 def test_creased_quads_keep_their_sides_and_cells_and_springs_agree():
     _, body, faces = tilted_tube(0.6, skew=0.3)
     surface = make_surface(body, faces)
-    laid, face, _ = lay_quads_flat(surface.vertices, surface.faces)
-    assert len(face) == len(faces)
-    corner = surface.faces[face]
-    for a in range(4):
-        b = (a + 1) % 4
+    crease, corner = quad_creases(surface.vertices, surface.faces), surface.faces
+    assert (crease >= 0).all()
+    laid = distances(surface.vertices, surface.faces, crease)
+    for a, b in ((0, 1), (1, 2), (2, 3), (0, 3)):
         space = np.linalg.norm(surface.vertices[corner[:, a]] - surface.vertices[corner[:, b]], axis=1)
-        np.testing.assert_allclose(np.linalg.norm(laid[:, a] - laid[:, b], axis=1), space, rtol=1e-12)
-    shoelace = 0.5 * np.linalg.det(np.stack([laid[:, 2] - laid[:, 0], laid[:, 3] - laid[:, 1]], axis=1))
-    assert (shoelace > 0.0).all()
+        np.testing.assert_allclose(laid[a, b], space, rtol=1e-12)
     springs = springs_of(surface, find_fabric("woven"), surface.vertices[:, :2])
     diagonals = springs.rest_length[springs.edge_count :].reshape(2, -1)
     for k in (0, 1):
-        np.testing.assert_allclose(diagonals[k], np.linalg.norm(laid[:, k] - laid[:, k + 2], axis=1), rtol=1e-12)
-    # The four cells of a quad at half weight are the quad.
-    area = np.bincount(cells_of(surface).face, cells_of(surface).area)
-    np.testing.assert_allclose(area, shoelace, rtol=1e-12)
+        np.testing.assert_allclose(diagonals[k], laid[k, k + 2], rtol=1e-12)
+    # The four cells of a quad at half weight are the quad: by Bretschneider's formula, of its sides and diagonals.
+    cells = cells_of(surface)
+    assert (np.linalg.det(cells.edges) > 0.0).all()
+    across = laid[0, 1] ** 2 - laid[1, 2] ** 2 + laid[2, 3] ** 2 - laid[0, 3] ** 2
+    whole = 0.25 * np.sqrt(4.0 * laid[0, 2] ** 2 * laid[1, 3] ** 2 - across**2)
+    np.testing.assert_allclose(np.bincount(cells.face, cells.area), whole, rtol=1e-12)
 
 
 def test_a_lone_quad_is_creased_along_its_longer_diagonal_and_unfolds_into_what_it_was():
@@ -75,41 +97,51 @@ def test_a_lone_quad_is_creased_along_its_longer_diagonal_and_unfolds_into_what_
             # Fold corner 3 up about the diagonal 0-2.
             vertices[3] = middle + out * np.cos(angle) + np.linalg.norm(out) * np.array([0, 0, np.sin(angle)])
             faces = np.roll([[0, 1, 2, 3]], roll, axis=1).astype(np.int32)
-            laid, _, crease = lay_quads_flat(vertices, faces)
+            crease = quad_creases(vertices, faces)
             assert crease.tolist() == [roll % 2]
-            sides = np.linalg.norm(np.roll(laid[0], -1, axis=0) - laid[0], axis=1)
+            laid = distances(vertices, faces, crease)
+            sides = [laid[a, b] for a, b in ((0, 1), (1, 2), (2, 3), (0, 3))]
             np.testing.assert_allclose(sides, 1.0, rtol=1e-14)
-            np.testing.assert_allclose(
-                np.linalg.norm(laid[0, [0, 1]] - laid[0, [2, 3]], axis=1), np.sqrt(2), rtol=1e-14
-            )
+            np.testing.assert_allclose([laid[0, 2], laid[1, 3]], np.sqrt(2), rtol=1e-14)
+            lengths, _ = unfold_quad_diagonals(vertices, faces, crease=crease)
+            np.testing.assert_allclose(lengths, np.sqrt(2), rtol=1e-14)
 
 
 def test_flat_twisted_and_reflex_quads_have_no_crease():
-    assert (
-        quad_creases(make_shape("cylinder", resolution=9).vertices, make_shape("cylinder", resolution=9).faces)[0] < 0
-    ).all()
+    tube = make_shape("cylinder", resolution=9)
+    assert (quad_creases(tube.vertices, tube.faces) < 0).all()
     saddle = make_shape("saddle", resolution=17)
     middle = (np.abs(saddle.vertices[saddle.faces].mean(axis=1)[:, :2]) < 0.05).all(axis=1)
-    crease, face = quad_creases(saddle.vertices, saddle.faces)
+    crease = quad_creases(saddle.vertices, saddle.faces)
     assert middle.sum() > 4
-    assert (crease[np.isin(face, np.flatnonzero(middle))] < 0).all()
+    assert (crease[middle] < 0).all()
     # Of a sphere every direction is as curved, however long the diagonals of a quad are.
     dome = make_shape("hemisphere", resolution=17)
-    assert (quad_creases(dome.vertices, dome.faces)[0] < 0).mean() > 0.9
+    assert (quad_creases(dome.vertices, dome.faces) < 0).mean() > 0.9
     reflex = np.array([[0, 0, 0], [1, 0, 0], [0.2, 0.2, 0.05], [0, 1, 0]], dtype=float)
-    assert quad_creases(reflex, np.array([[0, 1, 2, 3]], dtype=np.int32))[0].tolist() == [-1]
-    triangle = np.array([[0, 1, 2, -1]], dtype=np.int32)
-    assert len(lay_quads_flat(reflex, triangle)[0]) == 0
+    assert quad_creases(reflex, np.array([[0, 1, 2, 3]], dtype=np.int32)).tolist() == [-1]
+    assert quad_creases(reflex, np.array([[0, 1, 2, -1]], dtype=np.int32)).tolist() == [-1]
 
 
 def test_a_cut_changes_no_crease():
     """Its two sides lie at the same place in space."""
     _, body, faces = tilted_tube(0.5)
-    before, _ = quad_creases(body, faces)
+    before = quad_creases(body, faces)
     assert (before >= 0).all()
     cut = faces.copy()
     right = np.arange(len(faces)) % 11 >= 5
     line = 5 + 12 * np.arange(12)
     cut[right] = np.where(np.isin(faces[right], line), 144 + faces[right] // 12, faces[right])
-    after, _ = quad_creases(np.concatenate([body, body[line]]), cut)
+    after = quad_creases(np.concatenate([body, body[line]]), cut)
     np.testing.assert_array_equal(after, before)
+
+
+@pytest.mark.parametrize("column", [2, 6, 10])
+def test_a_cut_changes_no_crease_where_the_body_curves_both_ways(column: int):
+    """There one side of the cut alone would tell another normal than both."""
+    body = make_shape("bodice", resolution=13)
+    line = np.arange(169, dtype=np.int32).reshape(13, 13)[:8, column]
+    cut = cut_along(body.faces, np.ascontiguousarray(line), vertex_count=169)
+    before = quad_creases(body.vertices, body.faces)
+    assert (before >= 0).any()
+    np.testing.assert_array_equal(quad_creases(body.vertices[cut.vertex_origin], cut.faces), before)

@@ -53,6 +53,21 @@ def test_a_vertex_pulled_over_its_neighbours_comes_back_and_the_rest_stays():
     assert np.array_equal(out[far], flat[far])
 
 
+def test_only_suspects_are_looked_at_to_begin_with():
+    vertices, triangles, _ = scattered(300, plane)
+    surface = make_surface(vertices, triangles)
+    flat = surface.vertices[:, :2].copy()
+    flat[int(np.argmin(np.linalg.norm(flat - [0.3, 0.5], axis=1)))] += 0.12
+    mirrored = np.flatnonzero(areas(surface, flat) <= 0)
+    everywhere, _ = untangle(surface, flat)
+    out, left = untangle(surface, flat, suspects=mirrored)
+    assert left == 0
+    assert np.array_equal(out, everywhere)
+    far = np.flatnonzero(np.linalg.norm(flat[surface.faces[:, 0]] - [0.8, 0.2], axis=1) < 0.2)
+    out, _ = untangle(surface, flat, suspects=far)
+    assert np.array_equal(out, flat)
+
+
 def test_layout_folded_at_large_is_given_up_with_the_count():
     surface = make_surface(*grid(9, 9))
     flat = surface.vertices[:, :2] * [-1.0, 1.0]

@@ -3,9 +3,9 @@
 The distance d at a vertex v is the least d(p) + |v - p| over the points p of the sides opposite to it, with d linear
 along each side (the Hopf-Lax form of the eikonal equation; Bornemann and Rasch 2006). It is exact where the front is
 straight, on whatever triangles, hence for a straight line on a surface that can be developed; the heat method is off
-by a quarter of an edge and more there. Fast marching (geometry-central's) solves it up to obtuse triangles; from there
-policy iteration takes a few steps: with every vertex's p held, the equations are linear; with d known, every p is a
-formula.
+by a quarter of an edge and more there. It is found from above: distances along edges are no shorter, and going
+through the vertices in the order of these, each takes the best p that it sees and, if that has brought it nearer, lets
+its neighbours look again. With every vertex's p held, the equations are linear, and triangular but for ways in circles.
 
 The station of the nearest point is constant along the way to it: the same linear system carries it. Beyond the ends of
 the line, where the nearest point is one end for all, the direction in which the way leaves that end is carried instead.
@@ -14,17 +14,19 @@ the line, where the nearest point is one end for all, the direction in which the
 from __future__ import annotations
 
 import numpy as np
+import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.kernels.geodesic import carry_along, find_ways, see_sides
 from warpflat.surface.lines import line_from_curve
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
 from warpflat.surface.topology import (
-    border_edges,
     components,
-    half_edges,
-    stable_order,
+    half_edges_of,
+    launch_each,
+    order_by,
     triangulate,
     unfold_quad_diagonals,
 )
@@ -43,11 +45,13 @@ def distance_from(surface: Surface, line: ArrayLike) -> NDArray[np.float64]:
     path = np.asarray(line, dtype=np.int64).ravel()
     if len(path) == 0 or path.min() < 0 or path.max() >= len(surface.vertices):
         raise InputError(f"a line on {surface.name!r} needs vertices from 0 to {len(surface.vertices) - 1}")
-    return _Ways(surface, path).distance
+    return _Ways(surface, _short_triangles(surface), path).distance
 
 
 def _short_triangles(surface: Surface) -> NDArray[np.int32]:
     """#T by 3, quads split along their shorter diagonal."""
+    if not surface.is_quad.any():
+        return np.ascontiguousarray(surface.faces[:, :3])
     lengths, quads = unfold_quad_diagonals(surface.vertices, surface.faces)
     other = np.zeros(len(surface.faces), dtype=bool)
     other[quads] = lengths[:, 1] < lengths[:, 0] * (1 - 1e-9)
@@ -84,16 +88,20 @@ def signed_distance_and_station(
         path, before = extend_to_border(surface, path)
     station = chain_positions(surface.vertices[path])
     station -= station[before]
-    ways = _Ways(surface, path.astype(np.int64))
+    triangles = _short_triangles(surface)
+    ways = _Ways(surface, triangles, path.astype(np.int64))
     along = ways.carry(path.astype(np.int64), station)
-    known, side, about_ends = _directions_at_line(surface, path)
+    known, side, about_ends = _directions_at_line(surface, triangles, path)
     columns = ways.carry(known, np.column_stack([side, *about_ends])).T
     x, y = ways.distance * np.sign(columns[0]), along
     for (right, up), end, outwards in ((columns[1:3], station[0], -1.0), (columns[3:], station[-1], 1.0)):
         beyond = outwards * up > 0
         scale = ways.distance / np.where(beyond, np.hypot(right, up), 1.0)
         x, y = np.where(beyond, scale * right, x), np.where(beyond, end + scale * up, y)
-    sides = _sides(surface, path)
+    # A way from beyond the line's reach of known places may end on the line itself, which has no side.
+    lost = columns[0] == 0
+    lost[path] = False
+    sides = _sides(surface, path) if lost.any() else None
     return (x if sides is None else sides * np.abs(x)), y
 
 
@@ -104,7 +112,7 @@ def extend_to_border(surface: Surface, line: NDArray[np.int32]) -> tuple[NDArray
         The longer line, and the position of the old line's first vertex in it. An end from which no way leads to the
         border clear of the line stays where it is.
     """
-    border = set(np.unique(border_edges(surface.faces)).tolist())
+    border = _on_border(surface)
     path = list(map(int, line))
     if path[-1] not in border:
         path += _ahead(surface, path)
@@ -112,6 +120,11 @@ def extend_to_border(surface: Surface, line: NDArray[np.int32]) -> tuple[NDArray
     if path[0] not in border:
         path = (path[::-1] + _ahead(surface, path[::-1]))[::-1]
     return np.array(path, dtype=np.int32), len(path) - count
+
+
+def _on_border(surface: Surface) -> set[int]:
+    he = half_edges_of(surface)
+    return set(np.unique(he.edges[he.count == 1]).tolist())
 
 
 def _ahead(surface: Surface, path: list[int]) -> list[int]:
@@ -135,14 +148,18 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
         new = line_from_curve(surface, trace, name="extension").tolist()
     except InputError:
         return []
-    border = set(np.unique(border_edges(surface.faces)).tolist())
+    border = _on_border(surface)
     stop = next((i for i, vertex in enumerate(new) if vertex in border), -1)
     new = new[: stop + 1]
     return new[1:] if stop > 0 and not set(new[1:]) & set(path) else []
 
 
-# Policy iteration at least doubles the correct digits each time; more steps than this are never taken.
-_MOST_STEPS = 30
+# Rounds over all vertices; a mesh of needles may take that many, any other a few.
+_MOST_ROUNDS = 200
+# How far back in the order of vertices a shorter way is made known at once, as a share of all.
+_REACH = 0.1
+# Less of the largest distance, or of the largest value carried, is rounding.
+_ROUNDING = 1e-14
 
 
 class _Ways:
@@ -150,108 +167,98 @@ class _Ways:
 
     Attributes:
         distance: #V [m].
-        first, second, share: #V, the way from a vertex passes between `first` and `second`, this share of the way
-            from the first to the second. Vertices of the line have themselves.
     """
 
-    def __init__(self, surface: Surface, line: NDArray[np.int64]) -> None:
-        import potpourri3d
-
-        self.size = len(surface.vertices)
-        self.on_line = np.zeros(self.size, dtype=bool)
-        self.on_line[line] = True
-        triangles = _short_triangles(surface)
-        solver = potpourri3d.MeshFastMarchingDistanceSolver(surface.vertices, triangles)
-        chain: list[tuple[int, list[float]]] = [(int(vertex), []) for vertex in line]
-        distance = np.maximum(np.array(solver.compute_distance([chain]), dtype=np.float64), 0.0)
-        distance[line] = 0.0
-        self._see_corners(surface.vertices, triangles)
-        for _ in range(_MOST_STEPS):
-            cost, change = self._choose_ways(distance)
-            if change <= 1e-12 * float(distance.max()):
+    def __init__(self, surface: Surface, triangles: NDArray[np.int32], line: NDArray[np.int64]) -> None:
+        # Ways along edges are no shorter, and nearly in the right order: in here vertices are numbered by these.
+        along_edges = _along_edges(surface, line)
+        order = np.argsort(along_edges, kind="stable").astype(np.int32)
+        self._here = np.arange(len(order), dtype=np.int32)
+        self._rank = np.empty_like(order)
+        self._rank[order] = self._here
+        distance = along_edges[order]
+        tolerance = _ROUNDING * float(distance[np.isfinite(distance)][-1])
+        self._on_line = np.zeros(len(order), dtype=np.int32)
+        self._on_line[self._rank[line]] = 1
+        corner = self._rank[triangles]
+        slot, offset = order_by(corner.ravel(), len(order))
+        ends, seen = np.empty((corner.size, 2), dtype=np.int32), np.empty((corner.size, 3))
+        launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
+        waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
+        self._ways = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
+        for _ in range(_MOST_ROUNDS):
+            shortened[0] = 0
+            wp.launch(
+                find_ways,
+                dim=1,
+                inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
+                outputs=[distance, waiting, *self._ways, shortened],
+                device="cpu",
+            )
+            if shortened[0] == 0:
                 break
-            distance = self._solve(cost)
-        self.distance = distance
+        self._order, self._straight = self._order_of_ways()
+        self.distance = self._carry(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
 
-    def _see_corners(self, vertices: NDArray[np.float64], triangles: NDArray[np.int32]) -> None:
-        """Each vertex with each side opposite to it, triangle by triangle: how long that is, and where it lies."""
-        at, ahead, behind = (np.roll(triangles, -k, axis=1).T.ravel() for k in range(3))
-        order = stable_order(at)
-        order = order[~self.on_line[at[order]]]
-        self._corner = at[order], ahead[order], behind[order]
-        self._first_row = np.flatnonzero(np.diff(self._corner[0], prepend=-1))
-        away, before, side = (points_at(vertices, index) for index in self._corner)
-        side -= before
-        away -= before
-        del before, at, ahead, behind, order  # large
-        self._side = norm(side)
-        self._safe_side = np.where(self._side > 0, self._side, 1.0)
-        self._foot = dot(away, side) / self._safe_side
-        self._height = norm(cross(away, side)) / self._safe_side
+    def _order_of_ways(self) -> tuple[NDArray[np.int32], bool]:
+        """The vertices, each after those that its way leads to, as far as ways do not go in circles; whether none does."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import connected_components
 
-    def _choose_ways(self, distance: NDArray[np.float64]) -> tuple[NDArray[np.float64], float]:
-        """Set each vertex's way to the best one given the distances.
+        first, second, share, _ = self._ways
+        count = len(self._here)
+        ends = np.stack(
+            [np.where(share < 1, first, self._here), np.where(share > 0, second, self._here)], axis=1
+        ).ravel()
+        offset = np.arange(0, len(ends) + 1, 2, dtype=np.int32)
+        graph = csr_array((np.ones(len(ends), dtype=np.int8), ends, offset), shape=(count, count))
+        # Strongly connected components come numbered in such an order, of which nothing but the number of rounds depends.
+        parts, label = connected_components(graph, connection="strong")
+        straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
+        return order_by(label, parts)[0], straight
 
-        Returns:
-            #V, the length [m] of each way's first leg; and by how much at most the distances change [m] if those of all other
-            vertices are right.
-        """
-        vertex, a, b = self._corner
-        da, db = distance[a], distance[b]
-        slope = np.clip((db - da) / self._safe_side, -1 + 1e-15, 1 - 1e-15)
-        at = np.clip(self._foot - slope * self._height / np.sqrt(1 - slope**2), 0, self._side)
-        share = at / self._safe_side
-        leg = np.sqrt((at - self._foot) ** 2 + self._height**2)
-        before = da + share * (db - da)
-        # A way leads downhill. Where rounding leaves none that does, the lowest will do; on needles two vertices would
-        # else lead to each other.
-        value = np.where(before < distance[vertex], before + leg, 1e6 * (1.0 + before))
-        least = np.minimum.reduceat(value, self._first_row)
-        row = np.flatnonzero(value == np.repeat(least, np.diff(self._first_row, append=len(value))))
-        row = row[np.diff(vertex[row], prepend=-1) > 0]
-        chosen = vertex[row]
-        self.first, self.second, self.share = np.arange(self.size), np.arange(self.size), np.zeros(self.size)
-        self.first[chosen], self.second[chosen], self.share[chosen] = a[row], b[row], share[row]
-        cost = np.zeros(self.size)
-        cost[chosen] = leg[row]
-        # Nearly triangular in this order, so the factors stay as sparse as the matrix.
-        self._order = np.argsort(distance, kind="stable")
-        change = float(np.abs(value[row] - distance[chosen]).max(initial=0.0))
-        return cost, change
-
-    def _solve(self, right: NDArray[np.float64], also_fixed: NDArray[np.int64] | None = None) -> NDArray[np.float64]:
-        """x with x(v) = right(v) + the x where the way of v passes; x = right on the line."""
-        from scipy.sparse import csc_matrix
-        from scipy.sparse.linalg import splu
-
-        fixed = self.on_line.copy()
-        if also_fixed is not None:
-            fixed[also_fixed] = True
-        rank = np.empty(self.size, dtype=np.int32)
-        rank[self._order] = np.arange(self.size, dtype=np.int32)
-        # Row by row in the order of distance: 1 for the vertex itself, less its shares of two others if it has a way.
-        free = ~fixed[self._order]
-        offset = np.concatenate([[0], np.cumsum(np.where(free, 3, 1))]).astype(np.int32)
-        at, way = offset[:-1][free], self._order[free]
-        entries, columns = np.ones(offset[-1]), np.empty(offset[-1], dtype=np.int32)
-        columns[offset[:-1]] = np.arange(self.size)
-        columns[at + 1], columns[at + 2] = rank[self.first[way]], rank[self.second[way]]
-        entries[at + 1], entries[at + 2] = self.share[way] - 1.0, -self.share[way]
-        transposed = csc_matrix((entries, columns, offset), shape=(self.size, self.size))
-        # Rows so alike that SuperLU's blocks only cost.
-        factors = splu(transposed, permc_spec="NATURAL", panel_size=1, relax=1)
-        solution = factors.solve(right[self._order], trans="T")
-        return np.asarray(solution[rank])
+    def _carry(self, fixed: NDArray[np.int32], value: NDArray[np.float64], *, grows: float) -> NDArray[np.float64]:
+        """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
+        change = np.empty(value.shape[1])
+        for _ in range(_MOST_ROUNDS):
+            change[:] = 0.0
+            wp.launch(
+                carry_along,
+                dim=1,
+                inputs=[*self._ways, self._order, fixed, grows],
+                outputs=[value, change],
+                device="cpu",
+            )
+            if self._straight or not (change > _ROUNDING * np.abs(value).max(axis=0)).any():
+                break
+        return value
 
     def carry(self, known: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
         """#V (by #K), the values (#N, or #N by #K) of `known` vertices, the line's among them, carried to all others."""
-        right = np.zeros((self.size, *values.shape[1:]))
-        right[known] = values
-        return self._solve(right, also_fixed=known)
+        fixed, at = self._on_line.copy(), self._rank[known]
+        fixed[at] = 1
+        start = np.zeros((len(fixed), *values.shape[1:]))
+        start[at] = values
+        return self._carry(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
+
+
+def _along_edges(surface: Surface, line: NDArray[np.int64]) -> NDArray[np.float64]:
+    """#V, the distance [m] from the line along edges."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    edges, size = half_edges_of(surface).edges, len(surface.vertices)
+    ends = points_at(surface.vertices, edges.T)
+    # A length of zero would be read as "no edge".
+    length = np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny)
+    # Edges are sorted by their first vertex.
+    offset = np.searchsorted(edges[:, 0], np.arange(size + 1)).astype(np.int32)
+    graph = csr_array((length, edges[:, 1], offset), shape=(size, size))
+    return np.asarray(dijkstra(graph, directed=False, indices=line, min_only=True))
 
 
 def _directions_at_line(
-    surface: Surface, path: NDArray[np.int32]
+    surface: Surface, triangles: NDArray[np.int32], path: NDArray[np.int32]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]]]:
     """The vertices of the line and those joined to it, and where they lie.
 
@@ -260,7 +267,7 @@ def _directions_at_line(
         and up [m] of it, by the angles of the triangles around it as in the plane. A straight way that passes between two
         of them has the mean of their places. Vertices not joined to that end lie beside their own place of a straight line.
     """
-    rings = _rings(surface.vertices, _short_triangles(surface), path)
+    rings = _rings(surface.vertices, triangles, path)
     beside: dict[int, float] = {}
     place_on_line: dict[int, int] = {}
     around: tuple[dict[int, complex], dict[int, complex]] = ({}, {})
@@ -272,8 +279,7 @@ def _directions_at_line(
         starts += [(int(path[i + 1]), -1.0)] if i < last else []
         for start, right in starts:
             for follow, sign in zip(rings[centre], (right, -right), strict=True):
-                for vertex, angle in _walk(follow, start, on_line):
-                    length = float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[centre]))
+                for vertex, angle, length in _walk(follow, start, on_line):
                     beside[vertex] = beside.get(vertex, 0.0) + sign * length
                     place_on_line[vertex] = i
                     if i in (0, last):
@@ -286,55 +292,57 @@ def _directions_at_line(
     about_ends = []
     for near, end in zip(around, (0, last), strict=True):
         about_end = np.column_stack([side, station - station[end]])
-        joined = [k for k, vertex in enumerate(known.tolist()) if vertex in near]
-        places = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[joined]]
-        about_end[joined] = np.reshape(places, (-1, 2))
+        near_end = [k for k, vertex in enumerate(known.tolist()) if vertex in near]
+        places = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[near_end]]
+        about_end[near_end] = np.reshape(places, (-1, 2))
         about_ends.append(about_end)
     return known, side, (about_ends[0], about_ends[1])
 
 
-_Follow = dict[int, tuple[int, float]]
+_Follow = dict[int, tuple[int, float, float]]
 
 
 def _rings(
     vertices: NDArray[np.float64], triangles: NDArray[np.int32], centres: NDArray[np.int32]
 ) -> dict[int, tuple[_Follow, _Follow]]:
-    """For each centre the next vertex around it and the angle [rad] to that, counter-clockwise and clockwise.
+    """For each centre the next vertex around it, the angle [rad] to that and how far it is [m], counter-clockwise and clockwise.
 
     Where the ring is closed the angles are scaled to a full turn.
     """
     wanted = np.zeros(len(vertices), dtype=bool)
     wanted[centres] = True
     rings: dict[int, tuple[_Follow, _Follow]] = {int(centre): ({}, {}) for centre in centres}
+    triangles = triangles[np.unique(np.flatnonzero(wanted[triangles]) // 3)]
     for shift in range(3):
         corner = triangles[wanted[triangles[:, shift]]][:, [shift, (shift + 1) % 3, (shift + 2) % 3]]
-        u, v = (vertices[corner[:, k]] - vertices[corner[:, 0]] for k in (1, 2))
-        angles = np.arctan2(np.linalg.norm(np.cross(u, v), axis=1), np.einsum("ij,ij->i", u, v))
-        for (centre, a, b), angle in zip(corner.tolist(), angles.tolist(), strict=True):
-            rings[centre][0][a], rings[centre][1][b] = (b, angle), (a, angle)
+        u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
+        angles = np.arctan2(norm(cross(u, v)), dot(u, v))
+        measured = zip(corner.tolist(), angles.tolist(), norm(u).tolist(), norm(v).tolist(), strict=True)
+        for (centre, a, b), angle, to_a, to_b in measured:
+            rings[centre][0][a], rings[centre][1][b] = (b, angle, to_b), (a, angle, to_a)
     for follow in rings.values():
         if set(follow[0]) == set(follow[1]):
-            factor = 2 * np.pi / max(sum(angle for _, angle in follow[0].values()), np.finfo(float).tiny)
+            factor = 2 * np.pi / max(sum(angle for _, angle, _ in follow[0].values()), np.finfo(float).tiny)
             for way in follow:
-                way.update({a: (b, angle * factor) for a, (b, angle) in way.items()})
+                way.update({a: (b, angle * factor, length) for a, (b, angle, length) in way.items()})
     return rings
 
 
-def _walk(follow: _Follow, start: int, stop: set[int]) -> list[tuple[int, float]]:
-    """The vertices after `start` around a centre, up to the border or the line, with the angle passed."""
+def _walk(follow: _Follow, start: int, stop: set[int]) -> list[tuple[int, float, float]]:
+    """The vertices after `start` around a centre, up to the border or the line, with the angle passed and how far they are."""
     passed, here, total = [], start, 0.0
     while here in follow:
-        here, step = follow[here]
+        here, step, length = follow[here]
         total += step
         if here in stop or total > np.pi:
             break
-        passed.append((here, total))
+        passed.append((here, total, length))
     return passed
 
 
 def _sides(surface: Surface, path: NDArray[np.int32]) -> NDArray[np.float64] | None:
     """#V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
-    he = half_edges(surface.faces)
+    he = half_edges_of(surface)
     position = np.full(len(surface.vertices), -2, dtype=np.int64)
     position[path] = np.arange(len(path))
     step = position[he.head] - position[he.tail]

@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import EdgeGraph, as_vertex, path_in
-from warpflat.surface.topology import half_edges
+from warpflat.surface.topology import half_edges_of
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 
@@ -44,12 +44,19 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
     given = np.asarray(indices)
     if given.ndim != 1 or len(given) < 2 or not np.issubdtype(given.dtype, np.integer):
         raise InputError(f"a line is a list of at least two vertex indices, got {indices!r}")
-    line = np.array([as_vertex(surface, int(i), as_read=as_read) for i in given], dtype=np.int32)
+    if as_read or given.min() < 0 or given.max() >= len(surface.vertices):
+        line = np.array([as_vertex(surface, int(i), as_read=as_read) for i in given], dtype=np.int32)
+    else:
+        line = given.astype(np.int32)
     same = np.concatenate([[False], line[1:] == line[:-1]])
     line, given = line[~same], given[~same]
     if len(line) < 2:
         raise InputError("a line needs at least two different vertices")
-    broken = np.flatnonzero(~EdgeGraph(surface).are_joined(line[:-1], line[1:]))
+    on_line = np.zeros(len(surface.vertices), dtype=bool)
+    on_line[line] = True
+    faces = np.unique(np.flatnonzero(on_line[surface.faces]) // surface.faces.shape[1])
+    around = replace(surface, faces=surface.faces[faces])
+    broken = np.flatnonzero(~EdgeGraph(around).are_joined(line[:-1], line[1:]))
     if len(broken):
         a, b = given[broken[0]], given[broken[0] + 1]
         raise InputError(
@@ -134,7 +141,7 @@ def _longest_section(
     surface: Surface, height: NDArray[np.float64], above: NDArray[np.bool_]
 ) -> tuple[NDArray[np.int64], NDArray[np.float64], bool]:
     """The edges that the longest section crosses, in order; the arc length at each [m]; whether it is closed."""
-    he = half_edges(surface.faces)
+    he = half_edges_of(surface)
     up = above[he.tail] & ~above[he.head]
     down = ~above[he.tail] & above[he.head]
     a, b = surface.vertices[he.edges[:, 0]], surface.vertices[he.edges[:, 1]]

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "once_per_surface"]
+__all__ = ["Surface", "once_per_surface", "read_only"]
 
 Result = TypeVar("Result")
 
@@ -57,3 +57,11 @@ def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface]
         return known[surface]
 
     return remembered
+
+
+def read_only(arrays: Result) -> Result:
+    """The same object, its arrays not to be written to any more: what is kept for a surface is shared by all who ask for it."""
+    for value in vars(arrays).values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    return arrays

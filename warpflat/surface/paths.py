@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import mesh_edges
+from warpflat.surface.topology import half_edges_of, mesh_edges
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -31,7 +31,7 @@ class EdgeGraph:
     """
 
     def __init__(self, surface: Surface) -> None:
-        self.edges = mesh_edges(surface.faces)
+        self.edges = half_edges_of(surface).edges
         self.size = len(surface.vertices)
         ends = surface.vertices[self.edges]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)

@@ -8,12 +8,17 @@ may have any number of faces, so the same functions serve to check a mesh at the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.vectors import cross, dot, norm, points_at
+from warpflat.kernels.surface_cells import unfold_diagonals
+from warpflat.launching import launch_each
+from warpflat.surface.mesh import Surface, once_per_surface, read_only
+
+Number = TypeVar("Number", bound=np.generic)
 
 __all__ = [
     "HalfEdges",
@@ -25,15 +30,21 @@ __all__ = [
     "edge_faces",
     "euler_characteristic",
     "half_edges",
+    "half_edges_of",
     "mesh_edges",
     "non_manifold_edges",
     "non_manifold_vertices",
+    "order_by",
     "orient",
     "places_of",
     "stable_order",
     "triangulate",
     "unfold_quad_diagonals",
 ]
+
+
+# Corners of a quad's four corner triangles: before, corner, after.
+_CORNER_TRIANGLES = np.array([[3, 0, 1], [0, 1, 2], [1, 2, 3], [2, 3, 0]])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,10 +65,10 @@ class HalfEdges:
     head: NDArray[np.int32]
     face: NDArray[np.int32]
     slot: NDArray[np.int32]
-    next: NDArray[np.int64]
-    edge: NDArray[np.int64]
+    next: NDArray[np.int32]
+    edge: NDArray[np.int32]
     edges: NDArray[np.int32]
-    count: NDArray[np.int64]
+    count: NDArray[np.int32]
 
 
 def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
@@ -75,13 +86,22 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
     """The sides of all faces with their unique edges: what the other functions here are built on."""
     quads = _four_columns(faces)
     sides, tail, head, slot = _sides_of(quads)
-    follow = np.arange(1, len(tail) + 1, dtype=np.int64)
+    follow = np.arange(1, len(tail) + 1, dtype=np.int32)
     follow[np.cumsum(sides) - 1] -= sides
     low, high = np.minimum(tail, head), np.maximum(tail, head)
-    order, starts = _sorted_by_edge(low, high)
-    edge = np.empty(len(tail), dtype=np.int64)
-    edge[order] = np.cumsum(starts) - 1
-    first = order[starts]
+    digits = int(high.max(initial=0)).bit_length()
+    joined = low.astype(np.int64)
+    joined <<= digits
+    joined |= high
+    keys, order = _sorted_with_order(joined)
+    starts = np.append(True, keys[1:] != keys[:-1])[: len(keys)]
+    number = np.cumsum(starts, dtype=np.int32)
+    number -= 1
+    edge = np.empty_like(number)
+    edge[order] = number
+    begin = np.flatnonzero(starts)
+    edges = np.empty((len(begin), 2), dtype=np.int32)
+    edges[:, 0], edges[:, 1] = keys[begin] >> digits, keys[begin] & ((1 << digits) - 1)
     return HalfEdges(
         tail=tail,
         head=head,
@@ -89,48 +109,73 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
         slot=slot,
         next=follow,
         edge=edge,
-        edges=np.column_stack([low[first], high[first]]),
-        count=np.diff(np.flatnonzero(starts), append=len(tail)),
+        edges=edges,
+        count=np.diff(begin, append=len(tail)).astype(np.int32),
     )
+
+
+@once_per_surface
+def half_edges_of(surface: Surface) -> HalfEdges:
+    """The sides of the surface's faces, worked out once."""
+    return read_only(half_edges(surface.faces))
 
 
 def _sides_of(
     quads: NDArray[np.int32],
-) -> tuple[NDArray[np.int64], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
     """#F, how many sides each face has; and #H each, tail, head and slot of them all."""
     is_quad = quads[:, 3] >= 0
     for sides, only in ((4, is_quad.all()), (3, not is_quad.any())):
         if only:
             corner = quads[:, :sides]
             slot = np.tile(np.arange(sides, dtype=np.int32), len(quads))
-            return np.full(len(quads), sides), corner.ravel(), np.roll(corner, -1, axis=1).ravel(), slot
+            after = np.take(quads, np.roll(np.arange(sides), -1), axis=1)
+            return np.full(len(quads), sides, dtype=np.int32), corner.ravel(), after.ravel(), slot
     there = quads >= 0
     after = quads[:, [1, 2, 3, 0]]
     after[~is_quad, 2] = quads[~is_quad, 0]
     slots = np.broadcast_to(np.arange(4, dtype=np.int32), quads.shape)
-    return 3 + is_quad.astype(np.int64), quads[there], after[there], slots[there]
+    return 3 + is_quad.astype(np.int32), quads[there], after[there], slots[there]
 
 
-def _sorted_by_edge(low: NDArray[np.int32], high: NDArray[np.int32]) -> tuple[NDArray[np.int64], NDArray[np.bool_]]:
-    """#H, the half-edges in the order of their edges, of one edge in their own; and #H, in that order, where an edge begins."""
-    keys = low * (np.int64(high.max(initial=0)) + 1) + high
-    order = stable_order(keys)
-    keys = keys[order]
-    return order, np.append(True, keys[1:] != keys[:-1])[: len(keys)]
+def rows_of(array: NDArray[Number], chosen: NDArray[np.bool_]) -> NDArray[Number]:
+    """The chosen rows; the array itself, if these are all."""
+    return array if chosen.all() else array[chosen]
+
+
+def order_by(keys: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """The order that sorts numbers below `count`, equal ones in their own, and #count+1, where each number's begin.
+
+    A counting sort: the transpose of a sparse matrix with one entry a row.
+    """
+    from scipy.sparse import csr_array
+
+    rows = np.arange(len(keys) + 1, dtype=np.int32)
+    by_key = csr_array((np.empty(len(keys), dtype=np.int8), keys, rows), shape=(len(keys), count)).tocsc()
+    return by_key.indices, by_key.indptr
 
 
 def stable_order(keys: NDArray[np.integer]) -> NDArray[np.int64]:
-    """The order that sorts whole numbers from 0 on, equal ones in their own: what a stable argsort gives, several times as fast.
+    """The order that sorts whole numbers from 0 on, equal ones in their own: what a stable argsort gives, several times as fast."""
+    return _sorted_with_order(keys)[1]
 
-    Sorting numbers is that much faster than finding the order of numbers, so each is given its index as last digits.
+
+def _sorted_with_order(keys: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Whole numbers from 0 on sorted, and the order that sorts them, equal ones in their own.
+
+    Sorting numbers is several times as fast as finding the order of numbers, so each is given its index as last digits.
     """
     digits = len(keys).bit_length()
     if int(keys.max(initial=0)).bit_length() + digits > 63:
-        return np.argsort(keys, kind="stable")
-    with_index = (keys.astype(np.int64) << digits) | np.arange(len(keys))
+        order = np.argsort(keys, kind="stable")
+        return keys[order].astype(np.int64), order
+    with_index = keys.astype(np.int64)
+    with_index <<= digits
+    with_index |= np.arange(len(keys))
     with_index.sort()
-    with_index &= (1 << digits) - 1
-    return with_index
+    order = with_index & ((1 << digits) - 1)
+    with_index >>= digits
+    return with_index, order
 
 
 def mesh_edges(faces: ArrayLike) -> NDArray[np.int32]:
@@ -278,12 +323,22 @@ def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) 
     return sorted(loops, key=length, reverse=True)
 
 
-def places_of(vertices: NDArray[np.float64], faces: ArrayLike) -> NDArray[np.int64]:
-    """#V, for each vertex the lowest one at the very same place, of which only border vertices have any: sides of a crack."""
+def places_of(vertices: NDArray[np.float64], faces: ArrayLike, *, sides: HalfEdges | None = None) -> NDArray[np.int64]:
+    """#V, for each vertex the lowest one at the very same place, of which only border vertices have any: sides of a crack.
+
+    Args:
+        vertices: #V by 3, positions [m].
+        faces: #F by 4.
+        sides: of the faces, if they are known.
+    """
     place = np.arange(len(vertices))
-    border = np.unique(border_edges(faces))
-    _, first, same = np.unique(vertices[border], axis=0, return_index=True, return_inverse=True)
-    place[border] = border[first][same.reshape(-1)]
+    he = half_edges(faces) if sides is None else sides
+    border = np.unique(he.edges[he.count == 1])
+    order = np.lexsort(vertices[border].T)
+    sorted_places = vertices[border[order]]
+    begins = np.append(True, (sorted_places[1:] != sorted_places[:-1]).any(axis=1))[: len(order)]
+    if not begins.all():
+        place[border[order]] = border[order[begins]][np.cumsum(begins) - 1]
     return place
 
 
@@ -361,16 +416,21 @@ def corner_triangles(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.in
     """
     quads = _four_columns(faces)
     is_quad = quads[:, 3] >= 0
-    corners = np.stack([quads[:, [(i - 1) % 4, i, (i + 1) % 4]] for i in range(4)], axis=1)
+    if is_quad.all():
+        corners = np.take(quads, _CORNER_TRIANGLES, axis=1).reshape(-1, 3)
+        return corners, np.repeat(np.arange(len(quads), dtype=np.int32), 4), np.full(len(corners), 0.5)
+    if not is_quad.any():
+        return np.ascontiguousarray(quads[:, :3]), np.arange(len(quads), dtype=np.int32), np.ones(len(quads))
+    corners = np.take(quads, _CORNER_TRIANGLES, axis=1)
     corners[~is_quad, 0] = quads[~is_quad, :3]
     keep = np.repeat(is_quad[:, None], 4, axis=1)
     keep[:, 0] = True
     face = np.repeat(np.arange(len(quads), dtype=np.int32), 4).reshape(-1, 4)[keep]
-    return np.ascontiguousarray(corners[keep]), face, np.where(is_quad[face], 0.5, 1.0)
+    return corners[keep], face, np.where(is_quad[face], 0.5, 1.0)
 
 
 def unfold_quad_diagonals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32]
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], *, crease: NDArray[np.int8] | None = None
 ) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
     """Both diagonals of each quad, measured on the surface.
 
@@ -381,37 +441,15 @@ def unfold_quad_diagonals(
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4, -1 in the last column of a triangle.
+        crease: #F, along which diagonal a quad is creased (0 for corners 0-2, 1 for 1-3, else -1): that one is straight.
 
     Returns:
         #Q by 2 lengths [m], of corners 0-2 (across the hinge 1-3) and of corners 1-3 (across the hinge 0-2); and #Q,
         the face of each row.
     """
-    index = np.flatnonzero(faces[:, 3] >= 0).astype(np.int32)
-    corner = points_at(vertices, faces[index].T)
-    normal = cross(corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1])
+    is_quad = faces[:, 3] >= 0
+    index = np.flatnonzero(is_quad).astype(np.int32)
     lengths = np.empty((len(index), 2))
-    for column, (a, b, hinge, other) in enumerate(((0, 2, 1, 3), (1, 3, 2, 0))):
-        lengths[:, column] = _across(corner[:, a], corner[:, b], corner[:, hinge], corner[:, other], normal)
+    bent = np.full(len(index), -1, dtype=np.int8) if crease is None else rows_of(crease, is_quad)
+    launch_each(unfold_diagonals, len(index), [vertices, rows_of(faces, is_quad), bent], [lengths])
     return lengths, index
-
-
-def _across(
-    a: NDArray[np.float64],
-    b: NDArray[np.float64],
-    p: NDArray[np.float64],
-    q: NDArray[np.float64],
-    normal: NDArray[np.float64],
-) -> NDArray[np.float64]:
-    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad.
-
-    All are 3 by #Q.
-    """
-    hinge = q - p
-    length, straight = norm(hinge), norm(b - a)
-    safe = np.where(length > 0, length, 1.0)
-    cross_a, cross_b = cross(p - a, hinge), cross(b - p, hinge)
-    along = dot(b - a, hinge) / safe
-    across = (norm(cross_a) + norm(cross_b)) / safe
-    # Where the corner a or b points inwards, a-b runs inside the quad and the hinge outside of it: nothing to unfold.
-    inwards = (dot(cross_a, normal) < 0) | (dot(cross_b, normal) < 0)
-    return np.where((length > 0) & ~inwards, np.hypot(along, across), straight)

@@ -2,13 +2,21 @@
 
 from __future__ import annotations
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.kernels.strain import measure_flat_cells
+from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges, stable_order
+from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.vectors import cross, norm, points_at
 
-__all__ = ["untangle"]
+if TYPE_CHECKING:
+    from scipy.sparse import csr_array
+
+__all__ = ["signed_cell_areas", "untangle"]
 
 
 # So many sweeps without fewer mirrored triangles than ever before, and the rest will not help either.
@@ -16,7 +24,12 @@ _PATIENCE = 25
 
 
 def untangle(
-    surface: Surface, positions: NDArray[np.float64], *, least_area: float = 1e-3, most_sweeps: int = 200
+    surface: Surface,
+    positions: NDArray[np.float64],
+    *,
+    least_area: float = 1e-3,
+    most_sweeps: int = 200,
+    suspects: NDArray[np.integer] | None = None,
 ) -> tuple[NDArray[np.float64], int]:
     """Move the vertices of mirrored faces, and those beside, towards the mean of their neighbours until all faces agree.
 
@@ -30,65 +43,60 @@ def untangle(
         least_area: a corner triangle with less than this share of its area on the body counts as mirrored.
         most_sweeps: give up after so many, or once sweeps stop helping; a layout that is folded at large is not mended from
             its edges.
+        suspects: where all that are mirrored is known, these corner triangles; no others are looked at to begin with.
 
     Returns:
         #V by 2 positions [m], and how many corner triangles are still mirrored (0: done).
     """
+    from scipy.sparse import csc_array
+
     corner, _, _ = corner_triangles(surface.faces)
-    p = surface.vertices[corner]
-    body = 0.5 * np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1)
     flat = np.array(positions, dtype=np.float64)
-    mirrored = np.flatnonzero(_signed_areas(corner, flat) <= least_area * body)
+
+    def crushed(rows: NDArray[np.integer]) -> NDArray[np.integer]:
+        p = points_at(surface.vertices, corner[rows].T)
+        body = 0.5 * norm(cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
+        return rows[signed_cell_areas(corner[rows], flat) <= least_area * body]
+
+    mirrored = crushed(np.arange(len(corner)) if suspects is None else suspects)
     if len(mirrored) == 0:
         return flat, 0
-    size = len(flat)
-    start, end, weight = _neighbours(surface)
-    total = np.bincount(start, weights=weight, minlength=size)
-    of_start, of_end, of_vertex = (_Rows(keys, size) for keys in (start, end, corner.ravel()))
+    pull = _pull(surface)
+    total, pulled = pull.sum(axis=1)[:, None], pull.T.tocsr()
+    around = csc_array(
+        (np.ones(corner.size, dtype=np.int8), corner.ravel(), np.arange(0, corner.size + 1, 3)),
+        shape=(len(flat), len(corner)),
+    ).tocsr()
     fewest, since = len(mirrored), 0
     for _ in range(most_sweeps):
         turned = np.unique(corner[mirrored])
-        moving = np.union1d(turned, start[of_end.at(turned)[0]])
-        pair, row = of_start.at(moving)
-        share = weight[pair]
-        mean = np.stack([np.bincount(row, share * flat[end[pair], k], minlength=len(moving)) for k in (0, 1)], axis=1)
-        flat[moving] = 0.5 * (flat[moving] + mean / total[moving, None])
-        near = np.unique(of_vertex.at(moving)[0] // 3)
-        mirrored = near[_signed_areas(corner[near], flat) <= least_area * body[near]]
+        moving = np.union1d(turned, pulled[turned].indices)
+        flat[moving] = 0.5 * (flat[moving] + pull[moving] @ flat / total[moving])
+        mirrored = crushed(np.unique(around[moving].indices))
         fewest, since = (len(mirrored), 0) if len(mirrored) < fewest else (fewest, since + 1)
         if len(mirrored) == 0 or since > _PATIENCE:
             break
     return flat, len(mirrored)
 
 
-class _Rows:
-    """Which entries of an array of whole numbers below `size` have which value."""
+def _pull(surface: Surface) -> csr_array:
+    """#V by #V, the weights of the neighbours that each vertex moves between."""
+    from scipy.sparse import csr_array
 
-    def __init__(self, keys: NDArray[np.integer], size: int) -> None:
-        self._order = stable_order(keys)
-        self._offset = np.concatenate([[0], np.cumsum(np.bincount(keys, minlength=size))])
-
-    def at(self, values: NDArray[np.integer]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-        """The entries with these values, value by value and in their own order; and for each the position of its value."""
-        first, count = self._offset[values], self._offset[values + 1] - self._offset[values]
-        row = np.repeat(np.arange(len(values)), count)
-        return self._order[np.arange(len(row)) + np.repeat(first - np.cumsum(count) + count, count)], row
-
-
-def _neighbours(surface: Surface) -> tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.float64]]:
-    """Pairs of a vertex and one of the neighbours that it moves between, with the weight of that."""
-    he = half_edges(surface.faces)
-    edges = he.edges.astype(np.int64)
+    he = half_edges_of(surface)
     on_rim = he.count == 1
     border = np.zeros(len(surface.vertices), dtype=bool)
-    border[edges[on_rim]] = True
-    start, end = np.concatenate([edges, edges[:, ::-1]]).T
+    border[he.edges[on_rim]] = True
+    start, end = np.concatenate([he.edges, he.edges[:, ::-1]]).T
+    ends = points_at(surface.vertices, he.edges.T)
+    weight = np.tile(1.0 / np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny), 2)
     keep = ~border[start] | np.tile(on_rim, 2)
-    start, end = start[keep], end[keep]
-    length = np.linalg.norm(surface.vertices[start] - surface.vertices[end], axis=1)
-    return start, end, 1.0 / np.maximum(length, np.finfo(float).tiny)
+    return csr_array((weight[keep], (start[keep], end[keep])), shape=(len(border), len(border)))
 
 
-def _signed_areas(corner: NDArray[np.int32], flat: NDArray[np.float64]) -> NDArray[np.float64]:
-    a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
-    return np.asarray(0.5 * (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
+def signed_cell_areas(corner: NDArray[np.int32], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+    """#C, signed areas of triangles (#C by 3) in the plane [m2]; 0 or less where one is mirrored or collapsed."""
+    area = np.empty(len(corner))
+    given = [np.ascontiguousarray(positions), np.ascontiguousarray(corner, dtype=np.int32)]
+    launch_each(measure_flat_cells, len(corner), given, [area])
+    return area

@@ -1,0 +1,167 @@
+"""Shortest ways on a mesh to the vertices where they end: the best way out of each vertex, and what ways carry along.
+
+`find_ways` and `carry_along` are one thread each, which goes through the vertices in an order; every vertex uses what those before it
+have just got. Rounded without fused products, so that mirror images of each other get the same lengths.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+
+@wp.kernel
+def see_sides(
+    vertices: wp.array(dtype=wp.vec3d),
+    triangles: wp.array2d(dtype=wp.int32),
+    slot: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    ends: wp.array(dtype=wp.vec2i),
+    seen: wp.array(dtype=wp.vec3d),
+):
+    """How corners of triangles see the side opposite to them, from the next corner to the one after that.
+
+    vertices: #V [m]. triangles: #T by 3. slot: #R, 3 times the triangle plus the corner. ends: #R, the side's vertices a and b.
+    seen: #R, the length of the side, where the foot of the corner's height on it lies, and the height [m].
+    """
+    r = wp.tid() + first
+    t = slot[r] / 3
+    c = slot[r] - 3 * t
+    a = triangles[t, (c + 1) % 3]
+    b = triangles[t, (c + 2) % 3]
+    side = vertices[b] - vertices[a]
+    away = vertices[triangles[t, c]] - vertices[a]
+    length = wp.length(side)
+    safe = length
+    if length == wp.float64(0.0):
+        safe = wp.float64(1.0)
+    ends[r] = wp.vec2i(a, b)
+    seen[r] = wp.vec3d(length, wp.dot(away, side) / safe, wp.length(wp.cross(away, side)) / safe)
+
+
+@wp.func
+def slope_along(length: wp.float64, da: wp.float64, db: wp.float64):
+    """Of the distance along a side, less steep than a way along it."""
+    steepest = wp.float64(1.0) - wp.float64(1.0e-15)
+    if length == wp.float64(0.0):
+        return wp.float64(0.0)
+    return wp.clamp((db - da) / length, -steepest, steepest)
+
+
+@wp.func
+def length_over(seen: wp.vec3d, da: wp.float64, db: wp.float64):
+    """Length of the shortest way from a corner over the side a-b, which it sees as `see_sides` says."""
+    s = slope_along(seen[0], da, db)
+    r = wp.sqrt(wp.float64(1.0) - s * s)
+    place = seen[1] * r - s * seen[2]  # times r
+    if place <= wp.float64(0.0):
+        return da + wp.sqrt(seen[1] * seen[1] + seen[2] * seen[2])
+    if place >= seen[0] * r:
+        beyond = seen[0] - seen[1]
+        return db + wp.sqrt(beyond * beyond + seen[2] * seen[2])
+    return da + s * seen[1] + r * seen[2]
+
+
+@wp.func
+def place_on_side(seen: wp.vec3d, da: wp.float64, db: wp.float64):
+    """Where that way passes the side, as a share of it from a, and the leg to there."""
+    s = slope_along(seen[0], da, db)
+    place = wp.clamp(seen[1] - s * seen[2] / wp.sqrt(wp.float64(1.0) - s * s), wp.float64(0.0), seen[0])
+    off = place - seen[1]
+    share = wp.float64(0.0)
+    if seen[0] > wp.float64(0.0):
+        share = place / seen[0]
+    return wp.vec2d(share, wp.sqrt(off * off + seen[2] * seen[2]))
+
+
+@wp.kernel
+def find_ways(
+    offset: wp.array(dtype=wp.int32),
+    ends: wp.array(dtype=wp.vec2i),
+    seen: wp.array(dtype=wp.vec3d),
+    reach: int,
+    tolerance: wp.float64,
+    # outputs
+    distance: wp.array(dtype=wp.float64),
+    waiting: wp.array(dtype=wp.int32),
+    first: wp.array(dtype=wp.int32),
+    second: wp.array(dtype=wp.int32),
+    share: wp.array(dtype=wp.float64),
+    leg: wp.array(dtype=wp.float64),
+    shortened: wp.array(dtype=wp.int32),
+):
+    """The best way out of each waiting vertex given the distances; one whose way is now shorter lets its neighbours wait.
+
+    Vertices are numbered about as far as they are. One that lies at most `reach` numbers back looks again at once, any other in
+    the next launch.
+
+    offset: #V+1, where each vertex's entries in `ends` and `seen` begin, which are those of `see_sides`. tolerance: [m], less
+    is not shorter. distance: #V [m], upper bounds before and after, 0 or more; lowered. waiting: #V, 1 where a way is to be
+    found, 2 where ways end. first, second: #V, the side over which the way out of a vertex leads; share: #V, how much of that
+    lies before the place where the way passes; leg: #V, how far the place is [m]; all of those that were waiting.
+    shortened: 1, how many ways have become shorter is added to it.
+    """
+    v = int(0)
+    while v < distance.shape[0]:
+        follow = v + 1
+        if waiting[v] == 1:
+            waiting[v] = 0
+            best = wp.float64(wp.inf)
+            over = offset[v]
+            for r in range(offset[v], offset[v + 1]):
+                da = distance[ends[r][0]]
+                db = distance[ends[r][1]]
+                # Ways are longer than the distance that they lead to.
+                if wp.min(da, db) < best and wp.max(da, db) < wp.inf:
+                    length = length_over(seen[r], da, db)
+                    if length < best:
+                        best = length
+                        over = r
+            if best < wp.inf:
+                a = ends[over][0]
+                b = ends[over][1]
+                place = place_on_side(seen[over], distance[a], distance[b])
+                first[v] = a
+                second[v] = b
+                share[v] = place[0]
+                leg[v] = place[1]
+            if best < distance[v] - tolerance:
+                distance[v] = best
+                shortened[0] = shortened[0] + 1
+                for r in range(offset[v], offset[v + 1]):
+                    for i in range(2):
+                        near = ends[r][i]
+                        if waiting[near] == 0 and wp.min(best, distance[ends[r][1 - i]]) < distance[near]:
+                            waiting[near] = 1
+                            if near >= v - reach:
+                                follow = wp.min(follow, near)
+        v = follow
+
+
+@wp.kernel
+def carry_along(
+    first: wp.array(dtype=wp.int32),
+    second: wp.array(dtype=wp.int32),
+    share: wp.array(dtype=wp.float64),
+    leg: wp.array(dtype=wp.float64),
+    order: wp.array(dtype=wp.int32),
+    fixed: wp.array(dtype=wp.int32),
+    grows: wp.float64,
+    # outputs
+    value: wp.array2d(dtype=wp.float64),
+    change: wp.array(dtype=wp.float64),
+):
+    """Each vertex gets what there is where its way leads, plus `grows` times the leg.
+
+    first, second, share, leg: #V, the ways, as `find_ways` gives them. order: #V. fixed: #V, 1 where the value stays.
+    value: #V by #K. change: #K, the largest change of each column, if that is more than what it holds.
+    """
+    for k in range(order.shape[0]):
+        v = order[k]
+        if fixed[v] == 0:
+            a = first[v]
+            b = second[v]
+            for j in range(value.shape[1]):
+                new = value[a, j] + share[v] * (value[b, j] - value[a, j]) + grows * leg[v]
+                change[j] = wp.max(change[j], wp.abs(new - value[v, j]))
+                value[v, j] = new

@@ -1,0 +1,272 @@
+"""Lengths and stiffnesses of the springs, and their lists vertex by vertex."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+TINY = wp.constant(wp.float64(2.2250738585072014e-308))
+QUARTER = wp.constant(wp.float64(1.5707963267948966))
+
+
+@wp.kernel
+def measure_edges(
+    vertices: wp.array(dtype=wp.vec3d),
+    ends: wp.array(dtype=wp.vec2i),
+    first: int,
+    # outputs
+    length: wp.array(dtype=wp.float64),
+):
+    """Distance [m] of the two ends of each edge."""
+    e = wp.tid() + first
+    length[e] = wp.length(vertices[ends[e][0]] - vertices[ends[e][1]])
+
+
+@wp.kernel
+def list_springs(
+    offset: wp.array(dtype=wp.int32),
+    end: wp.array(dtype=wp.int32),
+    ends: wp.array(dtype=wp.vec2i),
+    spring_count: int,
+    first: int,
+    # outputs
+    neighbor: wp.array(dtype=wp.int32),
+    spring: wp.array(dtype=wp.int32),
+):
+    """The springs around each vertex by the vertices at their far ends.
+
+    offset: #V+1, where each vertex's entries begin in `end`: the spring at its second end, or #S more at its first, so that
+    edges, sorted by their lower vertex, are in order already. neighbor, spring: 2 #S, in the same order but for that within a
+    vertex.
+    """
+    i = wp.tid() + first
+    begin = offset[i]
+    for e in range(begin, offset[i + 1]):
+        s = end[e]
+        there = int(0)
+        if s < spring_count:
+            there = ends[s][0]
+        else:
+            s = s - spring_count
+            there = ends[s][1]
+        at = int(e)
+        while at > begin and neighbor[at - 1] > there:
+            neighbor[at] = neighbor[at - 1]
+            spring[at] = spring[at - 1]
+            at -= 1
+        neighbor[at] = there
+        spring[at] = s
+
+
+@wp.kernel
+def find_sides(
+    corner: wp.array(dtype=wp.vec3i),
+    offset: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+    spring: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    side: wp.array(dtype=wp.vec3i),
+):
+    """The springs along each cell's edges 0-1, 1-2, 2-0, -1 where there is none. offset, neighbor, spring: as `list_springs` has
+    them."""
+    c = wp.tid() + first
+    found = wp.vec3i(-1, -1, -1)
+    for k in range(3):
+        i = corner[c][k]
+        j = corner[c][(k + 1) % 3]
+        for e in range(offset[i], offset[i + 1]):
+            if neighbor[e] == j:
+                found[k] = spring[e]
+    side[c] = found
+
+
+@wp.kernel
+def spread_stiffness(
+    offset: wp.array(dtype=wp.int32),
+    spring: wp.array(dtype=wp.int32),
+    stiffness: wp.array(dtype=wp.float64),
+    pair_share: wp.float64,
+    first: int,
+    # outputs
+    at_entry: wp.array(dtype=wp.float64),
+    around: wp.array(dtype=wp.float64),
+):
+    """k_ij [N/m] of each entry around each vertex, and #V, their sum and a share of the stiffest. stiffness: #S."""
+    i = wp.tid() + first
+    total = wp.float64(0.0)
+    stiffest = wp.float64(0.0)
+    for e in range(offset[i], offset[i + 1]):
+        k = stiffness[spring[e]]
+        at_entry[e] = k
+        total += k
+        stiffest = wp.max(stiffest, k)
+    around[i] = total + pair_share * stiffest
+
+
+@wp.func
+def first_direction(position: wp.array(dtype=wp.vec2d), quad: wp.vec4i):
+    """Along a quad's edges 0-1 and 3-2, in the plane."""
+    return (position[quad[1]] - position[quad[0]]) + (position[quad[2]] - position[quad[3]])
+
+
+@wp.kernel
+def find_directions(
+    position: wp.array(dtype=wp.vec2d),
+    quads: wp.array(dtype=wp.vec4i),
+    warp: wp.vec2d,
+    first: int,
+    # outputs
+    fourfold: wp.array(dtype=wp.vec2d),
+):
+    """(cos 4a, sin 4a) of the angle a from the warp to each quad's first edges."""
+    q = wp.tid() + first
+    d = first_direction(position, quads[q])
+    along = wp.dot(d, warp)
+    across = warp[0] * d[1] - warp[1] * d[0]
+    length = wp.length(d)
+    if length == wp.float64(0.0):
+        along = wp.float64(1.0)
+        length = wp.float64(1.0)
+    c = along / length
+    s = across / length
+    c2 = c * c - s * s
+    s2 = wp.float64(2.0) * c * s
+    fourfold[q] = wp.vec2d(c2 * c2 - s2 * s2, wp.float64(2.0) * c2 * s2)
+
+
+@wp.struct
+class Lattice:
+    """A fabric as a lattice of springs along the edges of quads.
+
+    warp: unit vector in the plane. angle: of the quads' first edges from it, on the whole [rad].
+    along, across: K of those edges and of the others. shear: G [N/m].
+    least: share of K that a structural spring keeps.
+    """
+
+    warp: wp.vec2d
+    angle: wp.float64
+    along: wp.float64
+    across: wp.float64
+    shear: wp.float64
+    least: wp.float64
+
+
+@wp.kernel
+def weigh_quads(
+    vertices: wp.array(dtype=wp.vec3d),
+    position: wp.array(dtype=wp.vec2d),
+    quads: wp.array(dtype=wp.vec4i),
+    side: wp.array(dtype=wp.int32),
+    lattice: Lattice,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.float64),
+    diagonal: wp.array(dtype=wp.float64),
+    clamped: wp.array(dtype=wp.int8),
+):
+    """Stiffness [N/m] that a quad gives to the springs along its sides and to both its diagonals.
+
+    A cell a by b of springs K b/a, less what its diagonals G (a2 + b2)/2ab take over, and half of them to each of two sides. Which
+    pair of edges is nearer to the warp is each quad's own.
+
+    side: #Q, the first of each quad's half-edges. stiffness: #H. diagonal: #Q. clamped: #Q, 1 where the diagonals take too much.
+    """
+    q = wp.tid() + first
+    quad = quads[q]
+    d = first_direction(position, quad)
+    angle = wp.atan2(lattice.warp[0] * d[1] - lattice.warp[1] * d[0], wp.dot(d, lattice.warp))
+    ka = lattice.along
+    kb = lattice.across
+    if (int(wp.rint((angle - lattice.angle) / QUARTER)) & 1) == 1:
+        ka = lattice.across
+        kb = lattice.along
+    p0 = vertices[quad[0]]
+    p1 = vertices[quad[1]]
+    p2 = vertices[quad[2]]
+    p3 = vertices[quad[3]]
+    half = wp.float64(0.5)
+    a = half * (wp.length(p1 - p0) + wp.length(p3 - p2))
+    b = half * (wp.length(p2 - p1) + wp.length(p0 - p3))
+    ratio = b / a
+    taken_a = lattice.shear / (ratio * ratio)
+    taken_b = lattice.shear * (ratio * ratio)
+    half_a = half * wp.max(ka - taken_a, lattice.least * ka) * ratio
+    half_b = half * wp.max(kb - taken_b, lattice.least * kb) / ratio
+    left = wp.float64(1.0) - lattice.least
+    clamped[q] = wp.int8(0)
+    if taken_a > left * ka or taken_b > left * kb:
+        clamped[q] = wp.int8(1)
+    h = side[q]
+    stiffness[h] = half_a
+    stiffness[h + 1] = half_b
+    stiffness[h + 2] = half_a
+    stiffness[h + 3] = half_b
+    diagonal[q] = lattice.shear * (a * a + b * b) / (wp.float64(2.0) * a * b)
+
+
+@wp.kernel
+def weigh_triangles(
+    vertices: wp.array(dtype=wp.vec3d),
+    position: wp.array(dtype=wp.vec2d),
+    triangles: wp.array(dtype=wp.vec4i),
+    side: wp.array(dtype=wp.int32),
+    warp: wp.vec2d,
+    compliance: wp.vec3d,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.float64),
+):
+    """Stiffness [N/m] that a triangle gives to the springs along its sides: K area / length^2 (Van Gelder 1998), K that of a
+    strip of the cloth in the side's direction.
+
+    compliance: 1/K = (c4 [0] + s4 [1] + s2 c2 [2]) / (c2 + s2)^2 of a side that goes c along and s across the warp [m/N].
+    side: #T, the first of each triangle's half-edges. stiffness: #H.
+    """
+    t = wp.tid() + first
+    triangle = triangles[t]
+    p0 = vertices[triangle[0]]
+    area = wp.float64(0.5) * wp.length(wp.cross(vertices[triangle[1]] - p0, vertices[triangle[2]] - p0))
+    for k in range(3):
+        i = triangle[k]
+        j = triangle[(k + 1) % 3]
+        d = position[j] - position[i]
+        along = wp.dot(d, warp)
+        across = warp[0] * d[1] - warp[1] * d[0]
+        c2 = along * along
+        s2 = across * across
+        if c2 + s2 == wp.float64(0.0):
+            c2 = wp.float64(1.0)
+        edge = vertices[j] - vertices[i]
+        length2 = wp.dot(edge, edge)
+        if length2 == wp.float64(0.0):
+            length2 = wp.float64(1.0)
+        softness = c2 * c2 * compliance[0] + s2 * s2 * compliance[1] + s2 * c2 * compliance[2]
+        stiffness[side[t] + k] = area * (c2 + s2) * (c2 + s2) / (softness * length2)
+
+
+@wp.kernel
+def measure_hold(
+    position: wp.array(dtype=wp.vec2d),
+    offset: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+    spring: wp.array(dtype=wp.int32),
+    rest_length: wp.array(dtype=wp.float64),
+    stiffness: wp.array(dtype=wp.float64),
+    area: wp.array(dtype=wp.float64),
+    warp: wp.vec2d,
+    first: int,
+    # outputs
+    hold: wp.array(dtype=wp.float64),
+):
+    """Shear stiffness [N/m] of the springs around each vertex against warp and weft: sum of 1/2 k L^2 cos^2 sin^2 over the
+    vertex's area [m2]. rest_length, stiffness: #S."""
+    i = wp.tid() + first
+    held = wp.float64(0.0)
+    for e in range(offset[i], offset[i + 1]):
+        d = position[neighbor[e]] - position[i]
+        along = wp.dot(d, warp)
+        across = d[0] * warp[1] - d[1] * warp[0]
+        share = along * across / wp.max(along * along + across * across, TINY)
+        s = spring[e]
+        held += wp.float64(0.5) * stiffness[s] * rest_length[s] * rest_length[s] * share * share
+    hold[i] = held / area[i]

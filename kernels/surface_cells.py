@@ -1,0 +1,252 @@
+"""What a surface is when it is laid flat face by face: creases of quads, diagonals, cells.
+
+Rounded as NumPy rounds, without fused products: two quads that are mirror images of each other get the same.
+"""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
+
+# Diagonals that pass each other within this share of their length belong to a flat quad, creased or not.
+FLAT = wp.constant(wp.float64(1.0e-9))
+# A diagonal is the crease if the surface is curved along it less than this share of what it is along the other one; where the
+# mesh around tells nothing, if it is longer.
+STRAIGHTER = wp.constant(wp.float64(0.5))
+LONGER = wp.constant(wp.float64(1.0 - 1.0e-6))
+# Turns below this [rad] tell nothing.
+NO_TURN = wp.constant(wp.float64(1.0e-7))
+TINY = wp.constant(wp.float64(2.2250738585072014e-308))
+
+
+@wp.kernel
+def find_bends(
+    vertices: wp.array(dtype=wp.vec3d),
+    faces: wp.array(dtype=wp.vec4i),
+    first: int,
+    # outputs
+    normal: wp.array(dtype=wp.vec3d),
+    bent: wp.array(dtype=wp.int8),
+):
+    """normal: #F, of twice the face's area, of a quad at right angles to both diagonals [m2]. bent: #F, 1 for a convex quad
+    whose corners lie in no plane, else 0."""
+    f = wp.tid() + first
+    face = faces[f]
+    p0 = vertices[face[0]]
+    p1 = vertices[face[1]]
+    p2 = vertices[face[2]]
+    bent[f] = wp.int8(0)
+    if face[3] < 0:
+        normal[f] = wp.cross(p1 - p0, p2 - p0)
+    else:
+        p3 = vertices[face[3]]
+        n = wp.cross(p2 - p0, p3 - p1)
+        normal[f] = n
+        longer = wp.max(wp.length(p2 - p0), wp.length(p3 - p1))
+        if (
+            wp.abs(wp.dot(p1 - p0, n)) > FLAT * wp.length(n) * longer
+            and wp.dot(wp.cross(p1 - p0, p2 - p1), n) > wp.float64(0.0)
+            and wp.dot(wp.cross(p2 - p1, p3 - p2), n) > wp.float64(0.0)
+            and wp.dot(wp.cross(p3 - p2, p0 - p3), n) > wp.float64(0.0)
+            and wp.dot(wp.cross(p0 - p3, p1 - p0), n) > wp.float64(0.0)
+        ):
+            bent[f] = wp.int8(1)
+
+
+@wp.kernel
+def average_normals(
+    offset: wp.array(dtype=wp.int32),
+    corner: wp.array(dtype=wp.int32),
+    normal: wp.array(dtype=wp.vec3d),
+    first: int,
+    # outputs
+    mean: wp.array(dtype=wp.vec3d),
+):
+    """The mean normal, of length 1, of the faces around each vertex, whose `normal` (#F) are as long as they are large.
+
+    offset: #V+1, into `corner`: 4 times the face plus the column.
+    """
+    i = wp.tid() + first
+    there = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    for e in range(offset[i], offset[i + 1]):
+        there += normal[corner[e] / 4]
+    mean[i] = there / wp.max(wp.length(there), TINY)
+
+
+@wp.func
+def turn_along(from_normal: wp.vec3d, to_normal: wp.vec3d, diagonal: wp.vec3d, length: wp.float64):
+    """How far the surface turns from one end of a diagonal to the other [rad], for small turns."""
+    return wp.abs(wp.dot(to_normal - from_normal, diagonal)) / wp.max(length, TINY)
+
+
+@wp.kernel
+def find_creases(
+    vertices: wp.array(dtype=wp.vec3d),
+    faces: wp.array(dtype=wp.vec4i),
+    bent: wp.array(dtype=wp.int8),
+    normal: wp.array(dtype=wp.vec3d),
+    first: int,
+    # outputs
+    crease: wp.array(dtype=wp.int8),
+):
+    """Along which diagonal a bent quad is creased: 0 for corners 0-2, 1 for 1-3, else -1. normal: #V, of length 1."""
+    f = wp.tid() + first
+    crease[f] = wp.int8(-1)
+    if bent[f] != wp.int8(0):
+        face = faces[f]
+        d02 = vertices[face[2]] - vertices[face[0]]
+        d13 = vertices[face[3]] - vertices[face[1]]
+        l02 = wp.length(d02)
+        l13 = wp.length(d13)
+        m02 = turn_along(normal[face[0]], normal[face[2]], d02, l02)
+        m13 = turn_along(normal[face[1]], normal[face[3]], d13, l13)
+        share = STRAIGHTER
+        if wp.max(m02, m13) > NO_TURN:
+            m02 = m02 / wp.max(l02, TINY)
+            m13 = m13 / wp.max(l13, TINY)
+        else:
+            share = LONGER
+            m02 = l13
+            m13 = l02
+        if m02 < share * m13:
+            crease[f] = wp.int8(0)
+        if m13 < share * m02:
+            crease[f] = wp.int8(1)
+
+
+@wp.func
+def unfolded(a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, q: wp.vec3d, normal: wp.vec3d):
+    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad."""
+    hinge = q - p
+    length = wp.length(hinge)
+    straight = wp.length(b - a)
+    if length == wp.float64(0.0):
+        return straight
+    cross_a = wp.cross(p - a, hinge)
+    cross_b = wp.cross(b - p, hinge)
+    # Where the corner a or b points inwards, a-b runs inside the quad and the hinge outside of it: nothing to unfold.
+    if wp.dot(cross_a, normal) < wp.float64(0.0) or wp.dot(cross_b, normal) < wp.float64(0.0):
+        return straight
+    along = wp.dot(b - a, hinge) / length
+    across = (wp.length(cross_a) + wp.length(cross_b)) / length
+    return wp.sqrt(along * along + across * across)
+
+
+@wp.kernel
+def unfold_diagonals(
+    vertices: wp.array(dtype=wp.vec3d),
+    quads: wp.array(dtype=wp.vec4i),
+    crease: wp.array(dtype=wp.int8),
+    first: int,
+    # outputs
+    length: wp.array(dtype=wp.vec2d),
+):
+    """Lengths [m] of the diagonals 0-2 and 1-3 of quads on the surface; that along a crease is straight. All #Q."""
+    q = wp.tid() + first
+    quad = quads[q]
+    p0 = vertices[quad[0]]
+    p1 = vertices[quad[1]]
+    p2 = vertices[quad[2]]
+    p3 = vertices[quad[3]]
+    normal = wp.cross(p2 - p0, p3 - p1)
+    l02 = wp.length(p2 - p0)
+    l13 = wp.length(p3 - p1)
+    if crease[q] != wp.int8(0):
+        l02 = unfolded(p0, p2, p1, p3, normal)
+    if crease[q] != wp.int8(1):
+        l13 = unfolded(p1, p3, p2, p0, normal)
+    length[q] = wp.vec2d(l02, l13)
+
+
+@wp.func
+def beside(out: wp.vec3d, hinge: wp.vec3d, length: wp.float64, side: wp.float64):
+    """The point `out` from the hinge's beginning, in the plane in which the hinge is the x axis."""
+    return wp.vec3d(wp.dot(out, hinge) / length, side * wp.length(wp.cross(hinge, out)) / length, wp.float64(0.0))
+
+
+@wp.func
+def lay_cell(p: wp.vec3d, q: wp.vec3d, r: wp.vec3d):
+    """Edges from p to q and to r as columns, the first along x [m]; and twice the area [m2]."""
+    a = q - p
+    b = r - p
+    length = wp.length(a)
+    twice = wp.length(wp.cross(a, b))
+    safe = length
+    if length == wp.float64(0.0):
+        safe = wp.float64(1.0)
+    return wp.mat22d(length, wp.dot(a, b) / safe, wp.float64(0.0), twice / safe), twice
+
+
+@wp.kernel
+def lay_cells(
+    vertices: wp.array(dtype=wp.vec3d),
+    faces: wp.array(dtype=wp.vec4i),
+    crease: wp.array(dtype=wp.int8),
+    cell: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    edges: wp.array(dtype=wp.mat22d),
+    area: wp.array(dtype=wp.float64),
+):
+    """Cells laid flat: a triangle is one, a quad four, at its corners; those of a creased quad come from the one quad that it
+    unfolds into.
+
+    crease: #F, as `find_creases` has it. cell: #F, the first of each face. edges: #C, as `cells.Cells` has them [m].
+    area: #C [m2], of a quad's by half.
+    """
+    f = wp.tid() + first
+    face = faces[f]
+    c = cell[f]
+    p0 = vertices[face[0]]
+    p1 = vertices[face[1]]
+    p2 = vertices[face[2]]
+    if face[3] < 0:
+        laid, twice = lay_cell(p0, p1, p2)
+        edges[c] = laid
+        area[c] = wp.float64(0.5) * twice
+    else:
+        p3 = vertices[face[3]]
+        if crease[f] == wp.int8(0):
+            hinge = p2 - p0
+            length = wp.length(hinge)
+            p1 = beside(p1 - p0, hinge, length, wp.float64(-1.0))
+            p3 = beside(p3 - p0, hinge, length, wp.float64(1.0))
+            p0 = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+            p2 = wp.vec3d(length, wp.float64(0.0), wp.float64(0.0))
+        elif crease[f] == wp.int8(1):
+            hinge = p3 - p1
+            length = wp.length(hinge)
+            p2 = beside(p2 - p1, hinge, length, wp.float64(-1.0))
+            p0 = beside(p0 - p1, hinge, length, wp.float64(1.0))
+            p1 = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+            p3 = wp.vec3d(length, wp.float64(0.0), wp.float64(0.0))
+        # the last corner, each corner, and the first two again
+        before = p3
+        here = p0
+        after = p1
+        last = p2
+        for k in range(4):
+            laid, twice = lay_cell(before, here, after)
+            edges[c + k] = laid
+            area[c + k] = wp.float64(0.25) * twice
+            keep = before
+            before = here
+            here = after
+            after = last
+            last = keep
+
+
+@wp.kernel
+def add_areas(
+    offset: wp.array(dtype=wp.int32),
+    slot: wp.array(dtype=wp.int32),
+    area: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    total: wp.array(dtype=wp.float64),
+):
+    """A third of the areas of the cells around each vertex [m2]. offset: #V+1, into `slot`: 3 times the cell plus the corner."""
+    i = wp.tid() + first
+    there = wp.float64(0.0)
+    for e in range(offset[i], offset[i + 1]):
+        there += area[slot[e] / 3]
+    total[i] = there / wp.float64(3.0)

@@ -1,0 +1,147 @@
+"""Shortest ways over triangles, against the best of many places on every side."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import warp as wp
+from numpy.typing import NDArray
+from warpflat.kernels.geodesic import carry_along, find_ways, see_sides
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+# Two rows of triangles, some of them obtuse, bent along the middle; vertices are numbered about as far as they are from 0 and 1.
+VERTICES = np.array(
+    [
+        [0, 0, 0],
+        [1, 0, 0],
+        [0.1, 1, 0],
+        [1.3, 0.9, 0],
+        [2.4, 0.3, 0],
+        [-0.2, 1.8, 0.5],
+        [1.1, 1.7, 0.6],
+        [2.6, 1.6, 0.4],
+    ],
+    dtype=np.float64,
+)
+TRIANGLES = np.array([[0, 1, 2], [1, 3, 2], [1, 4, 3], [2, 3, 6], [2, 6, 5], [3, 4, 7], [3, 7, 6]], dtype=np.int32)
+
+
+def corners() -> tuple[IntArray, IntArray]:
+    """Offset and slot: each vertex's corners."""
+    slot = np.argsort(TRIANGLES.ravel(), kind="stable").astype(np.int32)
+    return np.append(0, np.cumsum(np.bincount(TRIANGLES.ravel()))).astype(np.int32), slot
+
+
+def sides() -> tuple[IntArray, FloatArray]:
+    _, slot = corners()
+    ends, seen = np.zeros((len(slot), 2), dtype=np.int32), np.zeros((len(slot), 3))
+    for first, last in ((0, 10), (10, len(slot))):
+        wp.launch(
+            see_sides, dim=last - first, inputs=[VERTICES, TRIANGLES, slot, first], outputs=[ends, seen], device="cpu"
+        )
+    return ends, seen
+
+
+def ways_from(start: FloatArray, ends_at: list[int], *, reach: int = 100) -> tuple[FloatArray, list[NDArray], int]:
+    """Distances, ways (first, second, share, leg) and the number of launches that it took."""
+    offset, _ = corners()
+    count = len(VERTICES)
+    distance, waiting = start.copy(), np.ones(count, dtype=np.int32)
+    waiting[ends_at] = 2
+    index = np.arange(count, dtype=np.int32)
+    ways = [index.copy(), index.copy(), np.zeros(count), np.zeros(count)]
+    shortened, launches = np.ones(1, dtype=np.int32), 0
+    while shortened[0]:
+        shortened[0] = 0
+        launches += 1
+        wp.launch(
+            find_ways,
+            dim=1,
+            inputs=[offset, *sides(), reach, 1e-14],
+            outputs=[distance, waiting, *ways, shortened],
+            device="cpu",
+        )
+    return distance, ways, launches
+
+
+def upper_bounds() -> FloatArray:
+    """Far too long, but finite."""
+    start = np.full(len(VERTICES), 50.0)
+    start[:2] = 0.0
+    return start
+
+
+def test_corners_see_the_opposite_side():
+    ends, seen = sides()
+    _, slot = corners()
+    for (a, b), (length, foot, height), s in zip(ends, seen, slot, strict=True):
+        triangle = np.roll(TRIANGLES[s // 3], -(s % 3))
+        assert [a, b] == triangle[1:].tolist()
+        side = (VERTICES[b] - VERTICES[a]) / np.linalg.norm(VERTICES[b] - VERTICES[a])
+        away = VERTICES[triangle[0]] - VERTICES[a]
+        assert length == pytest.approx(np.linalg.norm(VERTICES[b] - VERTICES[a]), rel=1e-14)
+        assert foot == pytest.approx(away @ side, abs=1e-14)
+        assert height == pytest.approx(np.linalg.norm(away - (away @ side) * side), rel=1e-13)
+
+
+@pytest.mark.parametrize("reach", [0, 100])
+def test_every_way_is_the_best_over_all_sides_around(reach: int):
+    distance, (first, second, share, leg), _ = ways_from(upper_bounds(), [0, 1], reach=reach)
+    assert distance[:2].tolist() == [0.0, 0.0]
+    places = np.linspace(0.0, 1.0, 20001)[:, None]
+    for v in range(2, len(VERTICES)):
+        best = np.inf
+        for triangle in TRIANGLES[np.isin(TRIANGLES, v).any(axis=1)]:
+            a, b = triangle[triangle != v]
+            points = VERTICES[a] + places * (VERTICES[b] - VERTICES[a])
+            there = distance[a] + places[:, 0] * (distance[b] - distance[a])
+            best = min(best, float((there + np.linalg.norm(points - VERTICES[v], axis=1)).min()))
+        assert distance[v] == pytest.approx(best, abs=1e-8)
+        a, b = first[v], second[v]
+        assert distance[v] == pytest.approx(distance[a] + share[v] * (distance[b] - distance[a]) + leg[v], abs=1e-13)
+        place = VERTICES[a] + share[v] * (VERTICES[b] - VERTICES[a])
+        assert leg[v] == pytest.approx(np.linalg.norm(place - VERTICES[v]), abs=1e-13)
+
+
+def test_who_looks_again_at_once_needs_fewer_launches():
+    """From the far end of the numbering every vertex is reached after those that come later."""
+    start = np.full(len(VERTICES), 50.0)
+    start[-1] = 0.0
+    at_once, later = (ways_from(start, [len(VERTICES) - 1], reach=reach) for reach in (100, 0))
+    np.testing.assert_allclose(at_once[0], later[0], rtol=1e-13)
+    assert at_once[2] == 2
+    assert later[2] > 2
+
+
+def test_what_cannot_be_reached_has_no_way():
+    start = np.full(len(VERTICES), np.inf)
+    distance, (first, *_), _ = ways_from(start, [])
+    assert np.isinf(distance).all()
+    assert first.tolist() == list(range(len(VERTICES)))
+
+
+def test_values_are_carried_along_the_ways():
+    distance, ways, _ = ways_from(upper_bounds(), [0, 1])
+    order = np.arange(len(VERTICES), dtype=np.int32)
+    fixed = np.zeros(len(VERTICES), dtype=np.int32)
+    fixed[:2] = 1
+
+    def carried(value: FloatArray, grows: float) -> FloatArray:
+        for _ in range(20):
+            change = np.zeros(value.shape[1])
+            wp.launch(carry_along, dim=1, inputs=[*ways, order, fixed, grows], outputs=[value, change], device="cpu")
+            if not change.any():
+                return value
+        raise AssertionError("still changing")
+
+    np.testing.assert_allclose(carried(np.zeros((8, 1)), 1.0)[:, 0], distance, rtol=1e-13)
+    start = np.zeros((8, 2))
+    start[:2] = [[3.0, 1.0], [5.0, 1.0]]
+    both = carried(start, 0.0)
+    np.testing.assert_allclose(both[:, 1], 1.0, rtol=1e-14)
+    assert both[:2, 0].tolist() == [3.0, 5.0]
+    first, second, share, _ = ways
+    np.testing.assert_allclose(both[2:, 0], ((1 - share) * both[first, 0] + share * both[second, 0])[2:], rtol=1e-13)
+    assert 3.5 < both[6, 0] < 4.9

@@ -1,0 +1,77 @@
+"""Where a run stands, and the lines of its history."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.relax import Energies, Relaxation
+from warpflat.strain import worn_strain
+from warpflat.surface import Surface
+
+__all__ = ["Progress", "Stage"]
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stage:
+    """A line of the history: energies [J] when a stage had ended, and what it took.
+
+    `residual` is the largest force on a vertex over the mean spring force; `work_units` counts approximate implicit
+    steps over all vertices.
+    """
+
+    name: str
+    spring_energy_j: float
+    guard_energy_j: float
+    strain_energy_j: float
+    steps: int
+    work_units: float
+    seconds: float
+    converged: bool
+    residual: float | None
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `metrics.json`."""
+        return dict(self.__dict__)
+
+
+class Progress:
+    """Where a run stands; what a callback gets after every step.
+
+    Attributes:
+        stage: "develop", "relax" or "cut:NAME".
+        step: approximate implicit steps so far, on the piece's own mesh.
+        work_units: all work so far, in such steps.
+        max_steps: at most so many.
+        spring_energy: [J], of the last look (see `RelaxOptions.check_every`).
+        residual: largest force over mean spring force, likewise.
+    """
+
+    def __init__(self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int) -> None:
+        """Hold on to the running state; nothing is copied before it is asked for."""
+        self.stage = stage
+        self.step = state.steps
+        self.work_units = state.work_units
+        self.max_steps = max_steps
+        self.spring_energy = energies.spring
+        self.guard_energy = energies.guard
+        self.residual = residual
+        self._state = state
+
+    @property
+    def surface(self) -> Surface:
+        """The surface with the present topology: after a cut its vertices are doubled."""
+        return self._state.network.surface
+
+    def positions(self) -> FloatArray:
+        """#V by 2, the layout [m], a copy."""
+        return self._state.positions()
+
+    def face_energy_density(self) -> FloatArray:
+        """#F, strain energy per flat area [J/m2]."""
+        return worn_strain(self._state.network, self.positions()).energy_density
