@@ -38,10 +38,11 @@ class LayoutEnergy:
         self._sides = [csr_matrix((ones, (rows, corner[:, k])), shape) - here for k in (1, 2)]
         self._edges, self._weight = cells.edges, cells.weight
         warp, weft = grain_axes(network.grain_angle)
-        guard = network.guard
+        # One piece has one onset for all its cells.
+        onset_warp, onset_weft = network.cells.onset.numpy()[0].tolist()
         self._threads = [
-            (warp, fabric.stiffness_warp, guard.onset_warp),
-            (weft, fabric.stiffness_weft, guard.onset_weft),
+            (warp, fabric.stiffness_warp, onset_warp),
+            (weft, fabric.stiffness_weft, onset_weft),
         ]
 
     def springs(self, positions: FloatArray) -> float:

@@ -53,18 +53,18 @@ def buffer_bytes(network: SpringNetwork) -> float:
 
 
 def step_bytes(network: SpringNetwork) -> float:
-    """Bytes that one approximate implicit step has to move if every array it reads or writes is moved once.
+    """Bytes that one approximate implicit step of a cycle has to move if every array it reads or writes is moved once.
 
-    (Places and velocities of neighbours are gathered several times; what the caches do not hold of that comes on top.)
+    All cells are looked at before every fourth. (Places and velocities of neighbours are gathered several times; what the
+    caches do not hold of that comes on top.)
     """
     v, c, s = network.vertex_count, network.cell_count, 2 * network.spring_count
-    evaluate = (
-        c * (12 + 32 + 8 + 16 + 4 + 8) + v * 32
-    )  # corners, edges, weight, slack; acting, clearance; places, velocities
-    gather = v * (32 + 8 + 8 + 4 + 4 + 16 + 16) + s * (4 + 8 + 8) + 3 * c * 4 + c * 12
-    gather += v * (16 + 8 + 16 + 16 + 8 + 8)
-    advance = v * (8 + 4 + 16 + 16 + 16 + 8 + 8) + s * (4 + 8) + v * 2 * 32
-    return float(evaluate + gather + advance)
+    look = c * (12 + 32 + 4 + 8) + v * 32  # corners, edges; acting, clearance; places, velocities
+    look += c * (3 * 4 + 4 + 8) + v * (16 + 8 + 4)  # slots, acting, clearance; anchor, reach, guarded
+    gather = v * (16 + 16 + 8 + 8 + 4 + 4 + 16 + 16) + s * (4 + 8 + 8)
+    gather += v * (16 + 8 + 16 + 16 + 8)
+    advance = v * (8 + 4 + 16 + 16 + 16 + 8 + 16 + 8) + s * (4 + 8) + v * 2 * 32
+    return float(0.25 * look + gather + advance)
 
 
 _CHILD = """

@@ -22,6 +22,7 @@ class Cells:
     offset: #V+1, where each vertex's entries in `slot` begin.
     slot: 3 times the cell plus the corner, for every cell around a vertex.
     slack: #C, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
+    onset: #C, worn stretch along warp and weft at which the guard begins to act.
     """
 
     corner: wp.array(dtype=wp.vec3i)
@@ -30,6 +31,7 @@ class Cells:
     offset: wp.array(dtype=wp.int32)
     slot: wp.array(dtype=wp.int32)
     slack: wp.array(dtype=wp.vec2d)
+    onset: wp.array(dtype=wp.vec2d)
 
 
 @wp.struct
@@ -38,15 +40,12 @@ class ThreadGuard:
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].
-    onset_warp, onset_weft: worn stretch at which the guard begins to act.
     """
 
     warp: wp.vec2d
     weft: wp.vec2d
     stiffness_warp: wp.float64
     stiffness_weft: wp.float64
-    onset_warp: wp.float64
-    onset_weft: wp.float64
 
 
 @wp.func
@@ -140,19 +139,20 @@ def evaluate_guard(
         early = wp.float64(0.5)
         if clearance[c] < SLENDER * longest:
             early = -wp.float64(wp.inf)
-        near_warp = early * guard.onset_warp
-        near_weft = early * guard.onset_weft
+        onset = cells.onset[c]
+        near_warp = early * onset[0]
+        near_weft = early * onset[1]
         if is_beyond(worn_warp, near_warp) or is_beyond(worn_weft, near_weft):
             acting[c] = 1
             F = cells.edges[c] * inv
-            y_warp = excess_stretch(worn_warp, guard.onset_warp)
-            y_weft = excess_stretch(worn_weft, guard.onset_weft)
+            y_warp = excess_stretch(worn_warp, onset[0])
+            y_weft = excess_stretch(worn_weft, onset[1])
             area = wp.float64(0.5) * det * cells.weight[c]
             density = wp.float64(0.5) * (
                 guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
             )
-            P = thread_stress(worn_warp, warp, guard.stiffness_warp, guard.onset_warp) + thread_stress(
-                worn_weft, weft, guard.stiffness_weft, guard.onset_weft
+            P = thread_stress(worn_warp, warp, guard.stiffness_warp, onset[0]) + thread_stress(
+                worn_weft, weft, guard.stiffness_weft, onset[1]
             )
             # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
             inv_t = wp.transpose(inv)
@@ -215,9 +215,10 @@ def compute_guard_energy(
         energy[c] = wp.float64(0.0)
         worn_warp = cells.edges[c] * (inv * (guard.warp * cells.slack[c][0]))
         worn_weft = cells.edges[c] * (inv * (guard.weft * cells.slack[c][1]))
-        if is_beyond(worn_warp, guard.onset_warp) or is_beyond(worn_weft, guard.onset_weft):
-            y_warp = excess_stretch(worn_warp, guard.onset_warp)
-            y_weft = excess_stretch(worn_weft, guard.onset_weft)
+        onset = cells.onset[c]
+        if is_beyond(worn_warp, onset[0]) or is_beyond(worn_weft, onset[1]):
+            y_warp = excess_stretch(worn_warp, onset[0])
+            y_weft = excess_stretch(worn_weft, onset[1])
             energy[c] = (
                 wp.float64(0.25)
                 * det

@@ -35,6 +35,34 @@ def measure_flat_cells(
     area[c] = wp.float64(0.5) * wp.determinant(flat_edges(position, corner[c]))
 
 
+@wp.func
+def worn_strain(position: wp.array(dtype=wp.vec2d), cells: Cells, membrane: Membrane, c: int):
+    """The cell's weighted flat area [m2], 0 or less if it is mirrored, and its strains along warp and weft and in shear, then 0."""
+    D = flat_edges(position, cells.corner[c])
+    det = wp.determinant(D)
+    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if det > wp.float64(0.0):
+        F = cells.edges[c] * wp.inverse(D)
+        worn_warp = F * membrane.warp
+        worn_weft = F * membrane.weft
+        e = wp.vec3d(
+            wp.length(worn_warp) - wp.float64(1.0),
+            wp.length(worn_weft) - wp.float64(1.0),
+            wp.dot(worn_warp, worn_weft),
+        )
+    return wp.float64(0.5) * det * cells.weight[c], e
+
+
+@wp.func
+def stress_of(e: wp.vec3d, membrane: Membrane):
+    """sigma_warp, sigma_weft, tau [N/m]."""
+    return wp.vec3d(
+        membrane.c_warp * e[0] + membrane.c_cross * e[1],
+        membrane.c_weft * e[1] + membrane.c_cross * e[0],
+        membrane.shear * e[2],
+    )
+
+
 @wp.kernel
 def compute_worn_strain(
     position: wp.array(dtype=wp.vec2d),
@@ -55,28 +83,27 @@ def compute_worn_strain(
     area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
     c = wp.tid() + first
-    D = flat_edges(position, cells.corner[c])
-    det = wp.determinant(D)
-    area[c] = wp.float64(0.5) * det * cells.weight[c]
-    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
-    if det > wp.float64(0.0):
-        inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        worn_warp = F * membrane.warp
-        worn_weft = F * membrane.weft
-        e = wp.vec3d(
-            wp.length(worn_warp) - wp.float64(1.0),
-            wp.length(worn_weft) - wp.float64(1.0),
-            wp.dot(worn_warp, worn_weft),
-        )
-    s = wp.vec3d(
-        membrane.c_warp * e[0] + membrane.c_cross * e[1],
-        membrane.c_weft * e[1] + membrane.c_cross * e[0],
-        membrane.shear * e[2],
-    )
+    flat, e = worn_strain(position, cells, membrane, c)
+    s = stress_of(e, membrane)
     strain[c] = e
     stress[c] = s
-    energy[c] = wp.float64(0.5) * wp.dot(s, e) * area[c]
+    energy[c] = wp.float64(0.5) * wp.dot(s, e) * flat
+    area[c] = flat
+
+
+@wp.kernel
+def compute_strain_energy(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    membrane: Membrane,
+    first: int,
+    # outputs
+    energy: wp.array(dtype=wp.float64),
+):
+    """The energy of `compute_worn_strain` alone. position: #V [m]. energy: #C [J]."""
+    c = wp.tid() + first
+    flat, e = worn_strain(position, cells, membrane, c)
+    energy[c] = wp.float64(0.5) * wp.dot(stress_of(e, membrane), e) * flat
 
 
 @wp.kernel

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, levels_meanwhile
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
@@ -55,7 +57,7 @@ def test_a_grid_keeps_every_second_row_and_column(columns: int, rows: int):
     for piece in (surface, mixed):
         step = made(piece)
         assert step.surface.is_quad.all()
-        assert len(step.kept) == (columns // 2 + 1) * (rows // 2 + 1)
+        assert len(step.kept) == ((columns + 1) // 2) * ((rows + 1) // 2)
         corners = {(0.0, 0.0), (0.01 * (columns - 1), 0.0), (0.0, 0.01 * (rows - 1))}
         assert corners <= {(x, y) for x, y in step.surface.vertices[:, :2].tolist()}
         np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(piece), atol=1e-15)
@@ -300,3 +302,17 @@ def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
 def test_what_cannot_be_made_coarser_says_so():
     triangle = make_surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
     assert coarser(triangle, flat(triangle)) is None
+
+
+def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
+    pieces = [sheet(80, 70) for _ in range(2)]
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    others: list[int] = []
+    with levels_meanwhile(pieces[0]):
+        others.append(threading.active_count())
+    assert max(others) > 1
+    for apart, here in zip(coarser_surfaces(pieces[0]), coarser_surfaces(pieces[1]), strict=True):
+        np.testing.assert_array_equal(apart.kept, here.kept)
+        np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
+    with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70)):
+        _ = 1 / 0

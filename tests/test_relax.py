@@ -52,7 +52,7 @@ def springs_and_guard(network: SpringNetwork, positions: FloatArray) -> tuple[fl
     for thread, stiffness, onset in zip(
         grain_axes(network.grain_angle),
         (fabric.stiffness_warp, fabric.stiffness_weft),
-        (network.guard.onset_warp, network.guard.onset_weft),
+        network.cells.onset.numpy().T,
         strict=True,
     ):
         worn = deformation @ thread

@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Any
 from warpflat._version import __version__
 
 if TYPE_CHECKING:
+    from warpflat.batch import flatten_all
     from warpflat.errors import InputError
     from warpflat.fabric import Fabric, find_fabric, load_library
     from warpflat.flattening import Flattening, Progress, change_fabric, flatten
@@ -34,6 +35,7 @@ _HOME = {
     "change_fabric": "flattening",
     "find_fabric": "fabric",
     "flatten": "flattening",
+    "flatten_all": "batch",
     "load_library": "fabric",
     "make_surface": "surface",
     "read_surface": "surface",
@@ -50,6 +52,7 @@ __all__ = [
     "change_fabric",
     "find_fabric",
     "flatten",
+    "flatten_all",
     "load_library",
     "make_surface",
     "read_surface",

@@ -11,6 +11,9 @@ that stay are kept up to date. The triangles are made at the end, of those that 
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
@@ -22,11 +25,11 @@ from scipy.sparse import csr_array, eye, vstack
 
 from warpflat.carry import GridCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
-from warpflat.launching import record
+from warpflat.launching import record, thread_count
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import HalfEdges, half_edges, triangulate
 
-__all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest"]
+__all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_meanwhile"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -42,6 +45,8 @@ _LEAST_GAIN = 0.3
 # that does not make them fewer, worse ones.
 _GOOD = 0.6
 _LEAST_QUALITIES = (0.3, 0.15)
+# Levels of a surface of more vertices are worth a thread of their own.
+_WORTH_A_THREAD = 5_000
 # Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
 _ROOM = 16
 
@@ -98,6 +103,18 @@ def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
         steps.append(step)
         surface = step.surface
     return tuple(steps)
+
+
+@contextmanager
+def levels_meanwhile(surface: Surface) -> Iterator[None]:
+    """Make `coarser_surfaces` of a large surface on another core while the body runs, and be done with both at its end."""
+    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
+        yield
+        return
+    with ThreadPoolExecutor(max_workers=1) as other:
+        made = other.submit(coarser_surfaces, surface)
+        yield
+        made.result()
 
 
 def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surface:
@@ -176,7 +193,7 @@ def _twins(he: HalfEdges) -> NDArray[np.int64]:
 
 
 def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
-    """Every second row and column, and the last ones; between them by halves, or by lengths where the count was even."""
+    """Every second row and column, and the last ones; between them linear by index."""
     rows, columns = grid.shape
     if min(rows, columns) < 5:
         return None
@@ -198,16 +215,14 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
         kept=kept.ravel(),
         prolongation=prolongation,
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
-        smooth_carry=GridCarry(grid, keep[0], keep[1]),
+        smooth_carry=GridCarry(surface.vertices, grid, keep[0], keep[1]),
     )
 
 
 def _second(count: int) -> IntArray:
-    keep = np.arange(0, count, 2)
-    if keep[-1] != count - 1:
-        # An even number of rows: the last cell is a single one.
-        keep = np.append(keep, count - 1)
-    return keep.astype(np.int32)
+    """Every second of so many, and the last; of an even number the last step goes over three, since a thin row of quads would be
+    stiffer than its cloth along it."""
+    return np.append(np.arange(0, count - 3 + count % 2, 2), count - 1).astype(np.int32)
 
 
 def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from contextlib import nullcontext
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -13,6 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.coarsen import levels_meanwhile
 from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, choose_datum, develop
 from warpflat.errors import InputError, nearest
@@ -21,8 +23,8 @@ from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
 from warpflat.relax import RelaxOptions
-from warpflat.running import Run
-from warpflat.strain import WornStrain, layout_errors, worn_strain
+from warpflat.running import Relaxed, Run, relax_runs
+from warpflat.strain import WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, components, line_from_indices, read_surface
 from warpflat.tightness import Wear, WornFit, assess_fit
@@ -224,35 +226,140 @@ def flatten(
     """
     if not isinstance(surface, Surface):
         surface = read_surface(surface, units=units)
+    settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
+    return finish([start(surface, datum, settings, callback)])[0]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What several pieces that are flattened have in common; as `flatten` takes it, checked."""
+
+    fabric: Fabric
+    grain_angle: float
+    model: Model
+    wear: Wear | None
+    options: RelaxOptions
+    device: wp.Device
+
+
+def check_settings(
+    fabric: Fabric | str,
+    *,
+    grain_angle: float,
+    model: Model,
+    wear: Wear | None,
+    relax: RelaxOptions | None,
+    device: str | None,
+) -> Settings:
+    """Look up what is named, and fill in what is not given.
+
+    Raises:
+        InputError: an unknown name, or a number out of its bounds.
+    """
     cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
     options = relax or RelaxOptions()
     options.validate()
     if not np.isfinite(grain_angle):
         raise InputError(f"grain_angle = {grain_angle} is not a number of degrees")
     check_model(model)
-    where = _device(device)
-    line, line_name, notes = _datum(surface, datum)
+    return Settings(
+        fabric=cloth, grain_angle=grain_angle, model=model, wear=wear, options=options, device=_device(device)
+    )
 
+
+@dataclass(frozen=True, kw_only=True)
+class Started:
+    """A piece that has been developed and is to be relaxed.
+
+    Attributes:
+        run: what was asked for.
+        datum_name: its name, or how it was chosen.
+        development: let go of the stretch that is meant.
+        network: measured in it.
+        notes: on the datum.
+        seconds: that it took so far.
+    """
+
+    run: Run
+    datum_name: str
+    development: Development
+    network: SpringNetwork
+    notes: tuple[str, ...]
+    seconds: float
+
+
+def start(
+    surface: Surface,
+    datum: str | ArrayLike | None,
+    settings: Settings,
+    callback: Callable[[Progress], None] | None,
+) -> Started:
+    """The first half of `flatten`: develop the piece from its datum, and measure its network there.
+
+    Raises:
+        InputError: it cannot be developed.
+    """
+    line, line_name, notes = _datum(surface, datum)
     begun = time.perf_counter()
-    run = Run(surface, cloth, grain_angle, where, options, callback, line, model=model, wear=wear)
-    development = run.let_go(develop(surface, line))
-    state = run.state_at(development.positions)
-    stages = [run.stage("develop", state, seconds=time.perf_counter() - begun)]
-    measure_again = development.mended or run.directions_matter()
-    state, outcome = run.relax(state, measure_again=measure_again)
-    stages.append(run.stage("relax", state, outcome=outcome, seconds=outcome.seconds))
-    return Flattening(
-        surface=surface,
-        fabric=cloth,
-        datum=line,
+    run = Run(
+        surface,
+        settings.fabric,
+        settings.grain_angle,
+        settings.device,
+        settings.options,
+        callback,
+        line,
+        model=settings.model,
+        wear=settings.wear,
+    )
+    with levels_meanwhile(surface) if settings.options.solver == "multilevel" else nullcontext():
+        development = run.let_go(develop(surface, line))
+    return Started(
+        run=run,
         datum_name=line_name,
-        grain_angle=grain_angle,
-        network=state.network,
         development=development,
-        positions=state.positions(),
-        stages=tuple(stages),
+        network=run.network_at(development.positions),
+        notes=tuple(notes),
+        seconds=time.perf_counter() - begun,
+    )
+
+
+def finish(pieces: Sequence[Started]) -> list[Flattening]:
+    """The second half of `flatten`: relax the pieces, of the same settings, side by side."""
+    relaxed = relax_runs(
+        [piece.run for piece in pieces],
+        [piece.network for piece in pieces],
+        [piece.development.positions for piece in pieces],
+        again=[piece.development.mended or piece.run.directions_matter() for piece in pieces],
+    )
+    return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
+
+
+def _flattening(piece: Started, end: Relaxed) -> Flattening:
+    run, development = piece.run, piece.development
+    developed = Stage(
+        name="develop",
+        spring_energy_j=end.begin.spring,
+        guard_energy_j=end.begin.guard,
+        strain_energy_j=strain_energy(piece.network, development.positions),
+        steps=0,
+        work_units=0.0,
+        seconds=piece.seconds,
+        converged=True,
+        residual=None,
+    )
+    return Flattening(
+        surface=run.surface,
+        fabric=run.fabric,
+        datum=run.datum,
+        datum_name=piece.datum_name,
+        grain_angle=run.grain_angle,
+        network=end.network,
+        development=development,
+        positions=end.positions,
+        stages=(developed, run.stage("relax", end.network, end.positions, end.outcome)),
         history=np.array(run.history),
-        notes=(*surface.notes, *notes, *development.notes, *run.notes),
+        notes=(*run.surface.notes, *piece.notes, *development.notes, *run.notes),
         wear=run.wear,
     )
 
@@ -332,12 +439,12 @@ def _later_run(
 
 def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
     """The result of a run from a layout, with what it adds to the history."""
-    state, outcome = run.relax(run.state_at(positions), measure_again=measure_again)
+    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[measure_again])
     return replace(
         result,
-        network=state.network,
-        positions=state.positions(),
-        stages=(*result.stages, run.stage(run.stage_name, state, outcome=outcome, seconds=outcome.seconds)),
+        network=end.network,
+        positions=end.positions,
+        stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
         history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
         notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
     )

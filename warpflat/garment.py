@@ -10,10 +10,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.batch import flatten_all
 from warpflat.constraints import Constraint
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flattening import Flattening, Progress, flatten
+from warpflat.flattening import Flattening, Progress
 from warpflat.fullness import FullEdge, give_fullness
 from warpflat.mannequin import Carrier, FormPiece, FormResult, FormSeam, Mannequin
 from warpflat.relax import RelaxOptions
@@ -187,23 +188,23 @@ def flatten_form(
         InputError: a piece cannot be flattened, or a wish or constraint names what there is not; one line says which and why.
     """
     wished = wished_seams(form, wishes)
-    pieces = {}
-    for name, piece in form.pieces.items():
+    names = list(form.pieces)
 
-        def told(progress: Progress, name: str = name) -> None:
-            if callback is not None:
-                callback(name, progress)
+    def told(number: int, progress: Progress) -> None:
+        if callback is not None:
+            callback(names[number], progress)
 
-        pieces[name] = flatten(
-            piece.surface,
-            fabric=fabric,
-            datum=piece.datum or None,
-            grain_angle=grain_angle,
-            relax=relax,
-            callback=told if callback is not None else None,
-            device=device,
-            **options,
-        )
+    flat = flatten_all(
+        [piece.surface for piece in form.pieces.values()],
+        fabric=fabric,
+        datum=[piece.datum or None for piece in form.pieces.values()],
+        grain_angle=grain_angle,
+        relax=relax,
+        callback=told if callback is not None else None,
+        device=device,
+        **options,
+    )
+    pieces = dict(zip(names, flat, strict=True))
     if not sewn:
         return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
     for name, edges in wished.full.items():

@@ -20,6 +20,7 @@ import os
 import threading
 from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -171,16 +172,20 @@ def _packed(recorded: wp.Launch) -> Command:
     if not recorded.device.is_cpu or recorded.block_dim != 1 or not wp.config.version.startswith(_PACKED_RELEASES):
         return recorded.launch
     bounds, *values = recorded.params
-    fields = [(arg.label, type(value)) for arg, value in zip(recorded.kernel.adj.args, values, strict=True)]
-    pack = type("Arguments", (ctypes.Structure,), {"_fields_": fields})()
-    for (label, _), value in zip(fields, values, strict=True):
-        setattr(pack, label, value)
+    pack = _pack_type(recorded.kernel, tuple(map(type, values)))(*values)
     run, at, of = recorded.hooks.forward, ctypes.byref(bounds), ctypes.byref(pack)
 
     def command(keep: wp.Launch = recorded) -> None:
         run(at, of)
 
     return command
+
+
+@cache
+def _pack_type(kernel: wp.Kernel, types: tuple[type, ...]) -> type[ctypes.Structure]:
+    """What the arguments of a kernel are packed into. Once each: types go in circles, and would keep what they are made for."""
+    fields = [(arg.label, kind) for arg, kind in zip(kernel.adj.args, types, strict=True)]
+    return type("Arguments", (ctypes.Structure,), {"_fields_": fields})
 
 
 class _Barrier:

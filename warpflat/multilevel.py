@@ -13,32 +13,37 @@ spring network of its own, with the same fabric, guard and steps, on a quarter o
 Nested iteration gives the start: the coarsest level is relaxed first, and each finer one is moved as far as the coarser
 went. The minimum is that of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's
 work as the unit.
+
+Of several pieces side by side (`warpflat.joined`) each has levels of its own, which are joined level by level; a piece that has no
+coarser one stays as it is on those below. How much of a correction is taken, and whether the piece is at rest, is told piece by piece.
 """
 
 from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
+from scipy.sparse import block_diag, csr_array, eye
 
-from warpflat.carry import GridCarry
 from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
 from warpflat.fabric import Fabric
+from warpflat.joined import begins, join_networks
 from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
-from warpflat.network import SpringNetwork
+from warpflat.network import SpringNetwork, cells_of
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
-from warpflat.surface.untangle import untangle
+from warpflat.surface.mesh import Surface
+from warpflat.surface.untangle import signed_cell_areas, untangle
 
 __all__ = ["Levels", "levels_pay", "relax_multilevel", "softness"]
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
 # the very first, or so many times the vertices along its side: a crack that opens is slow there too.
@@ -47,7 +52,7 @@ _AT_REST = 0.1
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 # Grids of more vertices are not cycled on the way up: cubics from this size on leave a few hundredths of a per cent.
-_CYCLED = int(__import__("os").environ.get("CYC", 5_000))
+_CYCLED = 5_000
 # Steps before and after, at least, and at most where cycles gain little: after one that gains more than this share of what the one
 # before gained, they are twice as many.
 _LEAST_STEPS = 4
@@ -66,6 +71,8 @@ _RENEWALS = 8
 _LEAST_SHARE = 0.05
 # Steps between two looks at all cells.
 _WATCH_EVERY = 4
+# A cell pressed to less than this share of its area is mended as if it were mirrored.
+_LEAST_AREA = 1e-6
 # Least curvature, over what its parts would have apart, of a direction that cycles leave to be followed.
 _SOUND = 1e-3
 # In units of a step: evaluating the forces, evaluating the energy.
@@ -82,6 +89,7 @@ class _Way:
         down: its vertices go where they are on the finer one. load: it gets the finer one's residual forces.
         differ: how far it has come from `base`, #V of the finer level. up: that, as `correction` of the finer level.
         carry: its layout, as that of the finer level.
+        steps: of each piece its step down.
     """
 
     coarse: Relaxation
@@ -92,7 +100,7 @@ class _Way:
     carry: Launch
     base: wp.array
     correction: wp.array
-    smooth_carry: GridCarry | None
+    steps: Sequence[Coarser]
 
 
 @dataclass
@@ -103,8 +111,18 @@ class _Level:
     way: _Way | None = None
 
 
-def _weights(matrix: csr_array, device: wp.Device) -> Weights:
-    weights = Weights()
+@dataclass(frozen=True, kw_only=True)
+class _Rung:
+    """A coarser level of one piece: the step to it, its network, and its layout [m]."""
+
+    step: Coarser
+    network: SpringNetwork
+    layout: FloatArray
+
+
+def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
+    """The matrix that has these along its diagonal."""
+    weights, matrix = Weights(), blocks[0] if len(blocks) == 1 else block_diag(blocks, format="csr")
     weights.offset = wp.array(matrix.indptr.astype(np.int32), dtype=wp.int32, device=device)
     weights.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device=device)
     weights.weight = wp.array(matrix.data.astype(np.float64), dtype=wp.float64, device=device)
@@ -134,40 +152,97 @@ def _calibrated(
     return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
 
 
+def _rungs(network: SpringNetwork, layout: FloatArray, *, mend: bool) -> list[_Rung]:
+    """All coarser levels of a piece, the finest first."""
+    rungs: list[_Rung] = []
+    # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
+    ready = iter(coarser_surfaces(network.surface))
+    while not is_coarsest(network.surface):
+        rung = _rung(network, layout, next(ready, None), mend=mend)
+        if rung is None:
+            ready = iter(())
+            rung = _rung(network, layout, coarser(network.surface, layout))
+        if rung is None:
+            break
+        rungs.append(rung)
+        network, layout = rung.network, rung.layout
+    return rungs
+
+
+def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> _Rung | None:
+    """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
+    if step is None:
+        return None
+    layout = np.ascontiguousarray(fine_layout[step.kept])
+    if mend:
+        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA)
+        if left:
+            return None
+    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
+        return None
+    network = SpringNetwork.build(
+        step.surface,
+        fine.fabric,
+        layout,
+        grain_angle=fine.grain_angle,
+        device=fine.device,
+        model=fine.model,
+        stretch=None if fine.stretch is None else fine.stretch[step.face_of],
+        # What threads are held by is a matter of the finest mesh.
+        hold=float(fine.shear_hold),
+    )
+    return _Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
+
+
+def _stay(surface: Surface) -> Coarser:
+    """The step of a piece that has no coarser level, where others have."""
+    every = np.arange(len(surface.vertices), dtype=np.int32)
+    one = csr_array(eye(len(every), format="csr"))
+    return Coarser(surface=surface, kept=every, prolongation=one, face_of=np.arange(len(surface.faces), dtype=np.int32))
+
+
 class Levels:
-    """The levels of a piece, finest first; made once, and good for any number of relaxations of the same network.
+    """The levels of a relaxation, finest first; made once, and good for any number of relaxations of the same network.
 
     Attributes:
         sizes: vertices of each level.
         stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
     """
 
-    def __init__(self, finest: Relaxation) -> None:
-        """Of a relaxation and its present layout, which must mirror no face."""
+    def __init__(self, finest: Relaxation, *, mend: bool = False) -> None:
+        """Of a relaxation and its present layout, which must mirror no face.
+
+        Args:
+            finest: the pieces themselves.
+            mend: turn back what cells of the coarser levels are mirrored where the piece lies, as at the start of a nested iteration, which
+                leaves that layout; otherwise make levels that have none.
+        """
+        layout, pieces = finest.positions(), finest.network.pieces
+        ladders = [_rungs(net, layout[own], mend=mend) for net, own in zip(pieces, finest.vertices, strict=True)]
+        depth = max(len(rungs) for rungs in ladders)
+        for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
+            lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
+            while len(rungs) < depth:
+                rungs.append(_Rung(step=_stay(lowest.surface), network=lowest, layout=where))
+        self._join(finest, ladders)
+
+    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[_Rung]]) -> None:
+        self._ladders = ladders
         self._levels = [_Level(finest)]
         self.stale = False
-        layout = finest.positions()
-        # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
-        ready = iter(coarser_surfaces(finest.network.surface))
-        while not is_coarsest(self._levels[-1].state.network.surface):
-            step = next(ready, None)
-            if step is None or not self._go_down(step, layout):
-                ready = iter(())
-                step = coarser(self._levels[-1].state.network.surface, layout)
-                if step is None or not self._go_down(step, layout):
-                    break
-            layout = layout[step.kept]
+        for rungs in zip(*ladders, strict=True):
+            start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
+            coarse = Relaxation(join_networks([rung.network for rung in rungs]), finest.options, start=start)
+            fine = self._levels[-1]
+            fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse)
+            self._levels.append(_Level(coarse))
 
-    def _go_down(self, step: Coarser, layout: FloatArray) -> bool:
-        """Add a level, unless some of its cells are mirrored where it lies."""
-        fine = self._levels[-1]
-        coarse = self._coarse(fine.state, step, layout)
-        coarse.evaluate_at_rest()
-        if coarse.mirrored_cells():
-            return False
-        fine.way = self._way(fine.state, step, coarse)
-        self._levels.append(_Level(coarse))
-        return True
+    def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
+        """Those of some of the pieces, which `finest` is of."""
+        kept = Levels.__new__(Levels)
+        kept._join(finest, [self._ladders[piece] for piece in pieces])
+        kept.stale = self.stale
+        return kept
 
     @property
     def sizes(self) -> list[int]:
@@ -175,28 +250,13 @@ class Levels:
         return [level.state.network.vertex_count for level in self._levels]
 
     @staticmethod
-    def _coarse(fine: Relaxation, step: Coarser, fine_layout: FloatArray) -> Relaxation:
-        net, layout = fine.network, fine_layout[step.kept]
-        network = SpringNetwork.build(
-            step.surface,
-            net.fabric,
-            layout,
-            grain_angle=net.grain_angle,
-            device=net.device,
-            model=net.model,
-            stretch=None if net.stretch is None else net.stretch[step.face_of],
-        )
-        network = _calibrated(network, layout, net, fine_layout)
-        # What threads are held by is a matter of the finest mesh.
-        network.guard = net.guard
-        return Relaxation(network, fine.options, start=layout)
-
-    @staticmethod
-    def _way(fine: Relaxation, step: Coarser, coarse: Relaxation) -> _Way:
+    def _way(fine: Relaxation, steps: Sequence[Coarser], coarse: Relaxation) -> _Way:
         device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
-        kept = wp.array(step.kept, dtype=wp.int32, device=device)
-        prolongation = _weights(step.prolongation, device)
-        restriction = _weights(step.restriction, device)
+        first = begins([net.vertex_count for net in fine.network.pieces])
+        ids = np.concatenate([step.kept + at for step, at in zip(steps, first, strict=False)])
+        kept = wp.array(ids, dtype=wp.int32, device=device)
+        prolongation = _weights([step.prolongation for step in steps], device)
+        restriction = _weights([step.restriction for step in steps], device)
         base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
         difference = wp.zeros(c, dtype=wp.vec2d, device=device)
         return _Way(
@@ -214,7 +274,7 @@ class Levels:
             ),
             base=base,
             correction=correction,
-            smooth_carry=step.smooth_carry,
+            steps=steps,
         )
 
     # --- the parts of a cycle
@@ -231,21 +291,27 @@ class Levels:
         self._count(level, steps)
 
     def _settle(self, share: float) -> None:
-        """Relax the coarsest level until its forces have come down to a share of what they were."""
+        """Relax the coarsest level until the forces of each piece have come down to a share of what they were."""
         last = len(self._levels) - 1
         state = self._levels[last].state
         state.evaluate_at_rest()
-        aim = share * float(np.linalg.norm(state.force.numpy()))
-        for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(self.sizes[last]) / _BOTTOM_STEPS)):
+
+        def forces() -> FloatArray:
+            force = state.force.numpy()
+            return np.array([np.linalg.norm(force[here]) for here in state.vertices])
+
+        aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
+        for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
             state.sweep(_BOTTOM_STEPS, watch_every=_WATCH_EVERY)
             self._count(last, _BOTTOM_STEPS)
-            if float(np.linalg.norm(state.force.numpy())) <= aim:
+            if (forces() <= aim).all():
                 break
 
-    def _objective(self, level: int) -> float:
+    def _objective(self, level: int) -> FloatArray:
+        """Of each piece [J]."""
         self._count(level, _ENERGY_WORK)
         state = self._levels[level].state
-        return sum(state.potential()) - state.work_of_load()
+        return np.asarray(state.potentials().sum(axis=1) - state.work_of_load())
 
     def cycle(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
         """One cycle from this level down and up again."""
@@ -260,35 +326,38 @@ class Levels:
         way.coarse.load.zero_()
         way.coarse.evaluate_at_rest()
         self._count(level + 1, _FORCE_WORK)
-        if way.coarse.mirrored_cells():
-            self.stale = True
-        else:
+        mirrored = way.coarse.mirrored_pieces()
+        self.stale = self.stale or bool(mirrored.any())
+        if not mirrored.all():
             way.load.launch()
             self.cycle(level + 1, steps)
             self._correct(level, way)
         self.smooth(level, steps, each_step)
 
-    def _correct(self, level: int, way: _Way) -> None:
-        """Add the coarse level's correction, or a half, a quarter ... of it, so that the energy does not rise."""
+    def _correct(self, level: int, way: _Way, which: BoolArray | None = None) -> None:
+        """Add the coarse level's correction to these pieces, or a half, a quarter ... of it, so that the energy does not rise."""
         state = self._levels[level].state
         before = self._objective(level)
         wp.copy(way.base, state.position)
         way.differ.launch()
         way.up.launch()
+        higher = np.ones(len(before), dtype=bool) if which is None else which.copy()
         share = 1.0
         while share > _LEAST_SHARE:
-            state.move(way.base, way.correction, share)
-            if self._objective(level) <= before:
+            state.move(way.base, way.correction, share, higher)
+            higher &= ~(self._objective(level) <= before)
+            if not higher.any():
                 return
             share *= 0.5
-        wp.copy(state.position, way.base)
+        for here in (state.vertices[piece] for piece in np.flatnonzero(higher)):
+            wp.copy(state.position, way.base, here.start, here.start, here.stop - here.start)
 
-    def leap(self, memory: CycleMemory, begin: FloatArray, force: FloatArray) -> None:
+    def leap(self, memories: Sequence[CycleMemory | None], begin: FloatArray, force: FloatArray) -> None:
         """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, if it is lower
         there.
 
         Args:
-            memory: of the cycles before; gets this one.
+            memories: of each piece that is to leap, of the cycles before; gets this one.
             begin: #V by 2, where the cycle began [m].
             force: #V by 2, of the cloth there [N].
         """
@@ -296,11 +365,19 @@ class Levels:
         end = state.positions()
         energy = self._objective(0)
         self._count(0, _FORCE_WORK)
-        further = memory.lowest(begin, force, end, state.forces())
-        if further is not None:
+        left, further, leapt = state.forces(), end.copy(), np.zeros(len(energy), dtype=bool)
+        for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
+            found = None if memory is None else memory.lowest(begin[own], force[own], end[own], left[own])
+            if found is not None:
+                further[own], leapt[piece] = found, True
+        if not leapt.any():
+            return
+        state.position.assign(further)
+        back = leapt & ~(self._objective(0) < energy)
+        if back.any():
+            for own in (state.vertices[piece] for piece in np.flatnonzero(back)):
+                further[own] = end[own]
             state.position.assign(further)
-            if not self._objective(0) < energy:
-                state.position.assign(end)
 
     def follow(self) -> None:
         """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
@@ -315,35 +392,50 @@ class Levels:
             level.state.load.zero_()
         self._settle(_AT_REST_FIRST)
         for number in range(last - 1, -1, -1):
-            smooth = self._rise_to(number)
-            if number and (self.sizes[number] <= _CYCLED or not smooth):
+            left = ~self._rise_to(number)
+            way = self._levels[number].way
+            assert way is not None
+            sizes = np.array([net.vertex_count for net in self._levels[number].state.network.pieces])
+            moved = sizes > [len(step.kept) for step in way.steps]
+            if number and (moved & (left | (sizes <= _CYCLED))).any():
                 self.cycle(number, steps)
 
-    def _rise_to(self, level: int) -> bool:
+    def _rise_to(self, level: int) -> BoolArray:
         """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
         what only the finer mesh has. Where neither lowers the energy, it stays where it is.
 
         Returns:
-            Whether it starts where cubics carried it.
+            #P, whether a piece starts where cubics carried it.
         """
         state, way = self._levels[level].state, self._levels[level].way
         assert way is not None
         before, energy = state.positions(), self._objective(level)
-        if way.smooth_carry is None:
+        smooth = [step.smooth_carry for step in way.steps]
+        if None in smooth:
             way.carry.launch()
-        else:
-            state.position.assign(way.smooth_carry(way.coarse.positions()))
+        layout, coarse = state.positions(), way.coarse.positions()
+        for carry, own, of in zip(smooth, state.vertices, way.coarse.vertices, strict=True):
+            if carry is not None:
+                layout[own] = carry(coarse[of])
+        state.position.assign(layout)
         carried = self._objective(level)
-        if math.isinf(carried):
+        turned = np.flatnonzero(np.isinf(carried))
+        if len(turned):
             # Turned faces, the odd one at a border, say.
-            mended, left = untangle(state.network.surface, state.positions())
-            state.position.assign(mended)
-            carried = math.inf if left else self._objective(level)
-        if carried < energy:
-            return way.smooth_carry is not None
-        state.position.assign(before)
-        self._correct(level, way)
-        return False
+            left = np.zeros(len(carried), dtype=bool)
+            for piece in turned.tolist():
+                own = state.vertices[piece]
+                layout[own], left[piece] = untangle(state.network.pieces[piece].surface, layout[own])
+            state.position.assign(layout)
+            carried = np.where(left, math.inf, self._objective(level))
+        lower = carried < energy
+        if not lower.all():
+            for piece in np.flatnonzero(~lower).tolist():
+                own = state.vertices[piece]
+                layout[own] = before[own]
+            state.position.assign(layout)
+            self._correct(level, way, ~lower)
+        return lower & np.array([carry is not None for carry in smooth])
 
 
 class CycleMemory:
@@ -382,6 +474,80 @@ class CycleMemory:
         return end + (share @ ways).reshape(end.shape)
 
 
+@dataclass(kw_only=True)
+class _Pace:
+    """How a piece nears its minimum.
+
+    Attributes:
+        steps: before and after, that it wants.
+        gained: by how much the last cycle has changed its energy [J].
+        slow: whether cycles are to be followed by a leap.
+        near: whether they take too little away to go on.
+        memory: of cycles.
+    """
+
+    steps: int
+    gained: float = math.inf
+    slow: bool = False
+    near: bool = False
+    memory: CycleMemory = field(default_factory=lambda: CycleMemory(_DEPTH))
+
+
+@dataclass(kw_only=True)
+class _Cycles:
+    """Pieces that are cycled together, and the pace of each."""
+
+    state: Relaxation
+    levels: Levels
+    paces: Sequence[_Pace]
+    renewals: int = 0
+
+    @property
+    def done(self) -> BoolArray:
+        """#P, whether a piece has come to rest, or near enough."""
+        return self.state.last.at_rest | [pace.near for pace in self.paces]
+
+    def parts(self) -> list[_Cycles]:
+        """The pieces that want the most steps, and the others, to be cycled apart; those that are done in neither. None where that would
+        not pay."""
+        done = self.done
+        steps = np.where(done, 0, [pace.steps for pace in self.paces])
+        slowest = steps == steps.max()
+        if not self.state.may_leave(~slowest):
+            return []
+        others = ~slowest & ~done
+        return [self._of(np.flatnonzero(part).tolist()) for part in (slowest, others) if part.any()]
+
+    def _of(self, pieces: Sequence[int]) -> _Cycles:
+        state = self.state.keep(pieces)
+        state.evaluate_at_rest()
+        paces = [self.paces[piece] for piece in pieces]
+        return _Cycles(state=state, levels=self.levels.keep(state, pieces), paces=paces, renewals=self.renewals)
+
+    def go(self, enough: float | None, each_step: Callable[[], None]) -> None:
+        """One cycle, and a look."""
+        state, paces = self.state, self.paces
+        if self.levels.stale and self.renewals < _RENEWALS:
+            self.levels, self.renewals = Levels(state), self.renewals + 1
+        work = state.work_units
+        self.levels.follow()
+        begin, force = state.positions(), state.cloth_force()
+        self.levels.cycle(0, max(pace.steps for pace in paces), each_step)
+        if any(pace.slow for pace in paces):
+            self.levels.leap([pace.memory if pace.slow else None for pace in paces], begin, force)
+        state.hold_upright()
+        state.evaluate_at_rest()
+        state.work_units += _FORCE_WORK + _ENERGY_WORK
+        look = state.look(state.work_units - work)
+        for piece, pace in enumerate(paces):
+            gain = float(look.gain[piece])
+            pace.near = enough is not None and gain <= enough * look.potential[piece]
+            pace.slow = abs(gain) > _SLOW * pace.gained
+            if abs(gain) > _VERY_SLOW * pace.gained and not look.at_rest[piece]:
+                pace.steps = min(2 * pace.steps, _MOST_STEPS)
+            pace.gained = abs(gain)
+
+
 def levels_pay(network: SpringNetwork) -> bool:
     """Whether cycles take less work than plain steps: on grids always; on triangles, of which coarse ones carry less the softer the shear
     is, the more vertices there are."""
@@ -416,64 +582,44 @@ def relax_multilevel(
         levels: of this state, if they are there already.
         nested: start from the coarsest level; without, cycles begin at the present layout, as after an edit.
         enough: it is over, at rest or not, after a cycle that takes no more than this share of the energy away; if given.
-        watch: called after every cycle with the state, its energies and the residual.
+        watch: called after every cycle with the state, its energies and the residual; of several pieces, with the state of those that
+            are still cycled together (its `numbers` say which).
         each_step: called after every step on the finest level, with the energies and the residual of the last look.
     """
     options: RelaxOptions = state.options
     begun = time.perf_counter()
     state.hold_upright()
-    levels = Levels(state) if levels is None else levels
+    levels = Levels(state, mend=nested) if levels is None else levels
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
-    first, start, renewals = state.steps, state.work_units, 0
-    before = state.energies()
-    change, residual, gained, slow = math.inf, math.inf, math.inf, False
+    whole, first, start = state, state.steps, state.work_units
+    if not nested:
+        state.begin()
     steps = first_steps(state.network)
+    cycles = _Cycles(state=state, levels=levels, paces=[_Pace(steps=steps) for _ in state.vertices])
 
-    def look() -> None:
-        if each_step is not None:
-            each_step(state, before, residual)
+    def tell(call: Watch | None) -> None:
+        if call is not None:
+            look = cycles.state.last
+            call(cycles.state, look.total, float(look.residual.max()))
 
     if nested:
         levels.rise(steps)
         state.hold_upright()
-        before = state.energies()
-        look()
-    converged, near, memory = False, False, CycleMemory(_DEPTH)
+        state.begin()
+        tell(each_step)
     state.evaluate_at_rest()
     state.work_units += _FORCE_WORK
-    while not converged and state.work_units - start < options.max_steps and not near:
-        if levels.stale and renewals < _RENEWALS:
-            levels, renewals = Levels(state), renewals + 1
-        work = state.work_units
-        levels.follow()
-        begin, force = state.positions(), state.cloth_force()
-        levels.cycle(0, steps, look)
-        if slow:
-            levels.leap(memory, begin, force)
-        state.hold_upright()
-        state.evaluate_at_rest()
-        now = state.energies()
-        state.work_units += _FORCE_WORK + _ENERGY_WORK
-        residual = state.residual()
-        at_rest = now.potential <= state.negligible_energy
-        gain = before.potential - now.potential
-        change = 0.0 if at_rest else abs(gain) / ((state.work_units - work) * now.potential)
-        converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
-        near = enough is not None and gain <= enough * now.potential
-        slow = abs(gain) > _SLOW * gained
-        if abs(gain) > _VERY_SLOW * gained:
-            steps = min(2 * steps, _MOST_STEPS)
-        before, gained = now, abs(gain)
-        if watch is not None:
-            watch(state, now, residual)
-    return Outcome(
-        converged=converged,
-        steps=state.steps - first,
-        work_units=state.work_units - start,
-        restarts=state.restarts,
-        energy_change=change,
-        residual=residual,
-        energies=before,
-        seconds=time.perf_counter() - begun,
-    )
+    waiting = [cycles]
+    while waiting:
+        cycles = waiting.pop()
+        while not cycles.done.all() and cycles.state.work_units - start < options.max_steps:
+            parts = cycles.parts()
+            if parts:
+                cycles.state.give(whole)
+                cycles, *others = parts
+                waiting += others
+            cycles.go(enough, lambda: tell(each_step))
+            tell(watch)
+        cycles.state.give(whole)
+    return whole.outcome(first, start, begun=begun)

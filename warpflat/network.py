@@ -22,7 +22,9 @@ stiffness, stay the matrix of the approximate implicit step.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -105,28 +107,6 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringArrays:
-    """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges."""
-
-    ends: IntArray
-    rest_length: FloatArray
-    stiffness: FloatArray
-    edge_count: int
-    clamped_cells: int = 0
-
-
-@dataclass(frozen=True, kw_only=True)
-class CellArrays:
-    """The cells: `corner` #C by 3, `face` #C, `edges` #C by 2 by 2 [m] (see `kernels.cells`), `area` #C weighted [m2]."""
-
-    corner: IntArray
-    face: IntArray
-    weight: FloatArray
-    edges: FloatArray
-    area: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True)
 class ByVertex:
     """Lists of what is around each vertex: `offset` #V+1, where the entries of each vertex begin, and what is there."""
 
@@ -143,14 +123,54 @@ class SpringsAround(ByVertex):
 
 @dataclass(frozen=True, kw_only=True)
 class _Unweighed:
-    """Of a surface's springs what no fabric changes: `ends`, `rest_length` and `edge_count` as in SpringArrays, which are around
-    each vertex, and their rest lengths in that order."""
+    """Of a surface's springs what no fabric changes: as in SpringArrays, and the rest lengths as they are listed around the vertices."""
 
     ends: IntArray
     rest_length: FloatArray
     edge_count: int
     around: SpringsAround
     listed_length: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringArrays:
+    """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
+    are `around` each vertex. Of a surface's own springs, what they share with those of other fabrics."""
+
+    ends: IntArray
+    rest_length: FloatArray
+    stiffness: FloatArray
+    edge_count: int
+    around: SpringsAround
+    clamped_cells: int = 0
+    own: _Unweighed | None = None
+
+    @property
+    def listed_length(self) -> FloatArray:
+        """2 #S, the rest lengths as they are listed around the vertices [m]."""
+        if self.own is not None and self.own.rest_length is self.rest_length:
+            return self.own.listed_length
+        return np.take(self.rest_length, self.around.entry)
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellArrays:
+    """The cells: `corner` #C by 3, `face` #C, `edges` #C by 2 by 2 [m] (see `kernels.cells`), `area` #C weighted [m2]; the corners,
+    counted through, `around` each vertex."""
+
+    corner: IntArray
+    face: IntArray
+    weight: FloatArray
+    edges: FloatArray
+    area: FloatArray
+    around: ByVertex
+
+    @cached_property
+    def vertex_areas(self) -> FloatArray:
+        """#V [m2], a third of each cell's share of the cloth at each of its corners."""
+        around, total = self.around, np.empty(len(self.around.offset) - 1)
+        launch_each(add_areas, len(total), [around.offset, around.entry, self.area], [total])
+        return total
 
 
 @once_per_surface
@@ -165,7 +185,8 @@ def cells_of(surface: Surface) -> CellArrays:
     edges, area = lay_cells(surface.vertices, surface.faces, _creases_of(surface), _first_of(surface, 4, 1))
     if len(weight) and (weight == weight[0]).all():
         weight = np.broadcast_to(weight[0], weight.shape)
-    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area))
+    around = _corners_at(corner, len(surface.vertices))
+    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area, around=around))
 
 
 def _first_of(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
@@ -174,27 +195,10 @@ def _first_of(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
     return np.cumsum(counts, dtype=np.int32) - counts
 
 
-@once_per_surface
-def _cells_around(surface: Surface) -> ByVertex:
-    return _corners_at(cells_of(surface).corner, len(surface.vertices))
-
-
 def _corners_at(corner: IntArray, count: int) -> ByVertex:
     """Of triples or other tuples of vertices, where each vertex is among them, counted through."""
     entry, offset = order_by(corner.ravel(), count)
     return read_only(ByVertex(offset=offset, entry=entry))
-
-
-@once_per_surface
-def _areas_at(surface: Surface) -> FloatArray:
-    return vertex_areas(cells_of(surface), _cells_around(surface))
-
-
-def vertex_areas(cells: CellArrays, around: ByVertex) -> FloatArray:
-    """#V [m2], a third of each cell's share of the cloth at each of its corners."""
-    total = np.empty(len(around.offset) - 1)
-    launch_each(add_areas, len(total), [around.offset, around.entry, cells.area], [total])
-    return total
 
 
 @once_per_surface
@@ -223,12 +227,6 @@ def _springs_at(ends: IntArray, count: int) -> SpringsAround:
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
     launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
     return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
-
-
-def springs_around(surface: Surface, springs: SpringArrays) -> SpringsAround:
-    """The springs around each vertex of the surface."""
-    own = _unweighed(surface)
-    return own.around if springs.ends is own.ends else _springs_at(springs.ends, len(surface.vertices))
 
 
 def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
@@ -264,7 +262,9 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         rest_length=own.rest_length,
         stiffness=stiffness,
         edge_count=own.edge_count,
+        around=own.around,
         clamped_cells=clamped,
+        own=own,
     )
 
 
@@ -319,7 +319,7 @@ def _shortened(
 
 def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
     """3 #C, the spring along each cell's edges 0-1, 1-2, 2-0."""
-    around = _springs_at(springs.ends, int(springs.ends.max()) + 1)
+    around = springs.around
     side = np.empty_like(cells.corner)
     given = [cells.corner, around.offset, around.neighbor, around.entry]
     launch_each(find_sides, len(side), given, [side])
@@ -348,11 +348,11 @@ def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, w
     is_quad = surface.is_quad
     if is_quad.all():
         return np.inf
-    around, count = springs_around(surface, springs), len(surface.vertices)
+    around, count = springs.around, len(surface.vertices)
     hold = np.empty(count)
     layout = np.ascontiguousarray(positions, dtype=np.float64)
     lists = [around.offset, around.neighbor, around.entry]
-    given = [layout, *lists, springs.rest_length, springs.stiffness, _areas_at(surface), wp.vec2d(*warp)]
+    given = [layout, *lists, springs.rest_length, springs.stiffness, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
     launch_each(measure_hold, count, given, [hold])
     hold[surface.faces[is_quad].ravel()] = np.inf
     return _HOLD_SHARE * float(np.partition(hold, count // 4)[count // 4])
@@ -368,7 +368,8 @@ class SpringNetwork:
         model: "springs", with their guard, or "membrane".
         stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
         held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
-        shear_hold: shear stiffness of the springs that keeps threads straight [N/m]; the fabric's where that is less.
+        shear_hold: shear stiffness of the springs that keeps threads straight [N/m], one for all or #C; the fabric's where that is less.
+        parts: the networks of which this one was joined, to be relaxed side by side (see `warpflat.joined`); none of any other.
         springs, cells, guard, cloth: what the kernels take.
         mass: #V [kg]. spring_stiffness: #V, sum of k_ij around each vertex, and a half of the stiffest [N/m].
         device: Warp device.
@@ -383,7 +384,8 @@ class SpringNetwork:
     model: Model = "springs"
     stretch: FloatArray | None = None
     held: FloatArray | None = None
-    shear_hold: float = np.inf
+    shear_hold: float | FloatArray = np.inf
+    parts: Sequence[SpringNetwork] = ()
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
     guard: ThreadGuard = field(init=False)
@@ -405,6 +407,7 @@ class SpringNetwork:
         device: str | wp.Device | None = None,
         model: Model = "springs",
         stretch: FloatArray | None = None,
+        hold: float | None = None,
     ) -> SpringNetwork:
         """Network for the surface, with directions measured in the layout `positions` (#V by 2 [m]).
 
@@ -416,6 +419,7 @@ class SpringNetwork:
             model: "springs" or "membrane".
             stretch: #F by 2, length worn over length flat that is meant along warp and weft. Springs and cells then are at
                 rest in a pattern that is so much smaller.
+            hold: `shear_hold`, if it is not to be measured.
 
         Raises:
             InputError: an unknown model.
@@ -424,15 +428,15 @@ class SpringNetwork:
         springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), cells_of(surface)
         if stretch is not None:
             springs = _shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
-        held, hold = None, np.inf
-        if model == "springs":
-            hold = shear_hold(surface, springs, positions, grain_axes(grain_angle)[0])
-        else:
+        held = None
+        if model == "membrane":
             meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
             weights, held = step_matrix(
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, meant
             )
-            springs = with_stiffness(springs, cells, weights)
+            springs, hold = with_stiffness(springs, cells, weights), np.inf
+        elif hold is None:
+            hold = shear_hold(surface, springs, positions, grain_axes(grain_angle)[0])
         return cls(
             surface=surface,
             fabric=fabric,
@@ -447,10 +451,8 @@ class SpringNetwork:
         )
 
     def __post_init__(self) -> None:
-        s, c, surface, device = self.spring_arrays, self.cell_arrays, self.surface, self.device
-        count = len(surface.vertices)
-        at, own = springs_around(surface, s), _unweighed(surface)
-        listed = own.listed_length if s.rest_length is own.rest_length else np.take(s.rest_length, at.entry)
+        s, c, device, count = self.spring_arrays, self.cell_arrays, self.device, self.vertex_count
+        at, corners, listed = s.around, c.around, s.listed_length
         springs = Springs()
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
@@ -462,10 +464,7 @@ class SpringNetwork:
         self._listed = _on(device, at.entry, wp.int32)
         self.weigh(s.stiffness)
 
-        own_cells = cells_of(surface)
-        corners = _cells_around(surface) if c.corner is own_cells.corner else _corners_at(c.corner, count)
-        area = _areas_at(surface) if c is own_cells else vertex_areas(c, corners)
-        self.mass = _on(device, self.fabric.areal_density * area, wp.float64)
+        self.mass = _on(device, self.fabric.areal_density * c.vertex_areas, wp.float64)
         cells = Cells()
         cells.corner = _on(device, c.corner, wp.vec3i)
         cells.edges = _on(device, c.edges, wp.mat22d)
@@ -474,6 +473,10 @@ class SpringNetwork:
         cells.slot = _on(device, corners.entry, wp.int32)
         slack = np.broadcast_to(np.ones(2), (len(c.corner), 2)) if self.stretch is None else 1.0 / self.stretch[c.face]
         cells.slack = _on(device, slack, wp.vec2d)
+        fabric = self.fabric
+        hold = np.minimum(fabric.shear_stiffness, self.shear_hold)
+        onset = np.stack([hold / fabric.stiffness_warp, hold / fabric.stiffness_weft], axis=-1)
+        cells.onset = _on(device, np.broadcast_to(onset, (len(c.corner), 2)), wp.vec2d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
@@ -481,12 +484,9 @@ class SpringNetwork:
         self.bonds.freedom = wp.array(np.ones((count, 2)), dtype=wp.vec2d, device=device)
 
         warp, weft = grain_axes(self.grain_angle)
-        fabric = self.fabric
         guard = ThreadGuard()
         guard.warp, guard.weft = wp.vec2d(*warp), wp.vec2d(*weft)
         guard.stiffness_warp, guard.stiffness_weft = fabric.stiffness_warp, fabric.stiffness_weft
-        hold = min(fabric.shear_stiffness, self.shear_hold)
-        guard.onset_warp, guard.onset_weft = hold / fabric.stiffness_warp, hold / fabric.stiffness_weft
         self.guard = guard
         if self.held is not None:
             # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
@@ -504,6 +504,11 @@ class SpringNetwork:
         if self.cloth is None:
             return evaluate_guard, compute_guard_energy, self.guard
         return evaluate_membrane, compute_membrane_energy, self.cloth
+
+    @property
+    def pieces(self) -> Sequence[SpringNetwork]:
+        """Of each piece that is relaxed on its own its network: the parts of a joined one, otherwise this one."""
+        return self.parts or (self,)
 
     @property
     def vertex_count(self) -> int:

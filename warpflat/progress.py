@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.network import SpringNetwork
 from warpflat.relax import Energies, Relaxation
 from warpflat.strain import worn_strain
 from warpflat.surface import Surface
@@ -52,8 +53,10 @@ class Progress:
         residual: largest force over mean spring force, likewise.
     """
 
-    def __init__(self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int) -> None:
-        """Hold on to the running state; nothing is copied before it is asked for."""
+    def __init__(
+        self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int, piece: int = 0
+    ) -> None:
+        """Hold on to the running state, of which it is this piece; nothing is copied before it is asked for."""
         self.stage = stage
         self.step = state.steps
         self.work_units = state.work_units
@@ -62,16 +65,21 @@ class Progress:
         self.guard_energy = energies.guard
         self.residual = residual
         self._state = state
+        self._piece = piece
 
     @property
     def surface(self) -> Surface:
         """The surface with the present topology: after a cut its vertices are doubled."""
-        return self._state.network.surface
+        return self._network.surface
 
     def positions(self) -> FloatArray:
         """#V by 2, the layout [m], a copy."""
-        return self._state.positions()
+        return self._state.positions()[self._state.vertices[self._piece]]
 
     def face_energy_density(self) -> FloatArray:
         """#F, strain energy per flat area [J/m2]."""
-        return worn_strain(self._state.network, self.positions()).energy_density
+        return worn_strain(self._network, self.positions()).energy_density
+
+    @property
+    def _network(self) -> SpringNetwork:
+        return self._state.network.pieces[self._piece]

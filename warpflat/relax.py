@@ -3,6 +3,9 @@
 The step is the paper's; two things are added. Velocities are set to zero whenever the forces begin to brake the motion
 (kinetic damping, as in dynamic relaxation: the energy swings otherwise, and progress is as slow as diffusion), and no
 vertex moves so far in one step that a face could be mirrored.
+
+Several pieces may be relaxed side by side as one joined network (`warpflat.joined`): each is damped, looked at and judged on its
+own, and leaves when it has come to rest, as soon as it is worth while to go on with fewer.
 """
 
 from __future__ import annotations
@@ -11,6 +14,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass, field
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -18,16 +22,28 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.joined import begins, join_networks
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
 from warpflat.kernels.transfer import correct
-from warpflat.launching import Launch, record
+from warpflat.launching import Launch, launch_each, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.network import SpringNetwork
 from warpflat.tangent import TangentMatrix
 
-__all__ = ["SOLVERS", "Energies", "Outcome", "RelaxOptions", "Relaxation", "Solver", "Upright", "Watch", "relax"]
+__all__ = [
+    "SOLVERS",
+    "Energies",
+    "Look",
+    "Outcome",
+    "RelaxOptions",
+    "Relaxation",
+    "Solver",
+    "Upright",
+    "Watch",
+    "relax",
+]
 
 
 Solver = Literal["multilevel", "plain"]
@@ -35,6 +51,11 @@ SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
 
 # Steps between two looks at the stiffness that a membrane has where it is.
 _FOLLOW_EVERY = 100
+# Pieces leave the others once they have this share of the vertices: to make the others anew takes as long as a dozen steps.
+_LEAVE = 0.2
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,8 +119,44 @@ class Energies:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Look:
+    """What a look at a running relaxation says of each of its pieces.
+
+    Attributes:
+        energies: #P by 3, of the springs or the membrane, of the guard, of the motion [J].
+        residual: #P, largest force on a vertex over the mean force of the springs; infinite before it is known.
+        gain: #P, what the springs' and the guard's energy has lost since the look before [J].
+        change: #P, eq. (11), that over the energy and the steps in between.
+        at_rest: #P, whether change and residual are within the tolerances.
+        steps, work_units: #P, what it has taken so far.
+    """
+
+    energies: FloatArray
+    residual: FloatArray
+    gain: FloatArray
+    change: FloatArray
+    at_rest: BoolArray
+    steps: NDArray[np.int64]
+    work_units: FloatArray
+
+    @property
+    def potential(self) -> FloatArray:
+        """#P, what is minimised [J]."""
+        return self.energies[:, 0] + self.energies[:, 1]
+
+    @property
+    def total(self) -> Energies:
+        """Of all pieces."""
+        return Energies(*self.energies.sum(axis=0).tolist())
+
+    def of(self, pieces: Sequence[int]) -> Look:
+        """What it says of some of them."""
+        return Look(**{name: values[list(pieces)] for name, values in vars(self).items()})
+
+
+@dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a relaxation ended.
+    """How a relaxation ended; of several pieces, the energies of all and the worst of what is left.
 
     Attributes:
         converged: false if it ran into its step limit.
@@ -150,14 +207,17 @@ class Relaxation:
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
             constant forces [N]. On the network's device.
         steps: taken. work_units: all work, in steps of this mesh; those of coarser levels count by their vertices.
+        vertices: of each piece, its vertices.
+        numbers: of each piece, which it was before others left.
+        last: what the last look said.
     """
 
     network: SpringNetwork
     options: RelaxOptions
-    start: InitVar[NDArray[np.float64]]
+    start: InitVar[FloatArray]
     upright: Sequence[Upright] = ()
 
-    def __post_init__(self, start: NDArray[np.float64]) -> None:
+    def __post_init__(self, start: FloatArray) -> None:
         n, c, device = self.network.vertex_count, self.network.cell_count, self.network.device
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
@@ -174,9 +234,10 @@ class Relaxation:
         self._reach = wp.zeros(n, dtype=wp.float64, device=device)
         self._guarded = wp.zeros(n, dtype=wp.int32, device=device)
         self._cell_acting = wp.zeros(c, dtype=wp.int32, device=device)
-        self._cell_force = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
-        self._cell_viscosity = wp.zeros(3 * c, dtype=wp.vec2d, device=device)
-        self._cell_stiffness = wp.zeros(3 * c, dtype=wp.float64, device=device)
+        # Written and read only where cells act: elsewhere no memory stands behind them.
+        self._cell_force = wp.empty(3 * c, dtype=wp.vec2d, device=device)
+        self._cell_viscosity = wp.empty(3 * c, dtype=wp.vec2d, device=device)
+        self._cell_stiffness = wp.empty(3 * c, dtype=wp.float64, device=device)
         self._cell_clearance = wp.zeros(c, dtype=wp.float64, device=device)
         self._seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self._seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
@@ -184,14 +245,21 @@ class Relaxation:
         self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
         self._vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
         self._cell_energy = wp.zeros(c, dtype=wp.float64, device=device)
-        springs = self.network.spring_arrays
+        pieces = self.network.pieces
+        self._vertex_begin = begins([net.vertex_count for net in pieces])
+        self._cell_begin = begins([net.cell_count for net in pieces])
+        self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
+        self.numbers: Sequence[int] = range(len(pieces))
+        springs = [net.spring_arrays for net in pieces]
         # What a strain of 1e-9 everywhere stores: below it a layout counts as free of strain.
-        self.negligible_energy = 0.5e-18 * float(np.sum(springs.stiffness * springs.rest_length**2))
-        self._mean_stiffness_force = float(np.mean(springs.stiffness * springs.rest_length))
+        self.negligible_energy = 0.5e-18 * np.array([np.sum(s.stiffness * s.rest_length**2) for s in springs])
+        self._mean_stiffness_force = np.array([np.mean(s.stiffness * s.rest_length) for s in springs])
+        self._spring_count = np.array([len(s.ends) for s in springs])
         self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
         self.work_units = 0.0
         self.restarts = 0
+        self.last: Look
         self._record()
 
     def _record(self) -> None:
@@ -309,13 +377,16 @@ class Relaxation:
             outputs=[self.position, self.velocity],
             device=device,
         )
-        self._stop = record(
-            stop,
-            dim=n,
-            inputs=[net.mass, self.force, self._stiffness, h],
-            outputs=[self.velocity, self._driving_force, self._first_guess],
-            device=device,
-        )
+        self._stop = [
+            record(
+                stop,
+                dim=here.stop - here.start,
+                inputs=[net.mass[here], self.force[here], self._stiffness[here], h],
+                outputs=[self.velocity[here], self._driving_force[here], self._first_guess[here]],
+                device=device,
+            )
+            for here in self.vertices
+        ]
 
     def step(self) -> None:
         """One approximate implicit step."""
@@ -337,9 +408,11 @@ class Relaxation:
                 evaluate_on = self._evaluate_on if self._guarded.numpy().any() else self._evaluate_unguarded
             else:
                 evaluate_on.launch()
-            if self.options.kinetic_damping and float(self._power.numpy().sum()) < 0.0:
-                self._stop.launch()
-                self.restarts += 1
+            if self.options.kinetic_damping:
+                braking = np.flatnonzero(_sums(self._power.numpy(), self._vertex_begin) < 0.0)
+                for piece in braking:
+                    self._stop[piece].launch()
+                self.restarts += len(braking)
             self._advance.launch()
             self.steps += 1
             if each_step is not None:
@@ -354,33 +427,117 @@ class Relaxation:
         """How many cells are mirrored or have no area, at the last evaluated state."""
         return int(np.count_nonzero(self._cell_clearance.numpy() <= 0.0))
 
-    def move(self, base: wp.array, way: wp.array, share: float) -> None:
-        """Go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
-        wp.launch(
-            correct,
-            dim=self.network.vertex_count,
-            inputs=[base, way, share, self.network.bonds.freedom, 0],
-            outputs=[self.position],
-            device=self.network.device,
-        )
+    def mirrored_pieces(self) -> BoolArray:
+        """#P, whether a piece has such cells."""
+        return np.logical_or.reduceat(self._cell_clearance.numpy() <= 0.0, self._cell_begin[:-1])
 
-    def work_of_load(self) -> float:
-        """Sum of load times place [J]."""
-        return float(np.einsum("ij,ij->", self.load.numpy(), self.position.numpy()))
+    def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:
+        """Let these pieces (#P) go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
+        count, device, freedom = self.network.vertex_count, self.network.device, self.network.bonds.freedom
+        if pieces.all():
+            launch_each(correct, count, [base, way, share, freedom], [self.position], device=device)
+            return
+        for here in (self.vertices[piece] for piece in np.flatnonzero(pieces)):
+            given = [base, way, share, freedom, here.start]
+            wp.launch(correct, dim=here.stop - here.start, inputs=given, outputs=[self.position], device=device)
 
-    def potential(self) -> tuple[float, float]:
-        """Energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
+    def work_of_load(self) -> FloatArray:
+        """#P, sum of load times place [J]."""
+        load, position = self.load.numpy(), self.position.numpy()
+        return np.array([np.einsum("ij,ij->", load[here], position[here]) for here in self.vertices])
+
+    def potentials(self) -> FloatArray:
+        """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
         self._measure.launch()
-        return float(self._vertex_energy.numpy().sum()), float(self._cell_energy.numpy().sum())
+        springs = _sums(self._vertex_energy.numpy(), self._vertex_begin)
+        return np.stack([springs, _sums(self._cell_energy.numpy(), self._cell_begin)], axis=1)
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
-        spring, cells = self.potential()
+        return Energies(*self.piece_energies().sum(axis=0).tolist())
+
+    def piece_energies(self) -> FloatArray:
+        """#P by 3, the same of each piece."""
+        spring, cells = self.potentials().T
         self._measure_motion.launch()
-        kinetic = float(self._vertex_energy.numpy().sum())
+        kinetic = _sums(self._vertex_energy.numpy(), self._vertex_begin)
         if self.network.model == "springs":
-            return Energies(spring, cells, kinetic)
-        return Energies(cells, 0.0, kinetic)
+            return np.stack([spring, cells, kinetic], axis=1)
+        return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
+
+    def begin(self) -> Look:
+        """The look before the first step."""
+        residual, gain, change = np.full((3, len(self.vertices)), np.inf)
+        never = np.zeros(len(self.vertices), dtype=bool)
+        return self._say(self.piece_energies(), residual=residual, gain=gain, change=change, at_rest=never)
+
+    def look(self, work: float) -> Look:
+        """How energy and residual are now, so many steps' work after the last look."""
+        before, energies, residual = self.last.potential, self.piece_energies(), self.residuals()
+        now = energies[:, 0] + energies[:, 1]
+        strained = now > self.negligible_energy
+        with np.errstate(invalid="ignore"):  # both infinite, with mirrored cells
+            gain = before - now
+            change = np.where(strained, np.abs(gain) / (work * np.where(strained, now, 1.0)), 0.0)
+        at_rest = (change <= self.options.energy_tolerance) & (residual <= self.options.residual_tolerance)
+        return self._say(energies, residual=residual, gain=gain, change=change, at_rest=at_rest)
+
+    def _say(
+        self, energies: FloatArray, *, residual: FloatArray, gain: FloatArray, change: FloatArray, at_rest: BoolArray
+    ) -> Look:
+        self.last = Look(
+            energies=energies,
+            residual=residual,
+            gain=gain,
+            change=change,
+            at_rest=at_rest,
+            steps=np.full(len(energies), self.steps),
+            work_units=np.full(len(energies), self.work_units),
+        )
+        return self.last
+
+    def may_leave(self, pieces: BoolArray) -> bool:
+        """Whether these pieces (#P) are so large a part that it pays to go on without them."""
+        sizes = np.diff(self._vertex_begin)
+        return bool(sizes[pieces].sum() >= _LEAVE * sizes.sum())
+
+    def keep(self, pieces: Sequence[int]) -> Relaxation:
+        """Some of the pieces, as they are, as a relaxation of their own."""
+        rows = np.concatenate([np.arange(here.start, here.stop) for here in (self.vertices[piece] for piece in pieces)])
+        number = np.full(self.network.vertex_count, -1)
+        number[rows] = np.arange(len(rows))
+        upright = [
+            Upright(
+                lower=int(number[piece.lower]),
+                upper=int(number[piece.upper]),
+                vertices=slice(int(number[piece.vertices.start]), int(number[piece.vertices.stop - 1]) + 1),
+            )
+            for piece in self.upright
+            if number[piece.lower] >= 0
+        ]
+        network = join_networks([self.network.pieces[piece] for piece in pieces])
+        kept = Relaxation(network, self.options, start=self.positions()[rows], upright=upright)
+        kept.velocity.assign(self.velocity.numpy()[rows])
+        kept.load.assign(self.load.numpy()[rows])
+        kept.steps, kept.restarts, kept.work_units = self.steps, self.restarts, self.work_units
+        kept.numbers = [self.numbers[piece] for piece in pieces]
+        kept.last = self.last.of(pieces)
+        if kept.matrix is not None:
+            kept.matrix.follow(kept.position)
+        return kept
+
+    def give(self, whole: Relaxation) -> None:
+        """Put what these pieces have come to where all of them are."""
+        if self is whole:
+            return
+        position = whole.positions()
+        for here, number in zip(self.vertices, self.numbers, strict=True):
+            position[whole.vertices[number]] = self.positions()[here]
+        whole.position.assign(position)
+        whole.steps, whole.work_units = max(whole.steps, self.steps), max(whole.work_units, self.work_units)
+        whole.restarts = max(whole.restarts, self.restarts)
+        for name, values in vars(self.last).items():
+            vars(whole.last)[name][list(self.numbers)] = values
 
     def hold_upright(self) -> None:
         """Turn each piece so that the chord of its datum points up, and hold it there.
@@ -392,7 +549,7 @@ class Relaxation:
             return
         position, velocity = self.positions(), np.array(self.velocity.numpy())
         load = np.zeros_like(position)
-        force = self.cloth_force()
+        force, weight = self.cloth_force(), self.network.spring_stiffness.numpy()
         for piece in self.upright:
             here = piece.vertices
             chord = position[piece.upper] - position[piece.lower]
@@ -401,7 +558,7 @@ class Relaxation:
             centre = position[here].mean(axis=0)
             position[here] = position[here] @ turn + (centre - centre @ turn)
             velocity[here] = velocity[here] @ turn
-            arm, weighted = self._arms(position, here)
+            arm, weighted = _arms(position[here], weight[here])
             inertia = max(float(np.vdot(arm, weighted)), 1e-300)
             velocity[here] -= (float(np.vdot(weighted, velocity[here])) / inertia) * arm
             load[here] = (-float(np.vdot(arm, force[here] @ turn)) / inertia) * weighted
@@ -409,45 +566,71 @@ class Relaxation:
         self.velocity.assign(velocity)
         self.load.assign(load)
 
-    def forces(self) -> NDArray[np.float64]:
+    def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
         self.velocity.zero_()
         self._evaluate.launch()
         return self.cloth_force()
 
-    def cloth_force(self) -> NDArray[np.float64]:
+    def cloth_force(self) -> FloatArray:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
         return np.array(self.force.numpy()) - self.load.numpy()
 
-    def _arms(self, position: NDArray[np.float64], vertices: slice) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
-        """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
-        weight = np.asarray(self.network.spring_stiffness.numpy(), dtype=np.float64)[vertices]
-        at = position[vertices]
-        centre = weight @ at / weight.sum()
-        arm = np.empty_like(at)
-        arm[:, 0], arm[:, 1] = centre[1] - at[:, 1], at[:, 0] - centre[0]
-        return arm, weight[:, None] * arm
-
     def residual(self) -> float:
-        """Largest force on a vertex, at the last evaluated state, over the mean force of the springs.
+        """The worst of `residuals`."""
+        return float(self.residuals().max())
+
+    def residuals(self) -> FloatArray:
+        """#P, largest force on a vertex of the piece, at the last evaluated state, over the mean force of its springs.
 
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        position = self.position.numpy()
+        position, weight = self.position.numpy(), self.network.spring_stiffness.numpy()
         self._measure.launches[0].launch()
-        mean = float(self._vertex_pull.numpy().sum()) / self.network.spring_count
+        mean = _sums(self._vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
         force = self.cloth_force()
         for piece in self.upright:
-            arm, weighted = self._arms(position, piece.vertices)
-            turning = float(np.vdot(arm, force[piece.vertices])) / max(float(np.vdot(arm, weighted)), 1e-300)
-            force[piece.vertices] -= turning * weighted
-        return float(np.sqrt(np.einsum("ij,ij->i", force, force).max())) / max(mean, floor)
+            here = piece.vertices
+            arm, weighted = _arms(position[here], weight[here])
+            turning = float(np.vdot(arm, force[here])) / max(float(np.vdot(arm, weighted)), 1e-300)
+            force[here] -= turning * weighted
+        largest = np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1])
+        return np.sqrt(largest) / np.maximum(mean, floor)
 
-    def positions(self) -> NDArray[np.float64]:
+    def outcome(self, steps: int, work_units: float, *, begun: float) -> Outcome:
+        """How it has ended, by the last look; it began with so many steps and so much work behind it, when the clock
+        (`time.perf_counter`) stood so."""
+        look = self.last
+        return Outcome(
+            converged=bool(look.at_rest.all()),
+            steps=self.steps - steps,
+            work_units=self.work_units - work_units,
+            restarts=self.restarts,
+            energy_change=float(look.change.max()),
+            residual=float(look.residual.max()),
+            energies=look.total,
+            seconds=time.perf_counter() - begun,
+        )
+
+    def positions(self) -> FloatArray:
         """#V by 2, a copy [m]."""
         return np.array(self.position.numpy(), dtype=np.float64, copy=True)
+
+
+def _sums(values: FloatArray, begin: NDArray[np.int32]) -> FloatArray:
+    """The sum of each range of the values; `begin` has its begins and the last end."""
+    # Of a whole array NumPy adds in pairs, which loses less.
+    return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])
+
+
+def _arms(at: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
+    centre = weight @ at / weight.sum()
+    arm = np.empty_like(at)
+    arm[:, 0], arm[:, 1] = centre[1] - at[:, 1], at[:, 0] - centre[0]
+    return arm, weight[:, None] * arm
 
 
 Watch = Callable[[Relaxation, Energies, float], None]
@@ -458,41 +641,31 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
 
     Args:
         state: where to start; holds the relaxed layout afterwards.
-        watch: called every `check_every` steps with the state, its energies and the residual.
+        watch: called every `check_every` steps with the state, its energies and the residual; of several pieces, with the state of those
+            that are still stepped (its `numbers` say which).
         each_step: called after every step, with the energies and the residual of the last look.
     """
-    options = state.options
-    begun = time.perf_counter()
-    first = state.steps
-    before = state.energies()
-    change, residual, converged = math.inf, math.inf, False
+    options, whole = state.options, state
+    begun, first, work = time.perf_counter(), state.steps, state.work_units
+    look = state.begin()
 
     def stepped() -> None:
         state.work_units += 1.0
         if each_step is not None:
-            each_step(state, before, residual)
+            each_step(state, look.total, float(look.residual.max()))
 
-    while not converged and state.steps < options.max_steps:
+    while not look.at_rest.all() and state.steps < options.max_steps:
+        if state.may_leave(look.at_rest):
+            state.give(whole)
+            state = state.keep(np.flatnonzero(~look.at_rest).tolist())
+            look = state.last
         chunk = min(options.check_every, options.max_steps - state.steps)
         state.sweep(chunk, stepped)
-        now = state.energies()
-        residual = state.residual()
+        look = state.look(chunk)
         state.hold_upright()
         if state.matrix is not None and state.steps % _FOLLOW_EVERY < chunk:
             state.matrix.follow(state.position)
-        at_rest = now.potential <= state.negligible_energy
-        change = 0.0 if at_rest else abs(now.potential - before.potential) / (chunk * now.potential)
-        converged = change <= options.energy_tolerance and residual <= options.residual_tolerance
-        before = now
         if watch is not None:
-            watch(state, now, residual)
-    return Outcome(
-        converged=converged,
-        steps=state.steps - first,
-        work_units=float(state.steps - first),
-        restarts=state.restarts,
-        energy_change=change,
-        residual=residual,
-        energies=before,
-        seconds=time.perf_counter() - begun,
-    )
+            watch(state, look.total, float(look.residual.max()))
+    state.give(whole)
+    return whole.outcome(first, work, begun=begun)

@@ -1,17 +1,20 @@
-"""A run of one piece: from a layout to the network that is measured in it, to its relaxation."""
+"""Runs: from a piece's layout to the network that is measured in it, to its relaxation; those of several pieces side by side."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.coarsen import coarser_surfaces
 from warpflat.develop import Development
 from warpflat.fabric import Fabric
+from warpflat.joined import begins, join_networks
 from warpflat.membrane import Model
 from warpflat.multilevel import levels_pay, relax_multilevel
 from warpflat.network import SpringNetwork, grain_axes
@@ -21,7 +24,7 @@ from warpflat.strain import strain_energy
 from warpflat.surface import Surface
 from warpflat.tightness import Wear, meant_stretch
 
-__all__ = ["Run"]
+__all__ = ["Relaxed", "Run", "relax_runs"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -47,9 +50,8 @@ class Run:
     model: Model = "springs"
     wear: Wear | None = None
 
-    def __post_init__(self) -> None:
-        self.history: list[tuple[float, float, float, float]] = []
-        self.notes: list[str] = []
+    history: list[tuple[float, float, float, float]] = field(default_factory=list)
+    notes: list[str] = field(default_factory=list)
 
     def let_go(self, development: Development) -> Development:
         """The development made smaller by the mean stretch that is meant: the cloth as it was on the body, let go."""
@@ -66,11 +68,11 @@ class Run:
             return None, ()
         return meant_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
 
-    def state_at(self, positions: FloatArray, *, after: Relaxation | None = None) -> Relaxation:
-        """A relaxation that starts at a layout, with directions measured in it."""
+    def network_at(self, positions: FloatArray) -> SpringNetwork:
+        """The piece's network, with directions measured in a layout."""
         stretch, notes = self._meant(positions)
         self.notes += [note for note in notes if note not in self.notes]
-        network = SpringNetwork.build(
+        return SpringNetwork.build(
             self.surface,
             self.fabric,
             positions,
@@ -79,75 +81,172 @@ class Run:
             model=self.model,
             stretch=stretch,
         )
-        ends = Upright(lower=int(self.datum[0]), upper=int(self.datum[-1]))
-        state = Relaxation(network, self.options, start=positions, upright=[ends])
-        if after is not None:
-            state.steps, state.restarts, state.work_units = after.steps, after.restarts, after.work_units
-        return state
-
-    def relax(self, state: Relaxation, *, measure_again: bool) -> tuple[Relaxation, Outcome]:
-        """Relax; where the first layout says little of directions, in two rounds, measuring them again in between."""
-        first = "develop" if self.stage_name == "relax" else self.stage_name
-        self._tell(first, state, state.energies(), float("nan"))
-        begun = time.perf_counter()
-        clamped = state.network.spring_arrays.clamped_cells
-        if clamped:
-            self.notes.append(
-                f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them; their "
-                "structural springs were kept at 5 % of it"
-            )
-        if measure_again:
-            state.options = replace(
-                self.options,
-                energy_tolerance=_FIRST_ROUND * self.options.energy_tolerance,
-                residual_tolerance=_FIRST_ROUND * self.options.residual_tolerance,
-            )
-            self._relax(state, enough=_FIRST_GAIN)
-            state = self.state_at(state.positions(), after=state)
-        state.options = self.options
-        outcome = self._relax(state)
-        seconds = time.perf_counter() - begun
-        return state, replace(outcome, steps=state.steps, work_units=state.work_units, seconds=seconds)
 
     def directions_matter(self) -> bool:
         """Whether another layout gives other springs: in a cloth that is not the same in all directions, between triangles."""
         return not (_is_isotropic(self.fabric) or bool(self.surface.is_quad.all()))
 
-    def _relax(self, state: Relaxation, *, enough: float | None = None) -> Outcome:
-        each_step = None if self.callback is None else self._each_step
-        if self.options.solver == "plain" or not levels_pay(state.network):
-            return relax(state, watch=self._watch, each_step=each_step)
-        # After an edit the layout is near the minimum already.
-        nested = self.stage_name == "relax" and state.steps == 0
-        return relax_multilevel(state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
-
-    def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self.history.append((float(state.steps), energies.spring, energies.guard, residual))
-
-    def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self._tell(self.stage_name, state, energies, residual)
-
-    def _tell(self, stage: str, state: Relaxation, energies: Energies, residual: float) -> None:
+    def tell(self, stage: str, state: Relaxation, piece: int) -> None:
+        """Call back with where this piece of the relaxation stands, by the last look."""
         if self.callback is not None:
+            look = state.last
             self.callback(
-                Progress(stage, state, energies=energies, residual=residual, max_steps=self.options.max_steps)
+                Progress(
+                    stage,
+                    state,
+                    energies=Energies(*look.energies[piece].tolist()),
+                    residual=float(look.residual[piece]),
+                    max_steps=self.options.max_steps,
+                    piece=piece,
+                )
             )
 
-    def stage(self, name: str, state: Relaxation, *, seconds: float, outcome: Outcome | None = None) -> Stage:
-        """The line of the history for a stage that ended in this state."""
-        energies = state.energies() if outcome is None else outcome.energies
-        steps = 0 if outcome is None else outcome.steps
+    def stage(self, name: str, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> Stage:
+        """The line of the history for a stage that ended so."""
         return Stage(
             name=name,
-            spring_energy_j=energies.spring,
-            guard_energy_j=energies.guard,
-            strain_energy_j=strain_energy(state.network, state.positions()),
-            steps=steps,
-            work_units=0.0 if outcome is None else outcome.work_units,
-            seconds=seconds,
-            converged=True if outcome is None else outcome.converged,
-            residual=None if outcome is None else outcome.residual,
+            spring_energy_j=outcome.energies.spring,
+            guard_energy_j=outcome.energies.guard,
+            strain_energy_j=strain_energy(network, positions),
+            steps=outcome.steps,
+            work_units=outcome.work_units,
+            seconds=outcome.seconds,
+            converged=outcome.converged,
+            residual=outcome.residual,
         )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Relaxed:
+    """A piece, relaxed.
+
+    Attributes:
+        network: with directions as they were measured last.
+        positions: #V by 2 [m].
+        begin: energies at the start.
+        outcome: how it ended; the seconds are those of all pieces that were relaxed with it.
+    """
+
+    network: SpringNetwork
+    positions: FloatArray
+    begin: Energies
+    outcome: Outcome
+
+
+def relax_runs(
+    runs: Sequence[Run],
+    networks: Sequence[SpringNetwork],
+    starts: Sequence[FloatArray],
+    *,
+    again: Sequence[bool],
+) -> list[Relaxed]:
+    """Relax the pieces of several runs, those of a kind side by side.
+
+    Args:
+        runs: of one fabric, grain, model, device, stage and set of options.
+        networks: of each, measured in its start.
+        starts: of each, #V by 2 [m].
+        again: for each, whether its first layout says little of directions: then it is relaxed in two rounds, and they are measured
+            again in between.
+    """
+    kinds: dict[tuple[bool, bool], list[int]] = {}
+    for number, (run, network) in enumerate(zip(runs, networks, strict=True)):
+        kinds.setdefault((_has_levels(run, network), bool(again[number])), []).append(number)
+    relaxed: dict[int, Relaxed] = {}
+    for (levels, twice), numbers in kinds.items():
+        own = [runs[number] for number in numbers]
+        batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
+        relaxed |= zip(numbers, batch.relax(levels=levels, twice=twice), strict=True)
+    return [relaxed[number] for number in range(len(runs))]
+
+
+def _has_levels(run: Run, network: SpringNetwork) -> bool:
+    return run.options.solver == "multilevel" and levels_pay(network) and bool(coarser_surfaces(network.surface))
+
+
+class _Batch:
+    """Runs of one kind, and the relaxation in which their pieces lie side by side."""
+
+    def __init__(self, runs: Sequence[Run], networks: Sequence[SpringNetwork], starts: Sequence[FloatArray]) -> None:
+        self._runs = runs
+        self._options = runs[0].options
+        self._first = begins([net.vertex_count for net in networks]).tolist()
+        self._put(networks, np.concatenate(starts))
+
+    def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
+        upright = [
+            Upright(lower=first + int(run.datum[0]), upper=first + int(run.datum[-1]), vertices=slice(first, end))
+            for run, (first, end) in zip(self._runs, pairwise(self._first), strict=True)
+        ]
+        self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
+
+    def relax(self, *, levels: bool, twice: bool) -> list[Relaxed]:
+        """Relax them, once or in two rounds."""
+        state, begun = self._state, time.perf_counter()
+        begin = state.begin().energies
+        stage = self._runs[0].stage_name
+        self._tell(state, "develop" if stage == "relax" else stage)
+        for run, net in zip(self._runs, state.network.pieces, strict=True):
+            clamped = net.spring_arrays.clamped_cells
+            if clamped:
+                run.notes.append(
+                    f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them; their "
+                    "structural springs were kept at 5 % of it"
+                )
+        if twice:
+            state.options = replace(
+                self._options,
+                energy_tolerance=_FIRST_ROUND * self._options.energy_tolerance,
+                residual_tolerance=_FIRST_ROUND * self._options.residual_tolerance,
+            )
+            self._round(levels, enough=_FIRST_GAIN)
+            layout = state.positions()
+            self._put(
+                [run.network_at(layout[own]) for run, own in zip(self._runs, state.vertices, strict=True)], layout
+            )
+            after, state = state, self._state
+            state.steps, state.restarts, state.work_units = after.steps, after.restarts, after.work_units
+        outcome = replace(self._round(levels), seconds=time.perf_counter() - begun)
+        layout, look = state.positions(), state.last
+        return [
+            Relaxed(
+                network=net,
+                positions=layout[own],
+                begin=Energies(*begin[piece].tolist()),
+                outcome=replace(
+                    outcome,
+                    converged=bool(look.at_rest[piece]),
+                    steps=int(look.steps[piece]),
+                    work_units=float(look.work_units[piece]),
+                    energy_change=float(look.change[piece]),
+                    residual=float(look.residual[piece]),
+                    energies=Energies(*look.energies[piece].tolist()),
+                ),
+            )
+            for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertices, strict=True))
+        ]
+
+    def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
+        told = any(run.callback is not None for run in self._runs)
+        each_step = self._each_step if told else None
+        if not levels:
+            return relax(self._state, watch=self._watch, each_step=each_step)
+        # After an edit the layout is near the minimum already.
+        nested = self._runs[0].stage_name == "relax" and self._state.steps == 0
+        return relax_multilevel(self._state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
+
+    def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
+        for piece, number in enumerate(state.numbers):
+            spring, guard, _ = state.last.energies[piece].tolist()
+            run = self._runs[number]
+            run.history.append((float(state.steps), spring, guard, float(state.last.residual[piece])))
+
+    def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
+        self._tell(state, self._runs[0].stage_name)
+
+    def _tell(self, state: Relaxation, stage: str) -> None:
+        for piece, number in enumerate(state.numbers):
+            self._runs[number].tell(stage, state, piece)
 
 
 def _is_isotropic(fabric: Fabric) -> bool:

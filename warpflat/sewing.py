@@ -161,7 +161,7 @@ def sew(
     alone = np.concatenate([piece.positions for piece in pieces.values()])
     ties, kinds, laid = _ties(whole, alone, seams, constraints)
     start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
-    network = whole.network(start)
+    network = whole.network()
     if folds:
         network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
     if len(ties):

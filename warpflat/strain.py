@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric
 from warpflat.kernels.membrane import compute_membrane_strain
-from warpflat.kernels.strain import Membrane, average_over_faces, compute_worn_strain
-from warpflat.launching import record
+from warpflat.kernels.strain import Membrane, average_over_faces, compute_strain_energy, compute_worn_strain
+from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface.mesh import Surface
@@ -77,13 +77,20 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
     offset = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
     cells = [wp.array(offset, dtype=wp.int32, device=device), *_worn_cells(network, positions)]
     strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
-    record(average_over_faces, dim=len(offset) - 1, inputs=cells, outputs=faces, device=device).launch()
+    launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
     return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
 
 
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
     """Strain energy [J] of a layout (#V by 2 [m]), the sum of what `worn_strain` gives per face."""
-    return float(_worn_cells(network, positions)[2].numpy().sum())
+    if network.model == "membrane":
+        return float(_worn_cells(network, positions)[2].numpy().sum())
+    device = network.device
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    energy = wp.empty(network.cell_count, dtype=wp.float64, device=device)
+    given = [at, network.cells, membrane_of(network.fabric, network.grain_angle)]
+    launch_each(compute_strain_energy, network.cell_count, given, [energy], device=device)
+    return float(energy.numpy().sum())
 
 
 def _worn_cells(network: SpringNetwork, positions: FloatArray) -> list[wp.array]:
@@ -95,7 +102,7 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> list[wp.array]
     if network.model == "membrane":
         kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
     inputs = [at, network.cells, cloth]
-    record(kernel, dim=network.cell_count, inputs=inputs, outputs=cells, device=device).launch()
+    launch_each(kernel, network.cell_count, inputs, cells, device=device)
     return cells
 
 

@@ -9,16 +9,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.flattening import Flattening
-from warpflat.network import CellArrays, SpringArrays, SpringNetwork
+from warpflat.joined import begins, join_networks, join_surfaces
+from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
 from warpflat.relax import Relaxation, Upright
 from warpflat.strain import strain_energy
-from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import components
 
 __all__ = ["Together"]
 
-FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 
@@ -35,23 +34,9 @@ class Together:
     def __init__(self, pieces: Mapping[str, Flattening]) -> None:
         """Put the pieces, of one fabric, side by side."""
         self.pieces = pieces
-        self.first: dict[str, int] = {}
-        total = 0
-        for name, piece in pieces.items():
-            self.first[name] = total
-            total += len(piece.positions)
-        surfaces = {name: piece.network.surface for name, piece in pieces.items()}
-        vertices = np.concatenate([surface.vertices for surface in surfaces.values()])
-        faces = np.concatenate(
-            [np.where(surface.faces >= 0, surface.faces + self.first[name], -1) for name, surface in surfaces.items()]
-        ).astype(np.int32)
-        self.surface = Surface(
-            vertices=vertices,
-            faces=faces,
-            name=" + ".join(pieces),
-            input_vertices=vertices,
-            input_index=np.arange(total, dtype=np.int32),
-        )
+        first = begins([len(piece.positions) for piece in pieces.values()])
+        self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
+        self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
         self.upright = {
             name: Upright(
                 lower=int(piece.datum[0]) + self.first[name],
@@ -65,55 +50,12 @@ class Together:
         """Vertices of a piece in the whole's numbering."""
         return np.asarray(vertices, dtype=np.int32) + np.int32(self.first[name])
 
-    def network(self, start: FloatArray) -> SpringNetwork:
-        """The pieces' own springs and cells, as one network on their device, nothing sewn yet."""
-        pieces = list(self.pieces.values())
-        first = pieces[0]
-        stretches = [piece.network.stretch for piece in pieces]
-        built = SpringNetwork.build(
-            self.surface,
-            first.fabric,
-            start,
-            grain_angle=first.grain_angle,
-            device=first.network.device,
-            model=first.network.model,
-            stretch=np.concatenate([s for s in stretches if s is not None]) if stretches[0] is not None else None,
-        )
-        # Built of their own arrays: a piece with fullness is not at rest at the body's lengths.
-        held = [piece.network.held for piece in pieces]
-        return replace(
-            built,
-            spring_arrays=self._springs(),
-            cell_arrays=self._cells(),
-            held=None if held[0] is None else np.concatenate([h for h in held if h is not None]),
-        )
-
-    def _springs(self) -> SpringArrays:
-        own = [(self.first[name], piece.network.spring_arrays) for name, piece in self.pieces.items()]
-        # Mesh edges first, then diagonals, as in each piece.
-        parts = [(first, s, slice(None, s.edge_count)) for first, s in own]
-        parts += [(first, s, slice(s.edge_count, None)) for first, s in own]
-        return SpringArrays(
-            ends=np.concatenate([s.ends[part] + np.int32(first) for first, s, part in parts]),
-            rest_length=np.concatenate([s.rest_length[part] for _, s, part in parts]),
-            stiffness=np.concatenate([s.stiffness[part] for _, s, part in parts]),
-            edge_count=sum(s.edge_count for _, s in own),
-            clamped_cells=sum(s.clamped_cells for _, s in own),
-        )
-
-    def _cells(self) -> CellArrays:
-        faces = np.cumsum([0, *(len(piece.faces) for piece in self.pieces.values())])
-        own = [
-            (np.int32(self.first[name]), np.int32(face), piece.network.cell_arrays)
-            for (name, piece), face in zip(self.pieces.items(), faces[:-1], strict=True)
-        ]
-        return CellArrays(
-            corner=np.concatenate([c.corner + first for first, _, c in own]),
-            face=np.concatenate([c.face + face for _, face, c in own]),
-            weight=np.concatenate([c.weight for _, _, c in own]),
-            edges=np.concatenate([c.edges for _, _, c in own]),
-            area=np.concatenate([c.area for _, _, c in own]),
-        )
+    def network(self) -> SpringNetwork:
+        """The pieces' own springs and cells, as one network on their device, nothing sewn yet; it comes to rest as a whole."""
+        # A single piece's own one would be sewn for good.
+        network = replace(join_networks([piece.network for piece in self.pieces.values()]))
+        network.parts = ()
+        return network
 
     def split(self, state: Relaxation, *, converged: bool, seconds: float, residual: float) -> dict[str, Flattening]:
         """Each piece with its share of the layout, and a stage "sew" in its history."""

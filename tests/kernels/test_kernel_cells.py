@@ -16,9 +16,9 @@ SQUEEZES = {"none": (1.15, 1.2), "warp": (1.15, 0.8), "weft": (0.8, 1.2), "both"
 
 def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64]) -> NDArray[np.float64]:
     """#C, a [1/2 K_warp <|F e_warp| - 1 - onset_warp>^2 + the same for weft]."""
-    fabric, guard, energies = network.fabric, network.guard, []
-    for corner, edges, weight in zip(
-        network.cell_arrays.corner, network.cell_arrays.edges, network.cell_arrays.weight, strict=True
+    fabric, cells, energies = network.fabric, network.cell_arrays, []
+    for corner, edges, weight, onsets in zip(
+        cells.corner, cells.edges, cells.weight, network.cells.onset.numpy(), strict=True
     ):
         flat = np.stack(
             [positions[corner[1]] - positions[corner[0]], positions[corner[2]] - positions[corner[0]]], axis=1
@@ -29,7 +29,7 @@ def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64])
         for thread, stiffness, onset in zip(
             grain_axes(network.grain_angle),
             (fabric.stiffness_warp, fabric.stiffness_weft),
-            (guard.onset_warp, guard.onset_weft),
+            onsets,
             strict=True,
         ):
             excess = np.linalg.norm(deformation @ thread) - 1.0 - onset
@@ -41,10 +41,7 @@ def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64])
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
     """A network of one triangle (3 by 2 [m])."""
     surface = make_surface(np.column_stack([shape, np.zeros(3)]), [[0, 1, 2]])
-    network = SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE)
-    network.guard.onset_warp = CLOTH.shear_stiffness / CLOTH.stiffness_warp
-    network.guard.onset_weft = CLOTH.shear_stiffness / CLOTH.stiffness_weft
-    return network
+    return SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE, hold=np.inf)
 
 
 def random_cell(seed: int) -> tuple[SpringNetwork, NDArray[np.float64]]:
@@ -142,7 +139,7 @@ def test_stiffness_bounds_the_second_derivative(seed: int):
 def test_stiffness_counts_from_half_of_the_onset():
     shape = np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]])
     network = one_cell(shape)
-    onset = network.guard.onset_warp
+    onset = network.cells.onset.numpy()[0, 0]
     for share, acts in ((0.4, 0), (0.6, 1)):
         at = Launched(network, shape * [1.1, 1.0 / (1.0 + share * onset)]).evaluate_guard()
         assert at["cell_acting"][0] == acts
@@ -214,7 +211,7 @@ def test_nearly_collapsed_cells_stay_finite_and_push_apart():
         assert np.isfinite(at["cell_stiffness"]).all()
         assert at["cell_force"][2, 1] > 0
         # 1/2 K <1/s - 1 - onset>^2 s A
-        onset = network.guard.onset_warp
+        onset = network.cells.onset.numpy()[0, 0]
         energy = 0.5 * CLOTH.stiffness_warp * (1 / squeeze - 1 - onset) ** 2 * squeeze * 0.0002
         assert at.guard_energy()[0] == pytest.approx(energy, rel=1e-9)
 

@@ -1,0 +1,115 @@
+"""Pieces side by side: their surfaces as one mesh, their networks as one network, for one set of launches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.network import ByVertex, CellArrays, SpringArrays, SpringNetwork, SpringsAround
+from warpflat.surface.mesh import Surface
+
+__all__ = ["begins", "join_networks", "join_surfaces"]
+
+IntArray = NDArray[np.int32]
+Number = TypeVar("Number", bound=np.generic)
+
+
+def begins(counts: Sequence[int]) -> IntArray:
+    """Where each of several ranges of so many begins, and where the last one ends."""
+    return np.cumsum([0, *counts], dtype=np.int32)
+
+
+def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of several, without their lines: the vertices and faces of the first one, then of the next."""
+    vertices = np.concatenate([surface.vertices for surface in surfaces])
+    first = begins([len(surface.vertices) for surface in surfaces])
+    return Surface(
+        vertices=vertices,
+        faces=np.concatenate(
+            [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
+        ),
+        name=" + ".join(surface.name for surface in surfaces),
+        input_vertices=vertices,
+        input_index=np.arange(len(vertices), dtype=np.int32),
+    )
+
+
+def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
+    """The networks as one, with them for its parts; nothing is sorted or measured again. A single one is returned as it is.
+
+    Args:
+        networks: of one fabric, grain, model and device; of all or of none a stretch is meant. Nothing is sewn or guided yet.
+    """
+    first = networks[0]
+    if len(networks) == 1:
+        return first
+    vertex = begins([net.vertex_count for net in networks])
+    stretches = [net.stretch for net in networks if net.stretch is not None]
+    held = [net.held for net in networks if net.held is not None]
+    hold = np.concatenate([np.broadcast_to(net.shear_hold, net.cell_count) for net in networks])
+    return SpringNetwork(
+        surface=join_surfaces([net.surface for net in networks]),
+        fabric=first.fabric,
+        grain_angle=first.grain_angle,
+        spring_arrays=_join_springs([net.spring_arrays for net in networks], vertex),
+        cell_arrays=_join_cells(networks, vertex),
+        device=first.device,
+        model=first.model,
+        stretch=np.concatenate(stretches) if stretches else None,
+        held=np.concatenate(held) if held else None,
+        shear_hold=float(hold[0]) if (hold == hold[0]).all() else hold,
+        parts=tuple(networks),
+    )
+
+
+def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray) -> SpringArrays:
+    """Mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
+    edge = begins([s.edge_count for s in springs])
+    diagonal = edge[-1] + begins([len(s.ends) - s.edge_count for s in springs])
+
+    def both(of_each: Sequence[NDArray[Number]]) -> NDArray[Number]:
+        edges = [values[: s.edge_count] for values, s in zip(of_each, springs, strict=True)]
+        return np.concatenate([*edges, *(values[s.edge_count :] for values, s in zip(of_each, springs, strict=True))])
+
+    around = [s.around for s in springs]
+    entry = [
+        a.entry + np.where(a.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+        for k, (s, a) in enumerate(zip(springs, around, strict=True))
+    ]
+    return SpringArrays(
+        ends=both([s.ends + at for s, at in zip(springs, vertex, strict=False)]),
+        rest_length=both([s.rest_length for s in springs]),
+        stiffness=both([s.stiffness for s in springs]),
+        edge_count=int(edge[-1]),
+        around=SpringsAround(
+            offset=_join_offsets(around),
+            entry=np.concatenate(entry),
+            neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
+        ),
+        clamped_cells=sum(s.clamped_cells for s in springs),
+    )
+
+
+def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArrays:
+    cells = [net.cell_arrays for net in networks]
+    face, cell = begins([len(net.surface.faces) for net in networks]), begins([len(c.corner) for c in cells])
+    around = [c.around for c in cells]
+    return CellArrays(
+        corner=np.concatenate([c.corner + at for c, at in zip(cells, vertex, strict=False)]),
+        face=np.concatenate([c.face + at for c, at in zip(cells, face, strict=False)]),
+        weight=np.concatenate([c.weight for c in cells]),
+        edges=np.concatenate([c.edges for c in cells]),
+        area=np.concatenate([c.area for c in cells]),
+        around=ByVertex(
+            offset=_join_offsets(around),
+            entry=np.concatenate([a.entry + 3 * at for a, at in zip(around, cell, strict=False)]),
+        ),
+    )
+
+
+def _join_offsets(lists: Sequence[ByVertex]) -> IntArray:
+    first = begins([len(each.entry) for each in lists])
+    return np.concatenate([*(each.offset[:-1] + at for each, at in zip(lists, first, strict=False)), first[-1:]])
