@@ -174,12 +174,10 @@ def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *,
     if step is None:
         return None
     layout = np.ascontiguousarray(fine_layout[step.kept])
-    if mend:
-        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA)
+    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
+        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
         if left:
             return None
-    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
-        return None
     network = SpringNetwork.build(
         step.surface,
         fine.fabric,

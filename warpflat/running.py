@@ -231,8 +231,11 @@ class _Batch:
         each_step = self._each_step if told else None
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
-        # After an edit the layout is near the minimum already.
-        nested = self._runs[0].stage_name == "relax" and self._state.steps == 0
+        # After an edit the layout is near the minimum already; a grid is nearer once it has been carried up from its coarser levels.
+        nested = self._state.steps == 0 and (
+            self._runs[0].stage_name == "relax"
+            or all(coarser_surfaces(run.surface)[0].smooth_carry is not None for run in self._runs)
+        )
         return relax_multilevel(self._state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
