@@ -34,7 +34,7 @@ def measure(shape: str, size: int, threads: list[int], triangles: bool, seconds:
     for count in threads:
         os.environ["WARPFLAT_THREADS"] = str(count)
         state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
-        steps[f"{count} thr."] = partial(state.sweep, SWEEP)
+        steps[f"{count} thr."] = partial(state.sweep, SWEEP, watch_every=SWEEP)
     least = dict.fromkeys(steps, float("inf"))
     until = time.perf_counter() + seconds
     # In turns, so that whatever else the machine does falls on all of them alike.
