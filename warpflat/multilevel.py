@@ -48,7 +48,7 @@ BoolArray = NDArray[np.bool_]
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
 # the very first, or so many times the vertices along its side: a crack that opens is slow there too.
 _BOTTOM_STEPS = 8
-_AT_REST = 0.1
+_AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 # Grids of more vertices are not cycled on the way up: cubics from this size on leave a few hundredths of a per cent.
