@@ -27,7 +27,7 @@ from warpflat.carry import GridCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import HalfEdges, half_edges, triangulate
+from warpflat.surface.topology import half_edges_of, triangulate, twins_of
 
 __all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_meanwhile"]
 
@@ -145,8 +145,8 @@ def _rows_and_columns(surface: Surface) -> IntArray | None:
         in_order = sorted(corner.tolist()) == [0, 1, columns, columns + 1]
         if in_order and np.array_equal(faces, grid[:-1, :-1].reshape(-1, 1) + corner):
             return grid
-    he = half_edges(faces)
-    twin = _twins(he)
+    he = half_edges_of(surface)
+    twin = twins_of(he)
     around = np.bincount(faces.ravel(), minlength=count)
     corners = np.flatnonzero(around == 1)
     if len(corners) != 4 or ((around != 1) & (around != 2) & (around != 4)).any():
@@ -180,16 +180,6 @@ def _rows_and_columns(surface: Surface) -> IntArray | None:
     if (edge >= 0).any() or len(np.unique(grid)) != count:
         return None
     return grid.astype(np.int32)
-
-
-def _twins(he: HalfEdges) -> NDArray[np.int64]:
-    """#H, the half-edge on the other side, -1 on the border."""
-    order = np.argsort(he.edge, kind="stable")
-    begin = np.cumsum(he.count) - he.count
-    inner = begin[he.count == 2]
-    twin = np.full(len(he.edge), -1, dtype=np.int64)
-    twin[order[inner]], twin[order[inner + 1]] = order[inner + 1], order[inner]
-    return twin
 
 
 def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:

@@ -29,6 +29,7 @@ from warpflat.surface.topology import (
     non_manifold_vertices,
     places_of,
     triangulate,
+    twins_of,
 )
 from warpflat.surface.untangle import untangle
 from warpflat.surface.vectors import norm, points_at
@@ -263,9 +264,8 @@ def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
     """
     he = half_edges_of(surface)
     here = np.arange(len(he.tail))
-    twin = np.where(he.count[he.edge] == 2, np.bincount(he.edge, here).astype(np.int64)[he.edge] - here, -1)
     # The last entry is where there is none, -1.
-    twin, tail, head = (np.append(index, -1) for index in (twin, he.tail, he.head))
+    twin, tail, head = (np.append(index, -1) for index in (twins_of(he), he.tail, he.head))
     some = np.empty(len(he.edges), dtype=np.int64)
     some[he.edge] = here
     size = np.int64(len(surface.vertices))

@@ -23,22 +23,23 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.sparse import block_diag, csr_array, eye
+from scipy.sparse import block_diag, csr_array
 
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
+from warpflat.coarsen import Coarser
+from warpflat.cycle_memory import CycleMemory
 from warpflat.fabric import Fabric
 from warpflat.joined import begins, join_networks
 from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
-from warpflat.network import SpringNetwork, cells_of
+from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
-from warpflat.surface.mesh import Surface
-from warpflat.surface.untangle import signed_cell_areas, untangle
+from warpflat.rungs import Rung, rungs_of, stay
+from warpflat.surface.untangle import untangle
 
 __all__ = ["Levels", "levels_pay", "relax_multilevel", "softness"]
 
@@ -71,10 +72,6 @@ _RENEWALS = 8
 _LEAST_SHARE = 0.05
 # Steps between two looks at all cells.
 _WATCH_EVERY = 4
-# A cell pressed to less than this share of its area is mended as if it were mirrored.
-_LEAST_AREA = 1e-6
-# Least curvature, over what its parts would have apart, of a direction that cycles leave to be followed.
-_SOUND = 1e-3
 # In units of a step: evaluating the forces, evaluating the energy.
 _FORCE_WORK = 1.0
 _ENERGY_WORK = 0.5
@@ -111,15 +108,6 @@ class _Level:
     way: _Way | None = None
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Rung:
-    """A coarser level of one piece: the step to it, its network, and its layout [m]."""
-
-    step: Coarser
-    network: SpringNetwork
-    layout: FloatArray
-
-
 def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
     """The matrix that has these along its diagonal."""
     weights, matrix = Weights(), blocks[0] if len(blocks) == 1 else block_diag(blocks, format="csr")
@@ -127,76 +115,6 @@ def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
     weights.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device=device)
     weights.weight = wp.array(matrix.data.astype(np.float64), dtype=wp.float64, device=device)
     return weights
-
-
-def _strain_fields(network: SpringNetwork, layout: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """#S, k L^2 of the springs, and 3 by #S, c^4, s^4 and c^2 s^2 of their directions: what each stores of uniform strains."""
-    s = network.spring_arrays
-    d = layout[s.ends[:, 1]] - layout[s.ends[:, 0]]
-    c2 = d[:, 0] ** 2 / np.maximum(np.einsum("ij,ij->i", d, d), 1e-300)
-    return s.stiffness * s.rest_length**2, np.stack([c2 * c2, (1.0 - c2) ** 2, c2 * (1.0 - c2)])
-
-
-def _calibrated(
-    network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray
-) -> SpringNetwork:
-    """The coarse network with its springs weighed by their directions, so that under uniform strains it stores what the fine one
-    does: edge springs on triangles store that only roughly, each mesh in its own way."""
-    if network.model != "springs" or network.surface.is_quad.all():
-        return network
-    energy, fields = _strain_fields(fine, fine_layout)
-    wished = fields @ energy
-    energy, fields = _strain_fields(network, layout)
-    factor = np.linalg.lstsq((fields * energy) @ fields.T, wished, rcond=1e-6)[0]
-    s = network.spring_arrays
-    return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
-
-
-def _rungs(network: SpringNetwork, layout: FloatArray, *, mend: bool) -> list[_Rung]:
-    """All coarser levels of a piece, the finest first."""
-    rungs: list[_Rung] = []
-    # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
-    ready = iter(coarser_surfaces(network.surface))
-    while not is_coarsest(network.surface):
-        rung = _rung(network, layout, next(ready, None), mend=mend)
-        if rung is None:
-            ready = iter(())
-            rung = _rung(network, layout, coarser(network.surface, layout))
-        if rung is None:
-            break
-        rungs.append(rung)
-        network, layout = rung.network, rung.layout
-    return rungs
-
-
-def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> _Rung | None:
-    """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
-    if step is None:
-        return None
-    layout = np.ascontiguousarray(fine_layout[step.kept])
-    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
-        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
-        if left:
-            return None
-    network = SpringNetwork.build(
-        step.surface,
-        fine.fabric,
-        layout,
-        grain_angle=fine.grain_angle,
-        device=fine.device,
-        model=fine.model,
-        stretch=None if fine.stretch is None else fine.stretch[step.face_of],
-        # What threads are held by is a matter of the finest mesh.
-        hold=float(fine.shear_hold),
-    )
-    return _Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
-
-
-def _stay(surface: Surface) -> Coarser:
-    """The step of a piece that has no coarser level, where others have."""
-    every = np.arange(len(surface.vertices), dtype=np.int32)
-    one = csr_array(eye(len(every), format="csr"))
-    return Coarser(surface=surface, kept=every, prolongation=one, face_of=np.arange(len(surface.faces), dtype=np.int32))
 
 
 class Levels:
@@ -216,15 +134,15 @@ class Levels:
                 leaves that layout; otherwise make levels that have none.
         """
         layout, pieces = finest.positions(), finest.network.pieces
-        ladders = [_rungs(net, layout[own], mend=mend) for net, own in zip(pieces, finest.vertices, strict=True)]
+        ladders = [rungs_of(net, layout[own], mend=mend) for net, own in zip(pieces, finest.vertices, strict=True)]
         depth = max(len(rungs) for rungs in ladders)
         for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
             while len(rungs) < depth:
-                rungs.append(_Rung(step=_stay(lowest.surface), network=lowest, layout=where))
+                rungs.append(Rung(step=stay(lowest.surface), network=lowest, layout=where))
         self._join(finest, ladders)
 
-    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[_Rung]]) -> None:
+    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[Rung]]) -> None:
         self._ladders = ladders
         self._levels = [_Level(finest)]
         self.stale = False
@@ -434,42 +352,6 @@ class Levels:
             state.position.assign(layout)
             self._correct(level, way, ~lower)
         return lower & np.array([carry is not None for carry in smooth])
-
-
-class CycleMemory:
-    """The last few cycles: how far they led, and how much the forces fell on the way. In the plane of these ways the energy is known,
-    to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
-
-    A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
-    share with each cycle.
-    """
-
-    def __init__(self, depth: int) -> None:
-        """Of so many cycles."""
-        self._depth = depth
-        self._ways: list[FloatArray] = []
-        self._falls: list[FloatArray] = []
-
-    def lowest(self, begin: FloatArray, force: FloatArray, end: FloatArray, left: FloatArray) -> FloatArray | None:
-        """#V by 2, where the energy is least [m]; None where that cannot be told.
-
-        Args:
-            begin, end: #V by 2, of the last cycle [m].
-            force, left: #V by 2, forces at its begin and end [N].
-        """
-        self._ways.append((end - begin).ravel())
-        self._falls.append((force - left).ravel())
-        del self._ways[: -self._depth], self._falls[: -self._depth]
-        ways = np.stack(self._ways)
-        curvature = ways @ np.stack(self._falls).T
-        curvature = 0.5 * (curvature + curvature.T)
-        size = np.sqrt(np.abs(np.diag(curvature)))
-        if not (size > 0.0).all():
-            return None
-        values, axes = np.linalg.eigh(curvature / np.outer(size, size))
-        sound = values > _SOUND
-        share = axes[:, sound] @ ((axes[:, sound].T @ (ways @ left.ravel() / size)) / values[sound]) / size
-        return end + (share @ ways).reshape(end.shape)
 
 
 @dataclass(kw_only=True)

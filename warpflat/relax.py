@@ -423,12 +423,8 @@ class Relaxation:
         self.velocity.zero_()
         self._evaluate.launch()
 
-    def mirrored_cells(self) -> int:
-        """How many cells are mirrored or have no area, at the last evaluated state."""
-        return int(np.count_nonzero(self._cell_clearance.numpy() <= 0.0))
-
     def mirrored_pieces(self) -> BoolArray:
-        """#P, whether a piece has such cells."""
+        """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
         return np.logical_or.reduceat(self._cell_clearance.numpy() <= 0.0, self._cell_begin[:-1])
 
     def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:

@@ -23,7 +23,7 @@ from warpflat.surface import (
     unfold_quad_diagonals,
 )
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges_of, order_by, places_of, stable_order
+from warpflat.surface.topology import half_edges_of, order_by, places_of, stable_order, twins_of
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 
@@ -288,3 +288,14 @@ def test_the_two_sides_of_a_crack_are_at_one_place():
     assert places_of(both, cut)[16:].tolist() == [1, 5, 9]
     assert np.array_equal(places_of(both, cut)[:16], np.arange(16))
     assert np.array_equal(places_of(both, cut, sides=half_edges(cut)), places_of(both, cut))
+
+
+def test_twins_run_along_the_same_edge_the_other_way():
+    faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 6, -1]])
+    he = half_edges(faces)
+    twin = twins_of(he)
+    inner = np.flatnonzero(twin >= 0)
+    assert len(inner) == 4
+    assert np.array_equal(he.tail[twin[inner]], he.head[inner])
+    assert np.array_equal(he.head[twin[inner]], he.tail[inner])
+    assert (he.count[he.edge[twin < 0]] == 1).all()

@@ -39,6 +39,7 @@ __all__ = [
     "places_of",
     "stable_order",
     "triangulate",
+    "twins_of",
     "unfold_quad_diagonals",
 ]
 
@@ -118,6 +119,13 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
 def half_edges_of(surface: Surface) -> HalfEdges:
     """The sides of the surface's faces, worked out once."""
     return read_only(half_edges(surface.faces))
+
+
+def twins_of(he: HalfEdges) -> NDArray[np.int64]:
+    """#H, the half-edge on the other side of each, -1 on the border and where more than two faces meet."""
+    here = np.arange(len(he.edge))
+    both = np.bincount(he.edge, here).astype(np.int64)
+    return np.where(he.count[he.edge] == 2, both[he.edge] - here, -1)
 
 
 def _sides_of(

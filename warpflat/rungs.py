@@ -1,0 +1,100 @@
+"""The coarser levels of a piece: of each the step to it, its network and where it lies."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array, eye
+
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
+from warpflat.network import SpringNetwork, cells_of
+from warpflat.surface.mesh import Surface
+from warpflat.surface.untangle import signed_cell_areas, untangle
+
+__all__ = ["Rung", "rungs_of", "stay"]
+
+FloatArray = NDArray[np.float64]
+
+# A cell pressed to less than this share of its area is mended as if it were mirrored.
+_LEAST_AREA = 1e-6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rung:
+    """A coarser level of one piece: the step to it, its network, and its layout [m]."""
+
+    step: Coarser
+    network: SpringNetwork
+    layout: FloatArray
+
+
+def _strain_fields(network: SpringNetwork, layout: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """#S, k L^2 of the springs, and 3 by #S, c^4, s^4 and c^2 s^2 of their directions: what each stores of uniform strains."""
+    s = network.spring_arrays
+    d = layout[s.ends[:, 1]] - layout[s.ends[:, 0]]
+    c2 = d[:, 0] ** 2 / np.maximum(np.einsum("ij,ij->i", d, d), 1e-300)
+    return s.stiffness * s.rest_length**2, np.stack([c2 * c2, (1.0 - c2) ** 2, c2 * (1.0 - c2)])
+
+
+def _calibrated(
+    network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray
+) -> SpringNetwork:
+    """The coarse network with its springs weighed by their directions, so that under uniform strains it stores what the fine one
+    does: edge springs on triangles store that only roughly, each mesh in its own way."""
+    if network.model != "springs" or network.surface.is_quad.all():
+        return network
+    energy, fields = _strain_fields(fine, fine_layout)
+    wished = fields @ energy
+    energy, fields = _strain_fields(network, layout)
+    factor = np.linalg.lstsq((fields * energy) @ fields.T, wished, rcond=1e-6)[0]
+    s = network.spring_arrays
+    return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
+
+
+def rungs_of(network: SpringNetwork, layout: FloatArray, *, mend: bool) -> list[Rung]:
+    """All coarser levels of a piece, the finest first."""
+    rungs: list[Rung] = []
+    # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
+    ready = iter(coarser_surfaces(network.surface))
+    while not is_coarsest(network.surface):
+        rung = _rung(network, layout, next(ready, None), mend=mend)
+        if rung is None:
+            ready = iter(())
+            rung = _rung(network, layout, coarser(network.surface, layout))
+        if rung is None:
+            break
+        rungs.append(rung)
+        network, layout = rung.network, rung.layout
+    return rungs
+
+
+def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> Rung | None:
+    """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
+    if step is None:
+        return None
+    layout = np.ascontiguousarray(fine_layout[step.kept])
+    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
+        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
+        if left:
+            return None
+    network = SpringNetwork.build(
+        step.surface,
+        fine.fabric,
+        layout,
+        grain_angle=fine.grain_angle,
+        device=fine.device,
+        model=fine.model,
+        stretch=None if fine.stretch is None else fine.stretch[step.face_of],
+        # What threads are held by is a matter of the finest mesh.
+        hold=float(fine.shear_hold),
+    )
+    return Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
+
+
+def stay(surface: Surface) -> Coarser:
+    """The step of a piece that has no coarser level, where others have."""
+    every = np.arange(len(surface.vertices), dtype=np.int32)
+    one = csr_array(eye(len(every), format="csr"))
+    return Coarser(surface=surface, kept=every, prolongation=one, face_of=np.arange(len(surface.faces), dtype=np.int32))
