@@ -15,31 +15,23 @@ argument.
 from __future__ import annotations
 
 import contextlib
-import ctypes
 import os
 import threading
-from collections.abc import Callable
 from collections.abc import Sequence as SequenceOf
-from functools import cache
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from warpflat.errors import InputError
+from warpflat.packing import Command, commands_of
 
 __all__ = ["Launch", "Sequence", "launch_each", "record", "split_range", "thread_count"]
-
-Command = Callable[[], None]
 
 # A range shorter than this is not worth waking a thread for (benchmarks/threads.py measures it).
 _LEAST_RANGE = 512
 # Ranges begin at multiples of this, so that no two threads write to one cache line.
 _ALIGNMENT = 64
-# Shorter launches are over before they could be recorded for several threads.
-_WORTH_RECORDING = 2048
-# Releases of Warp whose recorded launches are laid out as `_packed` takes them to be.
-_PACKED_RELEASES = ("1.19.",)
 
 
 def thread_count() -> int:
@@ -126,19 +118,7 @@ def record(
         ranges = split_range(dim, thread_count() if threads is None else threads, least=least)
     else:
         ranges = [(0, dim)] if dim > 0 else []
-    commands = [
-        _packed(
-            wp.launch(
-                kernel,
-                dim=end - begin,
-                inputs=[*inputs, begin],
-                outputs=list(outputs),
-                device=where,
-                record_cmd=True,
-            )
-        )
-        for begin, end in ranges
-    ]
+    commands = commands_of(kernel, ranges, inputs, outputs, where)
     return Launch(commands, keep=(inputs, outputs))
 
 
@@ -160,32 +140,7 @@ def launch_each(
         device: Warp device.
     """
     inputs = [np.ascontiguousarray(given) if isinstance(given, np.ndarray) else given for given in inputs]
-    if count < _WORTH_RECORDING:
-        wp.launch(kernel, dim=count, inputs=[*inputs, 0], outputs=outputs, device=device)
-    else:
-        record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device).launch()
-
-
-def _packed(recorded: wp.Launch) -> Command:
-    """What runs a recorded launch. On the CPU Warp packs its arguments anew each time, under the interpreter's lock
-    (13 us for two dozen of them); here that is done once."""
-    if not recorded.device.is_cpu or recorded.block_dim != 1 or not wp.config.version.startswith(_PACKED_RELEASES):
-        return recorded.launch
-    bounds, *values = recorded.params
-    pack = _pack_type(recorded.kernel, tuple(map(type, values)))(*values)
-    run, at, of = recorded.hooks.forward, ctypes.byref(bounds), ctypes.byref(pack)
-
-    def command(keep: wp.Launch = recorded) -> None:
-        run(at, of)
-
-    return command
-
-
-@cache
-def _pack_type(kernel: wp.Kernel, types: tuple[type, ...]) -> type[ctypes.Structure]:
-    """What the arguments of a kernel are packed into. Once each: types go in circles, and would keep what they are made for."""
-    fields = [(arg.label, kind) for arg, kind in zip(kernel.adj.args, types, strict=True)]
-    return type("Arguments", (ctypes.Structure,), {"_fields_": fields})
+    record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device).launch()
 
 
 class _Barrier:

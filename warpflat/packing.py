@@ -1,0 +1,163 @@
+"""A kernel's arguments, packed once: on the CPU a launch is a call of a C function with the address of its arguments.
+
+Warp looks at every argument of every launch, for whatever it might be (.1 to .2 ms for two dozen of them, and 13 us each time that a
+recorded launch runs). The kernels here get Warp's and NumPy's arrays, numbers and structs of one type each, so that what a kernel
+takes is found out once, from a launch that Warp records, and later launches are packed by that.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
+import numpy as np
+import warp as wp
+
+__all__ = ["Command", "commands_of"]
+
+Command = Callable[[], None]
+
+# Releases of Warp whose recorded launches are laid out as they are taken to be here; others pack and run them themselves.
+_RELEASES = ("1.19.",)
+
+
+def commands_of(
+    kernel: wp.Kernel,
+    ranges: Sequence[tuple[int, int]],
+    given: Sequence[Any],
+    outputs: Sequence[Any],
+    device: wp.Device,
+) -> list[Command]:
+    """What runs a kernel over each range of its threads.
+
+    Args:
+        kernel: takes ``first: int`` after `given`, before `outputs`.
+        ranges: begin and end of each, in threads.
+        given: all inputs but `first`.
+        outputs: arrays it writes.
+        device: Warp device.
+
+    Raises:
+        RuntimeError: Warp's, of an argument that the kernel does not take.
+    """
+    if not ranges:
+        return []
+    if device.is_cpu and wp.config.version.startswith(_RELEASES):
+        form = _forms.get(kernel)
+        if form is None:
+            form = _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
+            if form.fits:
+                _forms[kernel] = form
+        packed = form.commands(ranges, [*given, 0, *outputs])
+        if packed is not None:
+            return packed
+    return [_recorded(kernel, each, given, outputs, device).launch for each in ranges]
+
+
+def _recorded(
+    kernel: wp.Kernel, over: tuple[int, int], given: Sequence[Any], outputs: Sequence[Any], device: wp.Device
+) -> wp.Launch:
+    begin, end = over
+    return wp.launch(
+        kernel, dim=end - begin, inputs=[*given, begin], outputs=list(outputs), device=device, record_cmd=True
+    )
+
+
+class _Misfit(Exception):
+    """An argument that only Warp knows how to pack, or to refuse."""
+
+
+class _Form:
+    """How the arguments of a kernel are packed.
+
+    Attributes:
+        fits: whether launches can be packed by it.
+    """
+
+    def __init__(self, recorded: wp.Launch, first: int) -> None:
+        """From a launch that Warp has recorded, with its argument number `first`."""
+        self._bounds, values = type(recorded.params[0]), recorded.params[1:]
+        args = recorded.kernel.adj.args
+        self.fits = recorded.block_dim == 1 and len(values) == len(args) and not recorded.kernel.is_generic
+        self._first = args[first].label
+        self._run = recorded.hooks.forward
+        # Code stays loaded as long as this is held.
+        self._code = recorded.kernel.module.load(recorded.device, 1)
+        self._arguments: type[ctypes.Structure] = type(
+            "Arguments",
+            (ctypes.Structure,),
+            {"_fields_": [(a.label, type(v)) for a, v in zip(args, values, strict=True)]},
+        )
+        self._ways = [_way(arg.type, type(value)) for arg, value in zip(args, values, strict=True)]
+
+    def commands(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command] | None:
+        """For each range; None if there are arguments that it does not know."""
+        if not self.fits or len(values) != len(self._ways):
+            return None
+        try:
+            whole = self._arguments(*[way(value) for way, value in zip(self._ways, values, strict=True)])
+        except _Misfit:
+            return None
+        made, packed = list[Command](), whole
+        for begin, end in ranges:
+            if made:
+                packed = self._arguments.from_buffer_copy(whole)
+            setattr(packed, self._first, begin)
+            made.append(partial(self._run, ctypes.byref(self._bounds((end - begin,))), ctypes.byref(packed)))
+        return made
+
+
+_forms: dict[wp.Kernel, _Form] = {}
+
+
+def _way(of: Any, packed: type) -> Callable[[Any], Any]:
+    """How a value for an argument of this type becomes the C value that Warp packed it into."""
+    if isinstance(of, wp.array):
+        scalar = getattr(of.dtype, "_wp_scalar_type_", of.dtype)
+        inner = tuple(getattr(of.dtype, "_shape_", ()))
+        return partial(_array, of.dtype, of.ndim, np.dtype(wp.dtype_to_numpy(scalar)), inner, packed)
+    if issubclass(packed, ctypes._SimpleCData):
+        return partial(_number, packed)
+    return partial(_composite, packed)
+
+
+def _array(dtype: Any, ndim: int, scalar: np.dtype[Any], inner: tuple[int, ...], packed: type, value: Any) -> Any:
+    kind = type(value)
+    if kind is wp.array:
+        if value.dtype is not dtype or value.ndim != ndim or not value.device.is_cpu:
+            raise _Misfit
+        return value.__ctype__()
+    if (
+        kind is not np.ndarray
+        or value.dtype != scalar
+        or value.ndim != ndim + len(inner)
+        or value.shape[ndim:] != inner
+    ):
+        raise _Misfit
+    strides = value.strides
+    if inner and strides[ndim:] != np.empty(inner, scalar).strides:
+        raise _Misfit
+    return packed(value.__array_interface__["data"][0], 0, ndim, value.shape[:ndim], strides[:ndim])
+
+
+def _number(packed: type, value: Any) -> Any:
+    if isinstance(value, (np.integer, np.floating, np.bool_)):
+        value = value.item()
+    try:
+        return packed(value)
+    except TypeError:
+        raise _Misfit from None
+
+
+def _composite(packed: type, value: Any) -> Any:
+    if type(value) is packed:
+        return value
+    try:
+        made = value.__ctype__()
+    except AttributeError:
+        raise _Misfit from None
+    if type(made) is not packed:
+        raise _Misfit
+    return made
