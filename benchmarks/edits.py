@@ -51,8 +51,8 @@ def measure(name: str, run: Callable[[Look], Flattening], repeats: int) -> None:
 
 
 def flatten_with(mesh: Mesh, given: dict[str, Any], look: Look) -> Flattening:
-    """From nothing, but for what is worked out once for a surface."""
-    return warpflat.flatten(mesh.surface, callback=look, **given)
+    """From nothing."""
+    return warpflat.flatten(replace(mesh.surface), callback=look, **given)
 
 
 def change_with(start: Flattening, fabric: Fabric, look: Look) -> Flattening:

@@ -15,7 +15,7 @@ import math
 import os
 import platform
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -143,13 +143,15 @@ class Runner:
         best: tuple[float, Flattening, list[Look]] | None = None
         for _ in range(self.repeats):
             looks: list[Look] = []
+            # A surface of its own each time: nothing that the run before has worked out of it is given.
+            surface = replace(self.mesh.surface)
             begun = now()
 
             def look(at: Progress, begun: float = begun, looks: list[Look] = looks) -> None:
                 looks.append((at.spring_energy + at.guard_energy, now() - begun, at.work_units))
 
             flat = warpflat.flatten(
-                self.mesh.surface, fabric=CLOTH, datum=self.mesh.datum, device="cpu", callback=look, **OURS[name]
+                surface, fabric=CLOTH, datum=self.mesh.datum, device="cpu", callback=look, **OURS[name]
             )
             seconds = now() - begun
             if best is None or seconds < best[0]:
