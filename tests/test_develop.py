@@ -56,6 +56,28 @@ def ring(inner: float, outer: float, *, height: float = 0.0, around: int = 24, a
 # --- profiles
 
 
+@pytest.mark.parametrize("line", ["column", "row", "first column", "last row"])
+@pytest.mark.parametrize("reverse", [False, True], ids=["up", "down"])
+@pytest.mark.parametrize("turned", [False, True], ids=["face up", "face down"])
+def test_a_row_or_column_of_a_grid_is_seen_at_once(line: str, reverse: bool, turned: bool, monkeypatch):
+    """And gives what following the profiles edge by edge gives, however the grid is numbered."""
+    whole = make_shape("bodice", resolution=9)
+    grid = np.arange(81).reshape(9, 9)
+    datum = {"column": grid[:, 3], "row": grid[5], "first column": grid[:, 0], "last row": grid[-1]}[line]
+    number = np.random.default_rng(3).permutation(81).astype(np.int32)
+    vertices = np.empty_like(whole.vertices)
+    vertices[number] = whole.vertices
+    faces = number[whole.faces[np.random.default_rng(4).permutation(64)]]
+    surface = make_surface(vertices, faces[:, ::-1] if turned else faces)
+    datum = number[datum][:: -1 if reverse else 1].astype(np.int32)
+    positions = profile_layout(surface, datum)
+    assert positions is not None
+    assert np.linalg.norm(positions[datum[0]]) == 0.0
+    assert mirrored(surface, positions) == 0
+    monkeypatch.setattr("warpflat.develop._beside", lambda *_: None)
+    np.testing.assert_allclose(positions, profile_layout(surface, datum), atol=1e-15)
+
+
 def test_profiles_run_out_from_the_datum_at_their_arc_lengths():
     surface = make_shape("bodice", resolution=9)
     positions = profile_layout(surface, surface.lines["centre"])

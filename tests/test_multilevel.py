@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
-from warpflat.multilevel import Levels, relax_multilevel
+from warpflat.multilevel import Levels, _carry_up, relax_multilevel
 from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Upright, relax
 from warpflat.shapes import make_shape
@@ -113,14 +113,50 @@ def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     assert min(work for work, energy in seen if energy < 1.001 * minimum(done)) <= 60.0
 
 
-def test_a_grid_is_relaxed_as_soon_as_its_coarser_levels_are():
-    """What cubics leave between 2,600 vertices and 10,200 is a few hundredths of a per cent of the energy."""
-    surface = make_shape("bodice", resolution=101)
-    done = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
-    state = Relaxation(done.network, LEVELS, start=done.development.positions)
-    Levels(state).rise(4)
-    assert state.potentials().sum() < 1.001 * minimum(done)
-    assert state.work_units < 12.0
+def start_of(piece: Flattening) -> Relaxation:
+    """Its relaxation, before the first step."""
+    ends = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    state = Relaxation(piece.network, LEVELS, start=piece.development.positions, upright=[ends])
+    state.begin()
+    return state
+
+
+def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
+    """What cubics leave between 2,600 vertices and 10,200 is a few hundredths of a per cent of the energy, and between 2,600 and 40,400
+    not much more; of the level in between no network is made."""
+    for side, between in ((101, 0), (201, 10_201)):
+        done = flatten(make_shape("bodice", resolution=side), fabric=cloth(375.0), datum="centre", device="cpu")
+        state = start_of(done)
+        known = _carry_up(state, 4)
+        assert known is not None
+        assert state.last.potential[0] < 1.001 * minimum(done)
+        assert state.work_units < 12.0
+        sizes = [rung.network.vertex_count for rung in known.values()]
+        assert 2_601 in sizes
+        assert between not in sizes
+        levels = Levels(state, known=known)
+        assert levels.sizes[:2] == [side**2, between or 2_601]
+        assert all(levels.rungs[surface] is rung for surface, rung in known.items())
+
+
+def test_small_grids_and_triangles_rise_level_by_level():
+    for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
+        state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu"))
+        assert _carry_up(state, 4) is None
+
+
+def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
+    """Where it is relaxed already, all that could be carried up lies higher."""
+    done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device="cpu")
+    ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
+    state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
+    before = state.begin()
+    assert _carry_up(state, 4) is None
+    np.testing.assert_array_equal(state.positions(), done.positions)
+    assert state.last is before
+    outcome = relax_multilevel(state)
+    assert outcome.converged
+    assert outcome.energies.potential <= minimum(done) * (1.0 + 1e-12)
 
 
 def test_a_cycle_never_raises_the_energy_and_mirrors_nothing():

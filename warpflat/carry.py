@@ -6,21 +6,48 @@ coarse vertices would leave kinks, several per cent of the energy, for the finer
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeVar
+
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import csr_array
 
 __all__ = ["GridCarry", "cubics_between"]
 
 FloatArray = NDArray[np.float64]
+Number = TypeVar("Number", np.float64, np.complex128)
 IntArray = NDArray[np.int32]
 
 # Columns along which the distances of rows are measured, and the other way round.
 _LINES = 16
 
 
-def cubics_between(place: FloatArray, keep: IntArray) -> csr_array:
-    """#N by #keep: values at all places from those at the kept ones, by the cubic through the four nearest.
+@dataclass(frozen=True, kw_only=True)
+class Cubics:
+    """Values at places from those at the kept ones: `column` #N by 4 or fewer, which of the kept, and their `weight`."""
+
+    column: IntArray
+    weight: FloatArray
+
+    def __call__(self, values: NDArray[Number]) -> NDArray[Number]:
+        """#N or #N by #M, from #keep or #keep by #M."""
+        over = (slice(None), *(None,) * (values.ndim - 1))
+        result = self.weight[:, 0][over] * values[self.column[:, 0]]
+        for k in range(1, self.column.shape[1]):
+            result += self.weight[:, k][over] * values[self.column[:, k]]
+        return result
+
+    def along_rows(self, values: NDArray[Number]) -> NDArray[Number]:
+        """#M by #N, from #M by #keep."""
+        result = self.weight[:, 0] * values[:, self.column[:, 0]]
+        for k in range(1, self.column.shape[1]):
+            result += self.weight[:, k] * values[:, self.column[:, k]]
+        return result
+
+
+def cubics_between(place: FloatArray, keep: IntArray) -> Cubics:
+    """Values at all places from those at the kept ones, by the cubic through the four nearest.
 
     Args:
         place: #N, rising.
@@ -36,10 +63,7 @@ def cubics_between(place: FloatArray, keep: IntArray) -> csr_array:
         for other in range(points):
             if other != k:
                 weight[:, k] *= (place - node[:, other]) / (node[:, k] - node[:, other])
-    offset = points * np.arange(count + 1)
-    matrix = csr_array((weight.ravel(), column.ravel(), offset), shape=(count, len(keep)))
-    matrix.eliminate_zeros()
-    return matrix
+    return Cubics(column=column.astype(np.int32), weight=weight)
 
 
 def _places(lines: FloatArray) -> FloatArray:
@@ -61,18 +85,18 @@ class GridCarry:
             grid: #rows by #columns, their numbers.
             rows, columns: those that the coarser one keeps; its vertices are numbered row by row.
         """
-        self._grid = grid
-        self._shape = (len(rows), len(columns))
-        space = vertices[grid]
-        self._rows = cubics_between(_places(space), rows)
-        self._columns = cubics_between(_places(space.transpose(1, 0, 2)), columns)
+        self._vertices, self._grid, self._keep = vertices, grid, (rows, columns)
+
+    @cached_property
+    def _cubics(self) -> tuple[Cubics, Cubics]:
+        (rows, columns), space = self._keep, self._vertices[self._grid]
+        return cubics_between(_places(space), rows), cubics_between(_places(space.transpose(1, 0, 2)), columns)
 
     def __call__(self, layout: FloatArray) -> FloatArray:
         """#V by 2, the finer layout of a coarser one (#C by 2) [m]."""
-        height, width = self._grid.shape
-        along = self._rows @ layout.reshape(self._shape[0], -1)
-        across = along.reshape(height, self._shape[1], 2).transpose(1, 0, 2).reshape(self._shape[1], -1)
-        finer = (self._columns @ across).reshape(width, height, 2)
-        result = np.empty((height * width, 2))
-        result[self._grid.T.ravel()] = finer.reshape(-1, 2)
-        return result
+        by_rows, by_columns = self._cubics
+        # x + iy, so that a vertex is one number.
+        coarse = np.ascontiguousarray(layout).view(np.complex128).reshape(*map(len, self._keep))
+        result = np.empty(self._grid.size, dtype=np.complex128)
+        result[self._grid] = by_columns.along_rows(by_rows(coarse))
+        return result.view(np.float64).reshape(-1, 2)

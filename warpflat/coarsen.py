@@ -11,11 +11,11 @@ that stay are kept up to date. The triangles are made at the end, of those that 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -26,8 +26,9 @@ from scipy.sparse import csr_array, eye, vstack
 from warpflat.carry import GridCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import half_edges_of, triangulate, twins_of
+from warpflat.surface.topology import triangulate
 
 __all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_meanwhile"]
 
@@ -58,16 +59,21 @@ class Coarser:
     Attributes:
         surface: of the level; its vertices are the finer level's, without lines.
         kept: #C, the finer level's vertices that it has.
-        prolongation: #V by #C, rows add up to 1.
+        weigh: makes the prolongation, which grids seldom need.
         face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
         smooth_carry: of a grid, what carries layouts up by cubics.
     """
 
     surface: Surface
     kept: IntArray
-    prolongation: csr_array
+    weigh: Callable[[], csr_array]
     face_of: IntArray
     smooth_carry: GridCarry | None = None
+
+    @cached_property
+    def prolongation(self) -> csr_array:
+        """#V by #C, rows add up to 1."""
+        return self.weigh()
 
     @cached_property
     def restriction(self) -> csr_array:
@@ -88,8 +94,13 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
         layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either. Without,
             they are good on the body only.
     """
-    grid = _rows_and_columns(surface)
+    grid = rows_and_columns(surface)
     return _every_second(surface, grid) if grid is not None else _collapsed(surface, layout)
+
+
+@once_per_surface
+def _next(surface: Surface) -> Coarser | None:
+    return coarser(surface)
 
 
 @once_per_surface
@@ -97,7 +108,7 @@ def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
     """All coarser levels of a surface, good on the body, the finest first, down to the coarsest; made once for each surface."""
     steps: list[Coarser] = []
     while not is_coarsest(surface):
-        step = coarser(surface)
+        step = _next(surface)
         if step is None:
             break
         steps.append(step)
@@ -132,56 +143,6 @@ def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surfa
 # --- rectangular grids
 
 
-def _rows_and_columns(surface: Surface) -> IntArray | None:
-    """#rows by #columns vertices of a rectangular grid of quads, else None."""
-    faces, count = surface.faces, len(surface.vertices)
-    if not surface.is_quad.all():
-        return None
-    columns = int(np.ptp(faces[0])) - 1
-    if columns >= 2 and count % columns == 0:
-        # Most grids are numbered row by row, which is seen at once.
-        grid = np.arange(count, dtype=np.int32).reshape(-1, columns)
-        corner = faces[0] - faces[0].min()
-        in_order = sorted(corner.tolist()) == [0, 1, columns, columns + 1]
-        if in_order and np.array_equal(faces, grid[:-1, :-1].reshape(-1, 1) + corner):
-            return grid
-    he = half_edges_of(surface)
-    twin = twins_of(he)
-    around = np.bincount(faces.ravel(), minlength=count)
-    corners = np.flatnonzero(around == 1)
-    if len(corners) != 4 or ((around != 1) & (around != 2) & (around != 4)).any():
-        return None
-    # The side from one corner to the next, and then row after row to its left: the edge across each quad from a row's.
-    on_border = np.flatnonzero(twin < 0)
-    after = np.full(count, -1, dtype=np.int64)
-    after[he.tail[on_border]] = he.head[on_border]
-    leaving = np.full(count, -1, dtype=np.int64)
-    leaving[he.tail[on_border]] = on_border
-    side = [int(corners[0])]
-    while len(side) <= count:
-        side.append(int(after[side[-1]]))
-        if around[side[-1]] == 1:
-            break
-    columns = len(side)
-    if columns < 2 or count % columns or (count // columns - 1) * (columns - 1) != len(faces):
-        return None
-    rows = [np.array(side)]
-    edge = leaving[side[:-1]]
-    for _ in range(count // columns - 1):
-        opposite = he.next[he.next[edge]]
-        row = np.append(he.head[opposite], he.tail[opposite[-1]])
-        if (row[1:-1] != he.tail[opposite[:-1]]).any():
-            return None
-        rows.append(row)
-        edge = twin[opposite]
-        if (edge < 0).any() != (edge < 0).all():
-            return None
-    grid = np.stack(rows)
-    if (edge >= 0).any() or len(np.unique(grid)) != count:
-        return None
-    return grid.astype(np.int32)
-
-
 def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
     """Every second row and column, and the last ones; between them linear by index."""
     rows, columns = grid.shape
@@ -191,22 +152,27 @@ def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
     kept = grid[np.ix_(*keep)]
     number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
-    # Of each vertex the four kept ones around it, two rows by two columns.
-    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
-    parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
-    for k, (i, j) in enumerate(np.ndindex(2, 2)):
-        parents[grid, k] = np.add.outer(row[:, i] * kept.shape[1], column[:, j])
-        weights[grid, k] = np.multiply.outer(row_share[:, i], column_share[:, j])
-    offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
-    prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, kept.size))
-    prolongation.eliminate_zeros()
     return Coarser(
         surface=_part(surface, kept.ravel(), faces),
         kept=kept.ravel(),
-        prolongation=prolongation,
+        weigh=partial(_bilinear, grid, keep),
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
         smooth_carry=GridCarry(surface.vertices, grid, keep[0], keep[1]),
     )
+
+
+def _bilinear(grid: IntArray, keep: Sequence[IntArray]) -> csr_array:
+    """#V by #kept, a grid's values from those at the rows and columns kept, by the four around each vertex."""
+    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
+    height, width = map(len, keep)
+    parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
+    for k, (i, j) in enumerate(np.ndindex(2, 2)):
+        parents[grid, k] = np.add.outer(row[:, i] * width, column[:, j])
+        weights[grid, k] = np.multiply.outer(row_share[:, i], column_share[:, j])
+    offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
+    prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
+    prolongation.eliminate_zeros()
+    return prolongation
 
 
 def _second(count: int) -> IntArray:
@@ -266,10 +232,11 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     corners = _ends(gone.numpy(), parent.numpy()[:, 0])[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
+    prolongation = _prolongation(gone.numpy(), parent.numpy(), weight.numpy())
     return Coarser(
         surface=_part(surface, kept, np.column_stack([corners, np.full(len(corners), -1)])),
         kept=kept,
-        prolongation=_prolongation(gone.numpy(), parent.numpy(), weight.numpy()),
+        weigh=lambda: prolongation,
         face_of=face[whole],
     )
 

@@ -18,6 +18,7 @@ from warpflat.errors import InputError
 from warpflat.network import CellArrays, cells_of
 from warpflat.strain import signed_cell_areas
 from warpflat.surface.geodesic import signed_distance_and_station
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.lines import line_between, line_on_plane
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
@@ -244,6 +245,11 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """
     if not surface.is_quad.all() or datum[0] == datum[-1]:
         return None
+    grid = rows_and_columns(surface)
+    if grid is not None:
+        beside = _beside(surface, grid, datum)
+        if beside is not None:
+            return beside
     station = chain_positions(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
@@ -255,6 +261,32 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     positions[lines[1:][on]] = np.column_stack([x[on], np.broadcast_to(stations, x.shape)[on]])
     whole = len(datum) + np.count_nonzero(on) == len(positions)
     return positions if whole and not np.isnan(positions).any() else None
+
+
+def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | None:
+    """The same of a rectangular grid whose datum is one of its columns or rows, else None."""
+    for lines, mirrored in ((grid, False), (grid.T, True)):
+        column = np.flatnonzero(lines[0] == datum[0])
+        upwards = len(column) == 1
+        if not upwards:
+            column = np.flatnonzero(lines[-1] == datum[0])
+        ordered = lines if upwards else lines[::-1]
+        if len(column) == 0 or not np.array_equal(ordered[:, column[0]], datum):
+            continue
+        at = int(column[0])
+        # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
+        y, x = np.array([np.argwhere(grid == vertex)[0] for vertex in surface.faces[0]]).T
+        turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
+        side = 1.0 if (turns == upwards) != mirrored else -1.0
+        step = norm(np.diff(points_at(surface.vertices, ordered), axis=2))
+        positions = np.empty((len(surface.vertices), 2))
+        away = np.zeros(ordered.shape)
+        away[:, at + 1 :] = np.cumsum(side * step[:, at:], axis=1)
+        away[:, :at] = np.cumsum(-side * step[:, :at][:, ::-1], axis=1)[:, ::-1]
+        positions[ordered, 0] = away
+        positions[ordered, 1] = chain_positions(surface.vertices[datum])[:, None]
+        return positions
+    return None
 
 
 def _grid_lines(surface: Surface, start: IntArray) -> IntArray:

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -38,7 +38,8 @@ from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, i
 from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Outcome, Relaxation, RelaxOptions, Watch, relax
-from warpflat.rungs import Rung, rungs_of, stay
+from warpflat.rungs import Rung, far_below, rungs_of, stay
+from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
 __all__ = ["Levels", "levels_pay", "relax_multilevel", "softness"]
@@ -52,7 +53,8 @@ _BOTTOM_STEPS = 8
 _AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
-# Grids of more vertices are not cycled on the way up: cubics from this size on leave a few hundredths of a per cent.
+# Grids of more vertices start where a coarser one of at most so many has come to rest: cubics from this size on leave a few hundredths
+# of a per cent.
 _CYCLED = 5_000
 # Steps before and after, at least, and at most where cycles gain little: after one that gains more than this share of what the one
 # before gained, they are twice as many.
@@ -111,9 +113,10 @@ class _Level:
 def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
     """The matrix that has these along its diagonal."""
     weights, matrix = Weights(), blocks[0] if len(blocks) == 1 else block_diag(blocks, format="csr")
-    weights.offset = wp.array(matrix.indptr.astype(np.int32), dtype=wp.int32, device=device)
-    weights.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device=device)
-    weights.weight = wp.array(matrix.data.astype(np.float64), dtype=wp.float64, device=device)
+    # On the CPU the matrix' own arrays.
+    weights.offset = wp.array(matrix.indptr.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+    weights.column = wp.array(matrix.indices.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+    weights.weight = wp.array(matrix.data.astype(np.float64, copy=False), dtype=wp.float64, device=device, copy=False)
     return weights
 
 
@@ -125,16 +128,19 @@ class Levels:
         stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
     """
 
-    def __init__(self, finest: Relaxation, *, mend: bool = False) -> None:
+    def __init__(self, finest: Relaxation, *, mend: bool = False, known: Mapping[Surface, Rung] | None = None) -> None:
         """Of a relaxation and its present layout, which must mirror no face.
 
         Args:
             finest: the pieces themselves.
             mend: turn back what cells of the coarser levels are mirrored where the piece lies, as at the start of a nested iteration, which
                 leaves that layout; otherwise make levels that have none.
+            known: levels that are there already, by their surfaces.
         """
         layout, pieces = finest.positions(), finest.network.pieces
-        ladders = [rungs_of(net, layout[own], mend=mend) for net, own in zip(pieces, finest.vertices, strict=True)]
+        ladders = [
+            rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
+        ]
         depth = max(len(rungs) for rungs in ladders)
         for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
@@ -159,6 +165,11 @@ class Levels:
         kept._join(finest, [self._ladders[piece] for piece in pieces])
         kept.stale = self.stale
         return kept
+
+    @property
+    def rungs(self) -> dict[Surface, Rung]:
+        """The coarser levels of all pieces, by their surfaces."""
+        return {rung.step.surface: rung for rungs in self._ladders for rung in rungs}
 
     @property
     def sizes(self) -> list[int]:
@@ -308,21 +319,16 @@ class Levels:
             level.state.load.zero_()
         self._settle(_AT_REST_FIRST)
         for number in range(last - 1, -1, -1):
-            left = ~self._rise_to(number)
+            self._rise_to(number)
             way = self._levels[number].way
             assert way is not None
-            sizes = np.array([net.vertex_count for net in self._levels[number].state.network.pieces])
-            moved = sizes > [len(step.kept) for step in way.steps]
-            if number and (moved & (left | (sizes <= _CYCLED))).any():
+            sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
+            if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
                 self.cycle(number, steps)
 
-    def _rise_to(self, level: int) -> BoolArray:
+    def _rise_to(self, level: int) -> None:
         """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
-        what only the finer mesh has. Where neither lowers the energy, it stays where it is.
-
-        Returns:
-            #P, whether a piece starts where cubics carried it.
-        """
+        what only the finer mesh has. Where neither lowers the energy, it stays where it is."""
         state, way = self._levels[level].state, self._levels[level].way
         assert way is not None
         before, energy = state.positions(), self._objective(level)
@@ -351,7 +357,49 @@ class Levels:
                 layout[own] = before[own]
             state.position.assign(layout)
             self._correct(level, way, ~lower)
-        return lower & np.array([carry is not None for carry in smooth])
+
+
+def _carry_up(state: Relaxation, steps: int) -> dict[Surface, Rung] | None:
+    """Start pieces that are large grids where a coarser grid of theirs has come to rest; the others where their own levels lead.
+
+    Nothing is made or evaluated of the levels in between. The state is looked at in the end.
+
+    Returns:
+        The levels that were made, by their surfaces; None where no piece is such a grid, or one would not be lower than it lies: then
+        all are where they were.
+    """
+    pieces, layout = state.network.pieces, state.positions()
+    below = [
+        far_below(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
+        for net, own in zip(pieces, state.vertices, strict=True)
+    ]
+    if not any(below):
+        return None
+    before = state.last
+    networks = [net if way is None else way[1].network for net, way in zip(pieces, below, strict=True)]
+    start = [layout[own] if way is None else way[1].layout for own, way in zip(state.vertices, below, strict=True)]
+    coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
+    levels = Levels(coarse, mend=True)
+    levels.rise(steps)
+    levels.cycle(0, steps)
+    state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
+    carried, relaxed, known = layout.copy(), coarse.positions(), levels.rungs
+    for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
+        up = relaxed[of]
+        if way is not None:
+            known[way[1].step.surface] = way[1]
+            for step in reversed(way[0]):
+                assert step.smooth_carry is not None
+                up = step.smooth_carry(up)
+        carried[own] = up
+    state.position.assign(carried)
+    state.hold_upright()
+    state.work_units += _ENERGY_WORK
+    if (state.begin().potential < before.potential).all():
+        return known
+    state.position.assign(layout)
+    state.last = before
+    return None
 
 
 @dataclass(kw_only=True)
@@ -468,14 +516,16 @@ def relax_multilevel(
     """
     options: RelaxOptions = state.options
     begun = time.perf_counter()
+    whole, first, start, steps = state, state.steps, state.work_units, first_steps(state.network)
     state.hold_upright()
-    levels = Levels(state, mend=nested) if levels is None else levels
+    if not state.looked:
+        state.begin()
+    known = _carry_up(state, steps) if nested and levels is None else None
+    if known is not None and each_step is not None:
+        each_step(state, state.last.total, float(state.last.residual.max()))
+    levels = Levels(state, mend=nested, known=known) if levels is None else levels
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
-    whole, first, start = state, state.steps, state.work_units
-    if not nested:
-        state.begin()
-    steps = first_steps(state.network)
     cycles = _Cycles(state=state, levels=levels, paces=[_Pace(steps=steps) for _ in state.vertices])
 
     def tell(call: Watch | None) -> None:
@@ -483,7 +533,7 @@ def relax_multilevel(
             look = cycles.state.last
             call(cycles.state, look.total, float(look.residual.max()))
 
-    if nested:
+    if nested and known is None:
         levels.rise(steps)
         state.hold_upright()
         state.begin()

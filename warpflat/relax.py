@@ -56,6 +56,7 @@ _LEAVE = 0.2
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
+ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,7 +210,7 @@ class Relaxation:
         steps: taken. work_units: all work, in steps of this mesh; those of coarser levels count by their vertices.
         vertices: of each piece, its vertices.
         numbers: of each piece, which it was before others left.
-        last: what the last look said.
+        looked: whether there was a look yet. last: what the last one said.
     """
 
     network: SpringNetwork
@@ -260,6 +261,7 @@ class Relaxation:
         self.work_units = 0.0
         self.restarts = 0
         self.last: Look
+        self.looked = False
         self._record()
 
     def _record(self) -> None:
@@ -481,6 +483,7 @@ class Relaxation:
     def _say(
         self, energies: FloatArray, *, residual: FloatArray, gain: FloatArray, change: FloatArray, at_rest: BoolArray
     ) -> Look:
+        self.looked = True
         self.last = Look(
             energies=energies,
             residual=residual,
@@ -517,7 +520,7 @@ class Relaxation:
         kept.load.assign(self.load.numpy()[rows])
         kept.steps, kept.restarts, kept.work_units = self.steps, self.restarts, self.work_units
         kept.numbers = [self.numbers[piece] for piece in pieces]
-        kept.last = self.last.of(pieces)
+        kept.looked, kept.last = True, self.last.of(pieces)
         if kept.matrix is not None:
             kept.matrix.follow(kept.position)
         return kept
@@ -543,24 +546,23 @@ class Relaxation:
         """
         if not self.upright:
             return
-        position, velocity = self.positions(), np.array(self.velocity.numpy())
+        position, velocity = _complex(self.position.numpy()).copy(), _complex(self.velocity.numpy()).copy()
+        force, weight = _complex(self.cloth_force()), self.network.spring_stiffness.numpy()
         load = np.zeros_like(position)
-        force, weight = self.cloth_force(), self.network.spring_stiffness.numpy()
         for piece in self.upright:
             here = piece.vertices
             chord = position[piece.upper] - position[piece.lower]
-            length = float(np.hypot(chord[0], chord[1]))
-            turn = np.array([[chord[1], chord[0]], [-chord[0], chord[1]]]) / length if length > 0.0 else np.eye(2)
-            centre = position[here].mean(axis=0)
-            position[here] = position[here] @ turn + (centre - centre @ turn)
-            velocity[here] = velocity[here] @ turn
+            length = float(np.abs(chord))
+            turn = 1j * length / chord if length > 0.0 else 1.0 + 0.0j
+            centre = position[here].mean()
+            position[here] = centre + turn * (position[here] - centre)
+            velocity[here] *= turn
             arm, weighted = _arms(position[here], weight[here])
-            inertia = max(float(np.vdot(arm, weighted)), 1e-300)
-            velocity[here] -= (float(np.vdot(weighted, velocity[here])) / inertia) * arm
-            load[here] = (-float(np.vdot(arm, force[here] @ turn)) / inertia) * weighted
-        self.position.assign(position)
-        self.velocity.assign(velocity)
-        self.load.assign(load)
+            inertia = max(float(np.vdot(arm, weighted).real), 1e-300)
+            velocity[here] -= (float(np.vdot(weighted, velocity[here]).real) / inertia) * arm
+            load[here] = (-float(np.vdot(arm, turn * force[here]).real) / inertia) * weighted
+        for array, values in ((self.position, position), (self.velocity, velocity), (self.load, load)):
+            array.assign(values.view(np.float64).reshape(-1, 2))
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -582,17 +584,17 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        position, weight = self.position.numpy(), self.network.spring_stiffness.numpy()
+        position, weight = _complex(self.position.numpy()), self.network.spring_stiffness.numpy()
         self._measure.launches[0].launch()
         mean = _sums(self._vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
-        force = self.cloth_force()
+        force = _complex(self.cloth_force())
         for piece in self.upright:
             here = piece.vertices
             arm, weighted = _arms(position[here], weight[here])
-            turning = float(np.vdot(arm, force[here])) / max(float(np.vdot(arm, weighted)), 1e-300)
+            turning = float(np.vdot(arm, force[here]).real) / max(float(np.vdot(arm, weighted).real), 1e-300)
             force[here] -= turning * weighted
-        largest = np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1])
+        largest = np.maximum.reduceat(force.real**2 + force.imag**2, self._vertex_begin[:-1])
         return np.sqrt(largest) / np.maximum(mean, floor)
 
     def outcome(self, steps: int, work_units: float, *, begun: float) -> Outcome:
@@ -621,12 +623,15 @@ def _sums(values: FloatArray, begin: NDArray[np.int32]) -> FloatArray:
     return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])
 
 
-def _arms(at: FloatArray, weight: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _complex(vectors: FloatArray) -> ComplexArray:
+    """#V by 2 as #V, x + iy; the same memory."""
+    return np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
+
+
+def _arms(at: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
-    centre = weight @ at / weight.sum()
-    arm = np.empty_like(at)
-    arm[:, 0], arm[:, 1] = centre[1] - at[:, 1], at[:, 0] - centre[0]
-    return arm, weight[:, None] * arm
+    arm = 1j * (at - (weight @ at) / weight.sum())
+    return arm, weight * arm
 
 
 Watch = Callable[[Relaxation, Energies, float], None]

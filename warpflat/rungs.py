@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -13,7 +14,7 @@ from warpflat.network import SpringNetwork, cells_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import signed_cell_areas, untangle
 
-__all__ = ["Rung", "rungs_of", "stay"]
+__all__ = ["Rung", "far_below", "rungs_of", "stay"]
 
 FloatArray = NDArray[np.float64]
 
@@ -53,13 +54,24 @@ def _calibrated(
     return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
 
 
-def rungs_of(network: SpringNetwork, layout: FloatArray, *, mend: bool) -> list[Rung]:
-    """All coarser levels of a piece, the finest first."""
+def rungs_of(
+    network: SpringNetwork, layout: FloatArray, *, mend: bool, known: Mapping[Surface, Rung] | None = None
+) -> list[Rung]:
+    """All coarser levels of a piece, the finest first.
+
+    Args:
+        network: of the piece.
+        layout: #V by 2, where it lies [m].
+        mend: turn back what cells of coarser levels are mirrored there.
+        known: levels that are there already, by their surfaces.
+    """
     rungs: list[Rung] = []
     # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
     ready = iter(coarser_surfaces(network.surface))
     while not is_coarsest(network.surface):
-        rung = _rung(network, layout, next(ready, None), mend=mend)
+        step = next(ready, None)
+        rung = known.get(step.surface) if known and step is not None else None
+        rung = rung or _rung(network, layout, step, mend=mend)
         if rung is None:
             ready = iter(())
             rung = _rung(network, layout, coarser(network.surface, layout))
@@ -68,6 +80,25 @@ def rungs_of(network: SpringNetwork, layout: FloatArray, *, mend: bool) -> list[
         rungs.append(rung)
         network, layout = rung.network, rung.layout
     return rungs
+
+
+def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> tuple[Sequence[Coarser], Rung] | None:
+    """The largest coarser grid of a grid that has at most so many vertices, and the steps that lead there; None if there is none, or
+    where it would be mirrored."""
+    steps: list[Coarser] = []
+    kept, face_of = (
+        np.arange(network.vertex_count, dtype=np.int32),
+        np.arange(len(network.surface.faces), dtype=np.int32),
+    )
+    for step in coarser_surfaces(network.surface):
+        if step.smooth_carry is None or len(kept) <= most:
+            break
+        kept, face_of = kept[step.kept], face_of[step.face_of]
+        steps.append(step)
+    if not steps:
+        return None
+    rung = _rung(network, layout, replace(steps[-1], kept=kept, face_of=face_of), mend=True)
+    return (steps, replace(rung, step=steps[-1])) if rung is not None else None
 
 
 def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> Rung | None:
@@ -96,5 +127,9 @@ def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *,
 def stay(surface: Surface) -> Coarser:
     """The step of a piece that has no coarser level, where others have."""
     every = np.arange(len(surface.vertices), dtype=np.int32)
-    one = csr_array(eye(len(every), format="csr"))
-    return Coarser(surface=surface, kept=every, prolongation=one, face_of=np.arange(len(surface.faces), dtype=np.int32))
+    return Coarser(
+        surface=surface,
+        kept=every,
+        weigh=lambda: csr_array(eye(len(every), format="csr")),
+        face_of=np.arange(len(surface.faces), dtype=np.int32),
+    )
