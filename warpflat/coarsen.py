@@ -1,9 +1,10 @@
 """One coarser level of a piece: a quarter of its vertices, faces between them, and how layouts go between the two.
 
-The vertices of the coarser level are vertices of the finer one. A rectangular grid of quads keeps every second row and column.
-Any other mesh loses vertices by edges that collapse, an independent set of them at a time, until about a quarter is left: a vertex
-vanishes into the neighbour that leaves the best triangles, on the border only along the border. So corners, holes and cracks stay
-what they are: two sides of a crack have different vertices, and nothing joins them.
+The vertices of the coarser level are vertices of the finer one. A rectangular grid of quads keeps every second row and column, quads on
+any other lattice, with concave corners, holes or cracks, all those too in which the border turns. Any other mesh loses vertices by edges
+that collapse, an independent set of them at a time, until about a quarter is left: a vertex vanishes into the neighbour that leaves
+the best triangles, on the border only along the border. So corners, holes and cracks stay what they are: two sides of a crack have
+different vertices, and nothing joins them.
 
 In a pass all vertices look for the neighbour that is best, on all cores; then one goes after the other, while the rings of neighbours
 that stay are kept up to date. The triangles are made at the end, of those that have three different corners left.
@@ -23,10 +24,10 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye, vstack
 
-from warpflat.carry import GridCarry
+from warpflat.carry import GridCarry, LatticeCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
-from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import triangulate
 
@@ -34,6 +35,7 @@ __all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_mean
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
 
 # A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
 # piece.
@@ -48,6 +50,8 @@ _GOOD = 0.6
 _LEAST_QUALITIES = (0.3, 0.15)
 # Levels of a surface of more vertices are worth a thread of their own.
 _WORTH_A_THREAD = 5_000
+# Quads across the narrowest strip of a coarser lattice.
+_LEAST_QUADS = 2
 # Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
 _ROOM = 16
 
@@ -61,14 +65,14 @@ class Coarser:
         kept: #C, the finer level's vertices that it has.
         weigh: makes the prolongation, which grids seldom need.
         face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
-        smooth_carry: of a grid, what carries layouts up by cubics.
+        smooth_carry: of quads on a lattice, what carries layouts up by cubics.
     """
 
     surface: Surface
     kept: IntArray
     weigh: Callable[[], csr_array]
     face_of: IntArray
-    smooth_carry: GridCarry | None = None
+    smooth_carry: GridCarry | LatticeCarry | None = None
 
     @cached_property
     def prolongation(self) -> csr_array:
@@ -95,7 +99,10 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
             they are good on the body only.
     """
     grid = rows_and_columns(surface)
-    return _every_second(surface, grid) if grid is not None else _collapsed(surface, layout)
+    if grid is not None:
+        return _every_second(surface, grid)
+    lattice = lattice_of(surface)
+    return (lattice and _every_other(surface, lattice)) or _collapsed(surface, layout)
 
 
 @once_per_surface
@@ -194,6 +201,77 @@ def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
     face = np.empty(len(surface.vertices), dtype=np.int32)
     face[surface.faces] = np.arange(len(surface.faces), dtype=np.int32)[:, None]
     return face[vertices]
+
+
+# --- quads on any other lattice
+
+
+def _every_other(surface: Surface, lattice: Lattice) -> Coarser | None:
+    """Every second row and column between those in which the border turns, which all stay; None where too little would go, or a
+    strip between two of them would be a single quad wide, which bends several times as stiffly as its cloth."""
+    keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
+    for line, lines in zip((lattice.row, lattice.column), keep, strict=True):
+        if np.diff(np.searchsorted(lines, np.unique(line[lattice.bends]))).min() < _LEAST_QUADS:
+            return None
+    places = lattice.face_row, lattice.face_column
+    block_row, block_column = (
+        np.searchsorted(lines, place, side="right") - 1 for lines, place in zip(keep, places, strict=True)
+    )
+    # The faces at the corners of each block between kept lines.
+    width = len(keep[1])
+    block = block_row * width + block_column
+    first = [place == lines[at] for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)]
+    last = [
+        place == lines[at + 1] - 1 for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)
+    ]
+    at_corner = np.full((4, len(keep[0]) * width), -1, dtype=np.int32)
+    for k, (up, right) in enumerate(((first, first), (first, last), (last, last), (last, first))):
+        here = np.flatnonzero(up[0] & right[1])
+        at_corner[k, block[here]] = here
+    blocks = np.flatnonzero(at_corner[0] >= 0)
+    at_corner = at_corner[:, blocks]
+    corners = np.stack([lattice.corner[at_corner[k], k] for k in range(4)], axis=1)
+    kept = np.unique(corners)
+    count = len(surface.vertices)
+    if len(kept) > (1.0 - _LEAST_GAIN) * count:
+        return None
+    number = np.full(count, -1, dtype=np.int32)
+    number[kept] = np.arange(len(kept), dtype=np.int32)
+    return Coarser(
+        surface=_part(surface, kept, number[corners]),
+        kept=kept,
+        weigh=partial(_between_corners, lattice, keep, block, blocks, number[corners]),
+        face_of=at_corner[0],
+        smooth_carry=LatticeCarry(surface.vertices, lattice, keep),
+    )
+
+
+def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
+    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second."""
+    fixed = np.unique(line[bends])
+    between = [begin + _second(end - begin + 1) for begin, end in pairwise(fixed.tolist())]
+    return np.unique(np.concatenate([fixed, *between])).astype(np.int32)
+
+
+def _between_corners(
+    lattice: Lattice, keep: Sequence[IntArray], block: IntArray, blocks: NDArray[np.integer], corners: IntArray
+) -> csr_array:
+    """#V by #C, linear by index along rows and columns between the corners of the block that a vertex lies in."""
+    count = len(lattice.row)
+    face = np.empty(count, dtype=np.int32)
+    face[lattice.corner] = np.arange(len(block), dtype=np.int32)[:, None]
+    number = np.empty(int(blocks.max()) + 1, dtype=np.int32)
+    number[blocks] = np.arange(len(blocks), dtype=np.int32)
+    shares = []
+    for line, lines, at in zip((lattice.row, lattice.column), keep, np.divmod(block[face], len(keep[1])), strict=True):
+        share = (line - lines[at]) / (lines[at + 1] - lines[at])
+        shares.append((1.0 - share, share))
+    weights = np.stack([shares[0][up] * shares[1][right] for up, right in ((0, 0), (0, 1), (1, 1), (1, 0))], axis=1)
+    offset = np.arange(0, 4 * count + 1, 4, dtype=np.int32)
+    size = int(corners.max()) + 1
+    prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
+    prolongation.eliminate_zeros()
+    return prolongation
 
 
 # --- any other mesh

@@ -194,11 +194,14 @@ def carry_layout(positions: FloatArray, faces: IntArray, new_faces: IntArray, co
         faces, new_faces: #F by 4, the same faces and corners in the old and in the new numbering.
         count: vertices of the new numbering, of which the first keep their numbers.
     """
-    used = faces >= 0
-    pairs = np.unique(np.column_stack([new_faces[used], faces[used]]), axis=0)
     carried = np.zeros((count, 2))
     kept = min(count, len(positions))
     carried[:kept] = positions[:kept]
+    # Only where a corner has another number than before is there anything to do.
+    other = np.zeros(count, dtype=bool)
+    other[new_faces[new_faces != faces]] = True
+    used = (new_faces >= 0) & other[new_faces]
+    pairs = np.unique(np.column_stack([new_faces[used], faces[used]]), axis=0)
     number = np.bincount(pairs[:, 0], minlength=count)
     for axis in range(2):
         total = np.bincount(pairs[:, 0], positions[pairs[:, 1], axis], minlength=count)

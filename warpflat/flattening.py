@@ -26,7 +26,8 @@ from warpflat.relax import RelaxOptions
 from warpflat.running import Relaxed, Run, relax_runs
 from warpflat.strain import WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
-from warpflat.surface import Surface, components, line_from_indices, read_surface
+from warpflat.surface import Surface, line_from_indices, read_surface
+from warpflat.surface.topology import components_of
 from warpflat.tightness import Wear, WornFit, assess_fit
 
 if TYPE_CHECKING:
@@ -426,7 +427,7 @@ def _later_run(
     datum = result.datum
     if surface is not result.surface:
         # A cut may part the datum: then the first part of it stays upright.
-        part = components(surface.faces)
+        part = components_of(surface)
         part_of = np.full(len(surface.vertices), -1)
         used = surface.faces >= 0
         part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]

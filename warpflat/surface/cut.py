@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.topology import HalfEdges, components, half_edges
+from warpflat.surface.topology import HalfEdges, components, half_edges, join_labels
 
 __all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "glue"]
 
@@ -160,8 +160,10 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
         seams.extend(_seams(chain, left_ends, right_ends))
 
     labels = components(new_faces)
-    before = int(components(faces).max(initial=-1)) + 1
     after = int(labels.max(initial=-1)) + 1
+    # Sewn up again along the cut, what it parted is one.
+    beside = (labels[near[he.face[np.concatenate(half)]]] for half in zip(*sides, strict=True))
+    before = int(join_labels(after, *beside).max(initial=-1)) + 1
     return Cut(
         faces=new_faces,
         vertex_origin=origin,

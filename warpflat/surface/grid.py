@@ -1,16 +1,85 @@
-"""Rectangular grids of quads, however their vertices are numbered."""
+"""Quads in rows and columns: rectangles, and any other piece that lies on a lattice, with concave corners, holes and cracks."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.surface.mesh import Surface, once_per_surface
+from warpflat.kernels.lattice import number_faces
+from warpflat.surface.mesh import Surface, once_per_surface, read_only
 from warpflat.surface.topology import half_edges_of, twins_of
 
-__all__ = ["rows_and_columns"]
+__all__ = ["Lattice", "lattice_of", "rows_and_columns"]
 
+BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lattice:
+    """A quad mesh of which every inner vertex has four faces, on a lattice.
+
+    Attributes:
+        row, column: #V, from 0; the two sides of a crack lie at the same.
+        face_row, face_column: #F, of the corner below and to the left.
+        corner: #F by 4, vertices: below left, below right, above right, above left.
+        bends: #V, where the border turns: at corners and at the tips of cracks.
+    """
+
+    row: IntArray
+    column: IntArray
+    face_row: IntArray
+    face_column: IntArray
+    corner: IntArray
+    bends: BoolArray
+
+
+@once_per_surface
+def lattice_of(surface: Surface) -> Lattice | None:
+    """Rows and columns of a mesh, None where it has none: triangles, inner vertices of three or five faces, tubes, or a piece that
+    overlaps itself on the lattice."""
+    faces, count = surface.faces, len(surface.vertices)
+    if not surface.is_quad.all():
+        return None
+    he = half_edges_of(surface)
+    twin = twins_of(he).astype(np.int32)
+    place, queue = (
+        wp.empty(len(faces), dtype=wp.vec3i, device="cpu"),
+        wp.empty(len(faces), dtype=wp.int32, device="cpu"),
+    )
+    given = wp.array(twin, dtype=wp.int32, device="cpu", copy=False)
+    wp.launch(number_faces, dim=1, inputs=[given], outputs=[place, queue], device="cpu")
+    face_row, face_column, turn = (np.ascontiguousarray(values) for values in place.numpy().T)
+    if turn.min() < 0:
+        return None
+    face_row -= face_row.min()
+    face_column -= face_column.min()
+    at = face_row * np.int64(face_column.max() + 1) + face_column
+    if len(np.unique(at)) < len(at):
+        return None
+    corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4]
+    row, column = (np.empty(count, dtype=np.int32) for _ in range(2))
+    for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
+        row[corner[:, k]], column[corner[:, k]] = face_row + up, face_column + right
+    for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
+        if (row[corner[:, k]] != face_row + up).any() or (column[corner[:, k]] != face_column + right).any():
+            return None
+    around = np.bincount(faces.ravel(), minlength=count)
+    on_border = np.zeros(count, dtype=bool)
+    on_border[he.tail[twin < 0]] = True
+    return read_only(
+        Lattice(
+            row=row,
+            column=column,
+            face_row=face_row,
+            face_column=face_column,
+            corner=corner,
+            bends=on_border & (around != 2),
+        )
+    )
 
 
 @once_per_surface
@@ -27,38 +96,12 @@ def rows_and_columns(surface: Surface) -> IntArray | None:
         in_order = sorted(corner.tolist()) == [0, 1, columns, columns + 1]
         if in_order and np.array_equal(faces, grid[:-1, :-1].reshape(-1, 1) + corner):
             return grid
-    he = half_edges_of(surface)
-    twin = twins_of(he)
-    around = np.bincount(faces.ravel(), minlength=count)
-    corners = np.flatnonzero(around == 1)
-    if len(corners) != 4 or ((around != 1) & (around != 2) & (around != 4)).any():
+    lattice = lattice_of(surface)
+    if lattice is None:
         return None
-    # The side from one corner to the next, and then row after row to its left: the edge across each quad from a row's.
-    on_border = np.flatnonzero(twin < 0)
-    after = np.full(count, -1, dtype=np.int64)
-    after[he.tail[on_border]] = he.head[on_border]
-    leaving = np.full(count, -1, dtype=np.int64)
-    leaving[he.tail[on_border]] = on_border
-    side = [int(corners[0])]
-    while len(side) <= count:
-        side.append(int(after[side[-1]]))
-        if around[side[-1]] == 1:
-            break
-    columns = len(side)
-    if columns < 2 or count % columns or (count // columns - 1) * (columns - 1) != len(faces):
+    shape = int(lattice.row.max()) + 1, int(lattice.column.max()) + 1
+    if shape[0] * shape[1] != count or (shape[0] - 1) * (shape[1] - 1) != len(faces):
         return None
-    rows = [np.array(side)]
-    edge = leaving[side[:-1]]
-    for _ in range(count // columns - 1):
-        opposite = he.next[he.next[edge]]
-        row = np.append(he.head[opposite], he.tail[opposite[-1]])
-        if (row[1:-1] != he.tail[opposite[:-1]]).any():
-            return None
-        rows.append(row)
-        edge = twin[opposite]
-        if (edge < 0).any() != (edge < 0).all():
-            return None
-    grid = np.stack(rows)
-    if (edge >= 0).any() or len(np.unique(grid)) != count:
-        return None
-    return grid.astype(np.int32)
+    grid = np.full(shape, -1, dtype=np.int32)
+    grid[lattice.row, lattice.column] = np.arange(count, dtype=np.int32)
+    return grid if grid.min() >= 0 else None

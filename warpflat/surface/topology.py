@@ -25,12 +25,14 @@ __all__ = [
     "border_edges",
     "border_loops",
     "components",
+    "components_of",
     "corner_fans",
     "corner_triangles",
     "edge_faces",
     "euler_characteristic",
     "half_edges",
     "half_edges_of",
+    "join_labels",
     "mesh_edges",
     "non_manifold_edges",
     "non_manifold_vertices",
@@ -221,12 +223,16 @@ def border_edges(faces: ArrayLike) -> NDArray[np.int32]:
 
 def _paired(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Half-edges that share an edge, as pairs; around an edge with n faces, n - 1 pairs."""
+    if he.count.max(initial=0) <= 2:
+        twin = twins_of(he)
+        first = np.flatnonzero(twin > np.arange(len(twin)))
+        return first, twin[first]
     order = stable_order(he.edge)
     same = he.edge[order[1:]] == he.edge[order[:-1]]
     return order[:-1][same], order[1:][same]
 
 
-def _labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
+def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
     """Connected components of `size` nodes joined by the pairs a-b."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -244,8 +250,16 @@ def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) ->
         faces: #F by 4.
         barrier: #B by 2, edges that do not connect, such as those of a line that may part the surface.
     """
-    he = half_edges(faces)
-    size = len(_four_columns(faces))
+    return _components(half_edges(faces), len(_four_columns(faces)), barrier)
+
+
+@once_per_surface
+def components_of(surface: Surface) -> NDArray[np.int32]:
+    """`components` of the surface's faces, worked out once."""
+    return _components(half_edges_of(surface), len(surface.faces), None)
+
+
+def _components(he: HalfEdges, size: int, barrier: NDArray[np.int32] | None) -> NDArray[np.int32]:
     if size == 0:
         return np.empty(0, dtype=np.int32)
     a, b = _paired(he)
@@ -255,7 +269,9 @@ def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) ->
         open_edge = ~np.isin(he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1], blocked)
         passable = open_edge[he.edge[a]]
         a, b = a[passable], b[passable]
-    labels = _labels(size, he.face[a], he.face[b])
+    labels = join_labels(size, he.face[a], he.face[b])
+    if labels[0] == 0 and (labels[1:] <= np.maximum.accumulate(labels)[:-1] + 1).all():
+        return labels
     _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
     return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
 
@@ -274,7 +290,7 @@ def _corner_fans(he: HalfEdges) -> NDArray[np.int32]:
     opposite = he.tail[a] == he.head[b]
     at_tail = np.where(opposite, he.next[b], b)
     at_head = np.where(opposite, b, he.next[b])
-    return _labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([at_tail, at_head]))
+    return join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([at_tail, at_head]))
 
 
 def non_manifold_vertices(faces: ArrayLike) -> NDArray[np.int32]:
@@ -376,7 +392,7 @@ def orient(faces: ArrayLike) -> tuple[NDArray[np.int32], int]:
     # of the surface is two-sided exactly if its two copies stay apart (the orientation double cover).
     other = np.where(agree, fb, fb + size)
     mirror = np.where(agree, fb + size, fb)
-    labels = _labels(2 * size, np.concatenate([fa, fa + size]), np.concatenate([other, mirror]))
+    labels = join_labels(2 * size, np.concatenate([fa, fa + size]), np.concatenate([other, mirror]))
     front, back = labels[:size], labels[size:]
     one_sided = np.flatnonzero(front == back)
     if len(one_sided):

@@ -1,0 +1,206 @@
+"""Rows and columns of quads, with concave corners, holes and cracks; and coarser lattices and what they carry."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpflat.carry import LatticeCarry
+from warpflat.coarsen import coarser, coarser_surfaces
+from warpflat.shapes import make_shape
+from warpflat.surface import Surface, make_surface
+from warpflat.surface.cut import cut_along
+from warpflat.surface.grid import lattice_of, rows_and_columns
+from warpflat.surface.topology import border_loops, components, euler_characteristic, non_manifold_edges
+
+BoolArray = NDArray[np.bool_]
+
+
+def piece(solid: BoolArray, *, seed: int = 0, crack: list[tuple[int, int]] | None = None) -> Surface:
+    """Flat quads of 10 mm where `solid` (#rows by #columns) is true, vertices and faces numbered at random and each face begun at any
+    of its corners; cut along a way of (row, column) places."""
+    rng = np.random.default_rng(seed)
+    rows, columns = solid.shape
+    i = np.arange((rows + 1) * (columns + 1)).reshape(rows + 1, columns + 1)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1)[solid]
+    y, x = np.divmod(np.arange(i.size), columns + 1)
+    vertices = np.column_stack([0.01 * x, 0.01 * y, 0.0 * x])
+    if crack is not None:
+        made = cut_along(faces, [int(i[at]) for at in crack], vertex_count=len(vertices))
+        faces, vertices = made.faces, vertices[made.vertex_origin]
+    faces = np.stack([np.roll(face, turn) for face, turn in zip(faces, rng.integers(4, size=len(faces)), strict=True)])
+    used = rng.permutation(np.unique(faces))
+    number = np.empty(len(vertices), dtype=np.int32)
+    number[used] = np.arange(len(used))
+    return make_surface(vertices[used], number[faces[rng.permutation(len(faces))]])
+
+
+def ell() -> BoolArray:
+    solid = np.ones((20, 24), dtype=bool)
+    solid[12:, 15:] = False
+    return solid
+
+
+def with_hole() -> BoolArray:
+    solid = np.ones((20, 22), dtype=bool)
+    solid[6:12, 8:14] = False
+    return solid
+
+
+CRACK = [(row, 8) for row in range(13)]
+PIECES = {
+    "rectangle": piece(np.ones((9, 16), dtype=bool)),
+    "L": piece(ell()),
+    "hole": piece(with_hole()),
+    "crack": piece(np.ones((20, 24), dtype=bool), crack=CRACK),
+    "slit": piece(np.ones((20, 24), dtype=bool), crack=[(10, column) for column in range(6, 17)]),
+    "crooked crack": piece(ell(), crack=[*((row, 4) for row in range(7)), *((6, column) for column in range(5, 11))]),
+}
+
+
+@pytest.mark.parametrize("name", PIECES)
+def test_rows_and_columns_are_found_however_the_mesh_is_numbered(name: str) -> None:
+    surface = PIECES[name]
+    lattice = lattice_of(surface)
+    assert lattice is not None
+    # Up to a turn of the whole by quarters.
+    places = np.column_stack([lattice.column, lattice.row, np.ones(len(lattice.row))])
+    turn, left, _, _ = np.linalg.lstsq(places, 100.0 * surface.vertices[:, :2], rcond=None)
+    assert np.abs(left).max() < 1e-20
+    assert np.linalg.det(turn[:2]) == pytest.approx(1.0)
+    assert sorted(np.abs(turn[:2]).round(9).ravel().tolist()) == [0.0, 0.0, 1.0, 1.0]
+    assert lattice.row.min() == lattice.column.min() == 0
+    np.testing.assert_array_equal(np.sort(lattice.corner, axis=1), np.sort(surface.faces, axis=1))
+    for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
+        np.testing.assert_array_equal(lattice.row[lattice.corner[:, k]], lattice.face_row + up)
+        np.testing.assert_array_equal(lattice.column[lattice.corner[:, k]], lattice.face_column + right)
+    grid = rows_and_columns(surface)
+    assert (grid is not None) == (name == "rectangle")
+    if grid is not None:
+        assert sorted(grid.shape) == [10, 17]
+
+
+def test_border_turns_at_corners_and_tips() -> None:
+    # Four corners, both sides of the mouth of the crack, and its tip.
+    lattice = lattice_of(PIECES["crack"])
+    assert lattice is not None
+    assert np.count_nonzero(lattice.bends) == 7
+    ell_lattice = lattice_of(PIECES["L"])
+    assert ell_lattice is not None
+    assert np.count_nonzero(ell_lattice.bends) == 6
+
+
+def ring() -> Surface:
+    around, across = 24, 4
+    turn = np.linspace(0, 2 * np.pi, around, endpoint=False)
+    radius = np.linspace(1.0, 2.0, across)[:, None]
+    points = np.stack([radius * np.cos(turn), radius * np.sin(turn), 0.0 * radius * turn], axis=-1).reshape(-1, 3)
+    i = np.arange(around * across).reshape(across, around)
+    right = np.roll(i, -1, axis=1)
+    return make_surface(points, np.stack([i[:-1], i[1:], right[1:], right[:-1]], axis=-1).reshape(-1, 4))
+
+
+def corner_of_a_box() -> Surface:
+    """Three sheets of quads that meet in one inner vertex."""
+    side = 4
+    a, b = np.meshgrid(np.arange(side + 1.0), np.arange(side + 1.0))
+    i = np.arange((side + 1) ** 2).reshape(side + 1, side + 1)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    flat = [np.stack(place, axis=-1).reshape(-1, 3) for place in ((a, b, 0 * a), (0 * a, a, b), (b, 0 * a, a))]
+    points, index = np.unique(np.concatenate(flat), axis=0, return_inverse=True)
+    faces = np.concatenate([quads + k * i.size for k in range(3)])
+    return make_surface(points, index.reshape(-1)[faces])
+
+
+@pytest.mark.parametrize("surface", [ring(), corner_of_a_box(), make_shape("dome", resolution=9, triangles=True)])
+def test_what_lies_on_no_lattice(surface: Surface) -> None:
+    assert lattice_of(surface) is None
+    assert rows_and_columns(surface) is None
+
+
+@pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
+def test_a_coarser_lattice_has_the_same_border_and_half_the_rows(name: str) -> None:
+    fine = PIECES[name]
+    step = coarser(fine)
+    assert step is not None
+    coarse = step.surface
+    assert coarse.is_quad.all()
+    assert len(step.kept) < 0.4 * len(fine.vertices)
+    np.testing.assert_array_equal(coarse.vertices, fine.vertices[step.kept])
+    assert not len(non_manifold_edges(coarse.faces))
+    assert components(coarse.faces).max() == 0
+    assert euler_characteristic(coarse.faces) == euler_characteristic(fine.faces)
+    # A flat piece has the area and the length of border that it had.
+    for measure in (area, border_length):
+        assert measure(coarse) == pytest.approx(measure(fine))
+    lattice = lattice_of(fine)
+    assert lattice is not None
+    assert lattice.bends[step.kept].sum() == lattice.bends.sum()
+    # One of the faces of the finer level that lie in it.
+    inside = fine.vertices[fine.faces[step.face_of]].mean(axis=1)
+    quad = coarse.vertices[coarse.faces]
+    assert ((inside > quad.min(axis=1) - 1e-9) & (inside < quad.max(axis=1) + 1e-9)).all()
+    np.testing.assert_allclose(step.prolongation @ coarse.vertices, fine.vertices, atol=1e-15)
+
+
+def area(surface: Surface) -> float:
+    p = surface.vertices[surface.faces]
+    return float(np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[:, 2].sum())
+
+
+def border_length(surface: Surface) -> float:
+    loops = border_loops(surface.faces)
+    return sum(
+        float(np.linalg.norm(np.diff(surface.vertices[[*loop, loop[0]]], axis=0), axis=1).sum()) for loop in loops
+    )
+
+
+@pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
+def test_cubics_are_carried_up_whole(name: str) -> None:
+    fine = PIECES[name]
+    step = coarser(fine)
+    assert step is not None
+    assert isinstance(step.smooth_carry, LatticeCarry)
+    x, y = 10.0 * fine.vertices[:, 0], 10.0 * fine.vertices[:, 1]
+    layout = np.column_stack([x**3 - x * y + 0.5, x * x * y**2 - y**3 + x])
+    lattice = lattice_of(fine)
+    assert lattice is not None
+    exact = np.ones(len(layout), dtype=bool)
+    if name in ("L", "hole", "crooked crack"):
+        # Between two lines that stay there may be fewer than four.
+        exact = np.abs(step.smooth_carry(layout[step.kept]) - layout).max(axis=1) < 1e-12
+        assert exact.mean() > 0.6
+    np.testing.assert_allclose(step.smooth_carry(layout[step.kept])[exact], layout[exact], atol=1e-12)
+    straight = np.column_stack([1.0 + 2.0 * x - y, 0.5 * y])
+    np.testing.assert_allclose(step.smooth_carry(straight[step.kept]), straight, atol=1e-12)
+
+
+def test_nothing_is_carried_across_a_crack() -> None:
+    fine = PIECES["crack"]
+    step = coarser(fine)
+    assert step is not None
+    assert step.smooth_carry is not None
+    x, y = fine.vertices[:, 0], fine.vertices[:, 1]
+    at_crack = np.isclose(x, 0.08) & (y < 0.1299)
+    # Of the two sides of the crack, which belongs to faces on the right.
+    face_x = fine.vertices[fine.faces].mean(axis=1)[:, 0]
+    of_right = np.zeros(len(x), dtype=bool)
+    of_right[fine.faces[face_x > 0.08]] = True
+    right = ((x > 0.0801) | (at_crack & of_right)) & (y < 0.1199)
+    opened = np.where(right[:, None], 1.0, 0.0) * np.ones(2)
+    carried = step.smooth_carry(opened[step.kept])
+    left = ((x < 0.0799) | (at_crack & ~of_right)) & (y < 0.1201)
+    assert np.count_nonzero(left) > 100
+    np.testing.assert_array_equal(carried[left], 0.0)
+    np.testing.assert_allclose(carried[right & (y < 0.06)], 1.0, atol=1e-12)
+
+
+def test_strips_of_a_single_quad_are_left_to_triangles() -> None:
+    """A crack three columns from the border: a coarser lattice would bend several times as stiffly there."""
+    surface = piece(np.ones((20, 24), dtype=bool), crack=[(row, 3) for row in range(13)])
+    step = coarser(surface)
+    assert step is not None
+    assert not step.surface.is_quad.any()
+    four = coarser_surfaces(piece(np.ones((20, 24), dtype=bool), crack=[(row, 4) for row in range(13)]))
+    assert [level.surface.is_quad.all() for level in four[:2]] == [True, False]
