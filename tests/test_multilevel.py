@@ -127,16 +127,18 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
     for side, between in ((101, 0), (201, 10_201)):
         done = flatten(make_shape("bodice", resolution=side), fabric=cloth(375.0), datum="centre", device="cpu")
         state = start_of(done)
-        known = _carry_up(state, 4)
-        assert known is not None
+        below = _carry_up(state, 4)
+        assert below is not None
         assert state.last.potential[0] < 1.001 * minimum(done)
         assert state.work_units < 12.0
-        sizes = [rung.network.vertex_count for rung in known.values()]
+        sizes = [rung.network.vertex_count for rung in below.rungs.values()]
         assert 2_601 in sizes
         assert between not in sizes
-        levels = Levels(state, known=known)
-        assert levels.sizes[:2] == [side**2, between or 2_601]
-        assert all(levels.rungs[surface] is rung for surface, rung in known.items())
+        levels = Levels(state, below=below)
+        assert levels.sizes == [side**2, *([between] if between else []), *below.sizes]
+        assert [level.state for level in levels._levels[-len(below.sizes) :]] == [
+            level.state for level in below._levels
+        ]
 
 
 def test_small_grids_and_triangles_rise_level_by_level():

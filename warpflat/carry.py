@@ -6,7 +6,6 @@ coarse vertices would leave kinks, several per cent of the energy, for the finer
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -14,6 +13,8 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.kernels.cubics import carry_along, weigh_cubics
+from warpflat.launching import launch_each
 from warpflat.surface.grid import Lattice
 
 __all__ = ["GridCarry", "LatticeCarry", "cubics_between"]
@@ -61,24 +62,13 @@ def cubics_between(place: FloatArray, keep: IntArray) -> Cubics:
     before = np.searchsorted(keep, np.arange(count), side="right") - 1
     begin = np.clip(before - (points // 2 - 1), 0, len(keep) - points)
     column = begin[:, None] + np.arange(points)
-    return Cubics(column=column.astype(np.int32), weight=_lagrange(place, place[keep[column]]))
-
-
-def _lagrange(place: FloatArray, node: FloatArray, there: BoolArray | None = None) -> FloatArray:
-    """#N by #P, weights of the values at some nodes (#N by #P) in the polynomial through them at a place; of those that are `there`, if
-    given."""
-    weight = np.ones(node.shape)
-    for k in range(node.shape[1]):
-        for other in range(node.shape[1]):
-            if other == k:
-                continue
-            if there is None:
+    node = place[keep[column]]
+    weight = np.ones((count, points))
+    for k in range(points):
+        for other in range(points):
+            if other != k:
                 weight[:, k] *= (place - node[:, other]) / (node[:, k] - node[:, other])
-            else:
-                both = there[:, k] & there[:, other]
-                away = np.where(both, node[:, k] - node[:, other], 1.0)
-                weight[:, k] *= np.where(both, (place - node[:, other]) / away, 1.0)
-    return weight if there is None else np.where(there, weight, 0.0)
+    return Cubics(column=column.astype(np.int32), weight=weight)
 
 
 def _places(lines: FloatArray) -> FloatArray:
@@ -129,87 +119,51 @@ class LatticeCarry:
             keep: rows and columns that the coarser one keeps, all in which the border turns among them; its vertices are numbered in
                 the finer one's order.
         """
-        self._vertices, self._lattice, self._keep = vertices, lattice, keep
+        self._vertices, self._lattice = vertices, lattice
+        self._on_row, self._on_column = (
+            np.isin(line, lines) for line, lines in zip((lattice.row, lattice.column), keep, strict=True)
+        )
 
     @cached_property
-    def _passes(self) -> tuple[BoolArray, Sequence[tuple[IntArray, Cubics]]]:
-        lattice = self._lattice
-        on_row, on_column = (
-            np.isin(line, lines) for line, lines in zip((lattice.row, lattice.column), self._keep, strict=True)
-        )
-        below_left, below_right, above_right, above_left = lattice.corner.T
-        along_rows = _chains((below_left, below_right), (above_left, above_right), lattice.column, on_row)
-        along_columns = _chains((below_left, above_left), (below_right, above_right), lattice.row, None)
-        return on_row & on_column, (
-            self._cubics(along_rows, on_column),
-            self._cubics(along_columns, on_row),
-        )
+    def _cubics(self) -> tuple[tuple[IntArray, FloatArray], tuple[IntArray, FloatArray]]:
+        """Of the way along rows and of that along columns: #V by 4, the vertices that count and their weights."""
+        on_row, on_column = self._on_row, self._on_column
+        below_left, below_right, above_right, above_left = self._lattice.corner.T
+        # What lies between the rows that are kept is left alone on the first way.
+        along_row = _neighbors(len(on_row), (below_left, below_right), (above_left, above_right))
+        along_column = _neighbors(len(on_row), (below_left, above_left), (below_right, above_right))
+        return self._weigh(along_row, on_column | ~on_row), self._weigh(along_column, on_row)
 
-    def _cubics(self, chains: tuple[IntArray, IntArray], kept: BoolArray) -> tuple[IntArray, Cubics]:
-        """The vertices along chains, one after the other, and their values from those at kept vertices, numbered as vertices."""
-        vertex, chain = chains
-        place = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(self._vertices[vertex], axis=0), axis=1)))
-        is_node = kept[vertex]
-        node = np.flatnonzero(is_node)
-        ends = np.cumsum(np.bincount(chain[node]))
-        first, end = np.append(0, ends[:-1])[chain], ends[chain]
-        begin = np.clip(np.cumsum(is_node) - 2, first, np.maximum(end - 4, first))
-        column = begin[:, None] + np.arange(4)
-        there = column < end[:, None]
-        at = node[np.where(there, column, first[:, None])]
-        return vertex, Cubics(column=vertex[at], weight=_lagrange(place, place[at], there))
+    def _weigh(self, neighbors: tuple[IntArray, IntArray], kept: BoolArray) -> tuple[IntArray, FloatArray]:
+        column, weight = np.empty((len(kept), 4), dtype=np.int32), np.empty((len(kept), 4))
+        launch_each(weigh_cubics, len(kept), [self._vertices, *neighbors, kept.astype(np.int32)], [column, weight])
+        return column, weight
 
     def __call__(self, layout: FloatArray) -> FloatArray:
         """#V by 2, the finer layout of a coarser one (#C by 2) [m]."""
-        kept, passes = self._passes
-        result = np.zeros(len(kept), dtype=np.complex128)
-        result[kept] = np.ascontiguousarray(layout).view(np.complex128)[:, 0]
-        for vertex, cubics in passes:
-            result[vertex] = cubics(result)
-        return result.view(np.float64).reshape(-1, 2)
+        values = np.zeros((len(self._vertices), 2))
+        values[self._on_row & self._on_column] = layout
+        for column, weight in self._cubics:
+            carried = np.empty_like(values)
+            launch_each(carry_along, len(values), [column, weight, values], [carried])
+            values = carried
+        return values
 
 
-def _chains(
-    edges: tuple[IntArray, IntArray], others: tuple[IntArray, IntArray], place: IntArray, along: BoolArray | None
+def _neighbors(
+    count: int, edges: tuple[IntArray, IntArray], others: tuple[IntArray, IntArray]
 ) -> tuple[IntArray, IntArray]:
-    """Runs of vertices along rows (or columns), one after the other, and of each vertex in them the number of its run. A run ends
-    where the border turns and at the tip of a crack, where one of a row becomes two.
+    """Of each vertex the one before it and the one after it along its row (or column), -1 where the row ends: on the border, and at
+    the tip of a crack, where one of a row becomes two.
 
     Args:
+        count: of vertices.
         edges: tails and heads of the edges below (to the left of) the faces.
         others: of those above (to the right).
-        place: #V, how far along.
-        along: #V, the vertices in question; all, if not given.
     """
-    count = len(place)
-    ahead = np.full(count, -1, dtype=np.int32)
-    ahead[edges[0]] = edges[1]
-    new = ahead[others[0]] != others[1]
-    tail, head = (np.concatenate([a, b[new]]) for a, b in zip(edges, others, strict=True))
-    if along is not None:
-        tail, head = tail[along[tail]], head[along[tail]]
-    into, out = np.bincount(head, minlength=count), np.bincount(tail, minlength=count)
-    through = (into == 1) & (out == 1)
-    edge = np.arange(len(tail), dtype=np.int32)
-    arriving = np.full(count, -1, dtype=np.int32)
-    arriving[head] = edge
-    # Of each edge the first of its run: the one before it, and the one before that, ...
-    first = np.where(through[tail], arriving[tail], edge)
-    while True:
-        further = first[first]
-        if np.array_equal(further, first):
-            break
-        first = further
-    order = np.argsort(first.astype(np.int64) * (int(place.max()) + 1) + place[tail])
-    first = first[order]
-    begins = np.append(True, first[1:] != first[:-1])
-    run = np.cumsum(begins) - 1
-    vertex, number = (
-        np.empty(len(order) + run[-1] + 1, dtype=np.int32),
-        np.empty(len(order) + run[-1] + 1, dtype=np.int32),
-    )
-    # The heads first: but for the last of a run they are the tails of what follows.
-    at = np.arange(len(order)) + run
-    vertex[at + 1], vertex[at] = head[order], tail[order]
-    number[at + 1], number[at] = run, run
-    return vertex, number
+    ways = np.full((2, 2, count), -1, dtype=np.int32)
+    for side, (tail, head) in enumerate((edges, others)):
+        ways[0, side, head], ways[1, side, tail] = tail, head
+    fork = ((ways.min(axis=1) >= 0) & (ways[:, 0] != ways[:, 1])).any(axis=0)
+    before, after = np.where(fork, -1, ways.max(axis=1))
+    return before, after

@@ -22,7 +22,7 @@ from __future__ import annotations
 
 import math
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -125,19 +125,21 @@ class Levels:
 
     Attributes:
         sizes: vertices of each level.
+        leading: steps of a larger grid to the finest of these, by their surfaces.
         stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
     """
 
-    def __init__(self, finest: Relaxation, *, mend: bool = False, known: Mapping[Surface, Rung] | None = None) -> None:
+    def __init__(self, finest: Relaxation, *, mend: bool = False, below: Levels | None = None) -> None:
         """Of a relaxation and its present layout, which must mirror no face.
 
         Args:
             finest: the pieces themselves.
             mend: turn back what cells of the coarser levels are mirrored where the piece lies, as at the start of a nested iteration, which
                 leaves that layout; otherwise make levels that have none.
-            known: levels that are there already, by their surfaces.
+            below: levels that are there already; what they hold may be used as part of these.
         """
         layout, pieces = finest.positions(), finest.network.pieces
+        known = {} if below is None else below.rungs
         ladders = [
             rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
         ]
@@ -146,18 +148,24 @@ class Levels:
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
             while len(rungs) < depth:
                 rungs.append(Rung(step=stay(lowest.surface), network=lowest, layout=where))
-        self._join(finest, ladders)
+        self._join(finest, ladders, [] if below is None else below._levels)
 
-    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[Rung]]) -> None:
+    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = ()) -> None:
         self._ladders = ladders
         self._levels = [_Level(finest)]
+        self.leading: dict[Surface, Rung] = {}
         self.stale = False
+        ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
         for rungs in zip(*ladders, strict=True):
-            start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
-            coarse = Relaxation(join_networks([rung.network for rung in rungs]), finest.options, start=start)
+            networks = [rung.network for rung in rungs]
+            coarse = ready.get(tuple(map(id, networks)))
+            if coarse is None:
+                start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
+                coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start))
             fine = self._levels[-1]
-            fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse)
-            self._levels.append(_Level(coarse))
+            if fine.way is None:
+                fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
+            self._levels.append(coarse)
 
     def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
         """Those of some of the pieces, which `finest` is of."""
@@ -168,8 +176,8 @@ class Levels:
 
     @property
     def rungs(self) -> dict[Surface, Rung]:
-        """The coarser levels of all pieces, by their surfaces."""
-        return {rung.step.surface: rung for rungs in self._ladders for rung in rungs}
+        """The levels of all pieces but the finest, by their surfaces, and those that lead to them."""
+        return self.leading | {rung.step.surface: rung for rungs in self._ladders for rung in rungs}
 
     @property
     def sizes(self) -> list[int]:
@@ -359,13 +367,13 @@ class Levels:
             self._correct(level, way, ~lower)
 
 
-def _carry_up(state: Relaxation, steps: int) -> dict[Surface, Rung] | None:
+def _carry_up(state: Relaxation, steps: int) -> Levels | None:
     """Start pieces that are large grids where a coarser grid of theirs has come to rest; the others where their own levels lead.
 
     Nothing is made or evaluated of the levels in between. The state is looked at in the end.
 
     Returns:
-        The levels that were made, by their surfaces; None where no piece is such a grid, or one would not be lower than it lies: then
+        The levels of what was relaxed; None where no piece is such a grid, or one would not be lower than it lies: then
         all are where they were.
     """
     pieces, layout = state.network.pieces, state.positions()
@@ -383,11 +391,11 @@ def _carry_up(state: Relaxation, steps: int) -> dict[Surface, Rung] | None:
     levels.rise(steps)
     levels.cycle(0, steps)
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
-    carried, relaxed, known = layout.copy(), coarse.positions(), levels.rungs
+    carried, relaxed = layout.copy(), coarse.positions()
     for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
         up = relaxed[of]
         if way is not None:
-            known[way[1].step.surface] = way[1]
+            levels.leading[way[1].step.surface] = way[1]
             for step in reversed(way[0]):
                 assert step.smooth_carry is not None
                 up = step.smooth_carry(up)
@@ -396,7 +404,7 @@ def _carry_up(state: Relaxation, steps: int) -> dict[Surface, Rung] | None:
     state.hold_upright()
     state.work_units += _ENERGY_WORK
     if (state.begin().potential < before.potential).all():
-        return known
+        return levels
     state.position.assign(layout)
     state.last = before
     return None
@@ -520,10 +528,10 @@ def relax_multilevel(
     state.hold_upright()
     if not state.looked:
         state.begin()
-    known = _carry_up(state, steps) if nested and levels is None else None
-    if known is not None and each_step is not None:
+    below = _carry_up(state, steps) if nested and levels is None else None
+    if below is not None and each_step is not None:
         each_step(state, state.last.total, float(state.last.residual.max()))
-    levels = Levels(state, mend=nested, known=known) if levels is None else levels
+    levels = Levels(state, mend=nested, below=below) if levels is None else levels
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
     cycles = _Cycles(state=state, levels=levels, paces=[_Pace(steps=steps) for _ in state.vertices])
@@ -533,7 +541,7 @@ def relax_multilevel(
             look = cycles.state.last
             call(cycles.state, look.total, float(look.residual.max()))
 
-    if nested and known is None:
+    if nested and below is None:
         levels.rise(steps)
         state.hold_upright()
         state.begin()

@@ -17,6 +17,9 @@ __all__ = ["Lattice", "lattice_of", "rows_and_columns"]
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int32]
 
+# A rectangle around a piece may have so many times its places to be counted one by one.
+_DENSE = 8
+
 
 @dataclass(frozen=True, kw_only=True)
 class Lattice:
@@ -58,7 +61,8 @@ def lattice_of(surface: Surface) -> Lattice | None:
     face_row -= face_row.min()
     face_column -= face_column.min()
     at = face_row * np.int64(face_column.max() + 1) + face_column
-    if len(np.unique(at)) < len(at):
+    often = np.bincount(at) if at.max() < _DENSE * len(at) else np.unique(at, return_counts=True)[1]
+    if often.max() > 1:
         return None
     corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4]
     row, column = (np.empty(count, dtype=np.int32) for _ in range(2))

@@ -1,0 +1,103 @@
+"""Between vertices that a coarser lattice keeps: weights of the cubic through the four nearest along a row or a column."""
+
+import warp as wp
+
+wp.set_module_options({"enable_backward": False})
+
+
+@wp.struct
+class Nodes:
+    """The three nearest kept vertices on one side: how many there are, which, and how far away [m]."""
+
+    count: int
+    vertex: wp.vec3i
+    away: wp.vec3d
+
+
+@wp.func
+def look_along(
+    v: int,
+    vertices: wp.array(dtype=wp.vec3d),
+    following: wp.array(dtype=wp.int32),
+    kept: wp.array(dtype=wp.int32),
+):
+    """The kept vertices that follow on v, as far as the row runs without a break."""
+    nodes = Nodes()
+    at = int(v)
+    away = wp.float64(0.0)
+    while nodes.count < 3:
+        further = following[at]
+        if further < 0:
+            break
+        away += wp.length(vertices[further] - vertices[at])
+        at = further
+        if kept[at] != 0:
+            nodes.vertex[nodes.count] = at
+            nodes.away[nodes.count] = away
+            nodes.count += 1
+    return nodes
+
+
+@wp.kernel
+def weigh_cubics(
+    vertices: wp.array(dtype=wp.vec3d),
+    before: wp.array(dtype=wp.int32),
+    after: wp.array(dtype=wp.int32),
+    kept: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    column: wp.array(dtype=wp.vec4i),
+    weight: wp.array(dtype=wp.vec4d),
+):
+    """Of each vertex those kept ones that it lies between, two before it and two after it, near an end more of the other side, and
+    their weights in the polynomial through them.
+
+    vertices: #V [m]. before, after: #V, its neighbours along the row, -1 at the ends. kept: #V, 1 or 0; the ends are. column, weight: #V; a
+    kept vertex has itself.
+    """
+    v = wp.tid() + first
+    column[v] = wp.vec4i(v, v, v, v)
+    weight[v] = wp.vec4d(wp.float64(1.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if kept[v] == 0:
+        back = look_along(v, vertices, before, kept)
+        ahead = look_along(v, vertices, after, kept)
+        takes_back = wp.min(back.count, 2)
+        takes_ahead = wp.min(ahead.count, 4 - takes_back)
+        if takes_ahead < 2:
+            takes_back = wp.min(back.count, 4 - takes_ahead)
+        if takes_back == 2:
+            takes_ahead = wp.min(takes_ahead, 2)
+        place = wp.vec4d()
+        count = int(0)
+        for k in range(takes_back):
+            column[v][count] = back.vertex[k]
+            place[count] = -back.away[k]
+            count += 1
+        for k in range(takes_ahead):
+            column[v][count] = ahead.vertex[k]
+            place[count] = ahead.away[k]
+            count += 1
+        for k in range(4):
+            share = wp.float64(0.0)
+            if k < count:
+                share = wp.float64(1.0)
+                for other in range(count):
+                    if other != k:
+                        share *= place[other] / (place[other] - place[k])
+            weight[v][k] = share
+
+
+@wp.kernel
+def carry_along(
+    column: wp.array(dtype=wp.vec4i),
+    weight: wp.array(dtype=wp.vec4d),
+    values: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    result: wp.array(dtype=wp.vec2d),
+):
+    """result_i: the sum of the values in the columns of row i, by its weights. values, result: #V [m]."""
+    i = wp.tid() + first
+    c = column[i]
+    w = weight[i]
+    result[i] = w[0] * values[c[0]] + w[1] * values[c[1]] + w[2] * values[c[2]] + w[3] * values[c[3]]
