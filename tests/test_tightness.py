@@ -214,7 +214,12 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     fitting, tight = (warpflat.flatten(shape, fabric=NET, datum="centre", device="cpu") for shape in shapes)
     results = [fitting, replace(tight, positions=tight.positions * [0.7, 1.0])]
     drawn: list[Figure] = []
-    monkeypatch.setattr(Figure, "savefig", lambda figure, path, **_: (drawn.append(figure), Path(path).touch()))
+
+    def keep(path: Path, figure: Figure, text: object) -> None:
+        drawn.append(figure)
+        path.touch()
+
+    monkeypatch.setattr("warpflat.wear_picture.save_png", keep)
     write_wear_sheet(tmp_path / "wear.png", results, title="sleeves")
     assert (tmp_path / "wear.png").exists()
     figure = drawn[0]

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import weighted_percentile
+from warpflat.export.picture_png import save_png
 from warpflat.surface.topology import border_edges
 from warpflat.tightness import MAPS, WornFit
 from warpflat.wear_report import help_words
@@ -117,7 +118,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     )
     figure.tight_layout()
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": "warpflat"})
+        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str) -> None:
@@ -190,7 +191,7 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
         color="#404040",
     )
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", metadata={"Software": "warpflat"})
+        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def _to_mmhg(pascals: Any) -> Any:
@@ -242,7 +243,8 @@ def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> PolyC
     from matplotlib.collections import LineCollection, PolyCollection
 
     fit, p = result.fit, result.positions
-    polygons = [p[face[face >= 0]] for face in result.faces]
+    # A triangle with its last corner twice, so that all are one array: from a list every polygon is checked on its own.
+    polygons: Any = p[np.where(result.faces >= 0, result.faces, result.faces[:, 2:3])]
     drawn = PolyCollection(
         polygons,
         array=MAPS[name][1] * getattr(fit, name),

@@ -10,7 +10,8 @@ from warpflat.export import PicturePiece, write_picture
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale, weighted_percentile
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.labels import LabelRoom, Spot, along_line, beyond_ends
-from warpflat.export.raster import interpolate, rasterise, reduce_samples
+from warpflat.export.picture_png import png_bytes
+from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.topology import border_edges, triangulate
 
 
@@ -159,30 +160,114 @@ def test_raster_agrees_with_barycentric_coordinates() -> None:
         expected[nearer], depth[nearer] = index, z[nearer]
     nearest = samples.triangle == expected
     assert nearest.mean() > 0.999
-    seen = samples.triangle >= 0
-    values = interpolate(samples.triangle[seen], centres[seen], points, triangles, points)
-    np.testing.assert_allclose(values[:, :2], centres[seen], atol=1e-9)
-    np.testing.assert_allclose(values[:, 2], samples.depth[seen], atol=1e-9)
-    np.testing.assert_allclose(samples.depth[nearest], depth[nearest], atol=1e-9)
+    np.testing.assert_allclose(samples.depth_at(*np.nonzero(nearest)), depth[nearest], atol=1e-9)
 
 
-def test_raster_takes_many_triangles_in_chunks(monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("angle", [0.0, 0.3, np.pi / 4])
+def test_no_sample_falls_between_two_triangles(angle: float) -> None:
     shape = dome(33)
-    points = (shape.vertices + np.array([0.25, 0.25, 0.0])) * (120.0, 120.0, 1.0)
+    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+    points = np.column_stack([30.0 + 240.0 * shape.vertices[:, :2] @ turn.T, shape.vertices[:, 2]])
     triangles, _ = triangulate(shape.faces)
-    whole = rasterise(points, triangles, (60, 60))
-    monkeypatch.setattr("warpflat.export.raster._SPANS_AT_ONCE", 100)
-    parts = rasterise(points, triangles, (60, 60))
-    np.testing.assert_array_equal(whole.triangle, parts.triangle)
-    assert (whole.triangle >= 0).all()
+    samples = rasterise(points, triangles, (60, 60))
+    centres = np.stack(np.meshgrid(np.arange(60) + 0.5, np.arange(60) + 0.5), axis=-1)
+    low, high = shape.vertices[:, :2].min(axis=0), shape.vertices[:, :2].max(axis=0)
+    flat = (centres - 30.0) @ turn / 240.0
+    inside = ((flat > low + 1e-9) & (flat < high - 1e-9)).all(axis=-1)
+    assert inside.sum() > 2500
+    assert (samples.triangle[inside] >= 0).all()
+    beyond = ((flat < low - 1e-9) | (flat > high + 1e-9)).any(axis=-1)
+    assert (samples.triangle[beyond] == -1).all()
+
+
+def test_triangles_off_the_image_or_without_a_place_cover_nothing() -> None:
+    points = np.array(
+        [
+            [-9, -9, 0],
+            [-1, -9, 0],
+            [-9, -1, 0],
+            [1e12, 0, 0],
+            [1e12, 9, 0],
+            [2e12, 4, 0],
+            [np.nan, 1, 0],
+            [5, np.inf, 0],
+        ],
+        dtype=np.float64,
+    )
+    triangles = np.array([[0, 1, 2], [3, 4, 5], [0, 4, 6], [1, 2, 7]], dtype=np.int32)
+    samples = rasterise(points, triangles, (10, 10))
+    assert (samples.triangle == -1).all()
+    assert (samples.depth_at(*np.mgrid[:10, :10]) == -np.inf).all()
+
+
+def lit_mesh() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Points over a 40 by 40 image, triangles, and unit normals at the points, half of which look away."""
+    x, y = (values.ravel() for values in np.meshgrid(np.linspace(-1.0, 41.0, 5), np.linspace(-1.0, 41.0, 5)))
+    index, quads = grid(5, 5)
+    triangles, _ = triangulate(quads)
+    normals = np.random.default_rng(2).standard_normal((len(x), 3)) * 0.3 + (0.0, 0.0, 1.0)
+    normals[index[:, 3:]] *= (1.0, 1.0, -1.0)
+    return np.column_stack([x, y, 0.01 * x]), triangles, normals / np.linalg.norm(normals, axis=1)[:, None]
+
+
+def test_light_falls_by_the_blended_normal_and_the_reverse_is_greyed() -> None:
+    points, triangles, normals = lit_mesh()
+    samples = rasterise(points, triangles, (40, 40))
+    face = np.arange(len(triangles), dtype=np.int32)
+    colours = np.random.default_rng(3).random((len(triangles), 3))
+    light, back = np.array([0.6, 0.0, 0.8]), (0.7, 0.8, 0.9)
+    look = {"face": face, "normals": normals, "light": tuple(2.0 * light), "back": back}
+    pixels = shade(samples, 1, points, triangles, colours, **look)
+    assert (pixels[..., 3] == 255).all()
+    for row, column in np.random.default_rng(4).integers(0, 40, (200, 2)):
+        triangle = samples.triangle[row, column]
+        corners = points[triangles[triangle]]
+        share = np.linalg.solve(np.vstack([corners[:, :2].T, np.ones(3)]), [column + 0.5, row + 0.5, 1.0])
+        normal = share @ normals[triangles[triangle]]
+        towards = float(normal @ light) / np.linalg.norm(normal)
+        if normal[2] < 0.0:
+            wanted = (0.25 * colours[triangle] + 0.75 * np.array(back)) * (0.62 + 0.25 * max(-towards, 0.0))
+        else:
+            wanted = colours[triangle] * (0.55 + 0.50 * max(towards, 0.0))
+        np.testing.assert_allclose(pixels[row, column, :3], 255.0 * np.clip(wanted, 0.0, 1.0), atol=0.6)
+    assert {bool(n) for n in normals[triangles].mean(axis=1)[samples.triangle, 2].ravel() < 0.0} == {True, False}
+
+
+def test_a_triangle_lit_by_its_own_normal_has_one_colour() -> None:
+    points, triangles, _ = lit_mesh()
+    samples = rasterise(points, triangles, (40, 40))
+    own = np.tile([0.0, 0.0, 3.0], (len(triangles), 1))
+    face = np.zeros(len(triangles), dtype=np.int32)
+    look = {"face": face, "normals": own, "blended": False}
+    pixels = shade(samples, 2, points, triangles, np.array([[0.2, 0.4, 0.6]]), **look)
+    assert pixels.shape == (20, 20, 4)
+    np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([54, 107, 161, 255], (400, 1)))
 
 
 def test_samples_are_averaged_over_what_is_covered() -> None:
-    colours = np.zeros((2, 4, 3))
-    colours[:, :2] = 1.0
-    covered = np.array([[True, False, True, True], [False, False, True, True]])
-    pixels = reduce_samples(colours, covered, 2)
-    np.testing.assert_allclose(pixels, [[[1, 1, 1, 0.25], [0, 0, 0, 1]]])
+    front = np.full((4, 4), -1, dtype=np.int64)
+    front[:2] = [[0, -1, 1, 1], [-1, -1, 1, 1]]
+    front[2:] = [[0, 1, -1, -1], [0, 1, -1, -1]]
+    samples = Samples(front=front, back=0.0, step=1.0)
+    corners = np.zeros((3, 3)), np.array([[0, 1, 2], [0, 1, 2]], dtype=np.int32)
+    colours = np.array([[0.2, 0.4, 0.6], [1.0, 0.0, 0.0]])
+    pixels = shade(samples, 2, *corners, colours, face=np.array([0, 1], dtype=np.int32))
+    mixed_up = [[[51, 102, 153, 64], [255, 0, 0, 255]], [[153, 51, 77, 255], [0, 0, 0, 0]]]
+    np.testing.assert_allclose(pixels.astype(int), mixed_up, atol=1)
+
+
+@pytest.mark.parametrize("shape", [(1, 1), (70, 33), (32, 5)])
+def test_a_png_holds_the_pixels_its_resolution_and_who_wrote_it(tmp_path: Path, shape: tuple[int, int]) -> None:
+    from PIL import Image
+
+    rng = np.random.default_rng(6)
+    given = rng.integers(0, 256, (*shape, 4), dtype=np.uint8)
+    (tmp_path / "a.png").write_bytes(png_bytes(given[..., :3], dots_per_inch=150, text={"Software": "warpflat"}))
+    with Image.open(tmp_path / "a.png") as image:
+        assert image.mode == "RGB"
+        assert image.info["dpi"] == pytest.approx((150, 150), abs=0.1)
+        assert image.info["Software"] == "warpflat"
+        np.testing.assert_array_equal(np.asarray(image), given[..., :3])
 
 
 def test_outline_is_the_border_with_holes_and_cracks() -> None:

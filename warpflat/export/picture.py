@@ -14,6 +14,7 @@ from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.picture_page import DPI, PAGE_WIDTH, TOP_MARGIN, Pen, Row, draw_colour_bar, draw_row, lay_out
+from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import facets_of, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
@@ -87,9 +88,9 @@ def write_picture(
     for row in rows:
         draw_row(pen, row, top, scale)
         top -= row.height
-    draw_colour_bar(pen, figure, rows[0], scale, density, areas, quantity)
+    draw_colour_bar(pen, rows[0], scale, density, areas, quantity)
     with atomic_path(path) as temporary:
-        figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": "warpflat"})
+        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def _prepared(piece: PicturePiece) -> Row:

@@ -24,10 +24,14 @@ _BESIDE = 0.75  # right of the pattern, for labels
 _BELOW = 0.95  # a row's foot: the width's dimension line and the scale bar
 _SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
 _COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
+_BAR_WIDTH = 0.2
+_BAR_TIP = 0.05  # of its length, for what lies above the scale
 _SHORTEST_GRAIN = 0.28  # half its length
 _GREY = (0.36, 0.38, 0.42)
 _GRAIN = (0.02, 0.27, 0.66)
 _LABEL_SIZE = 8.5  # [pt]
+_TICK_SIZE = 8.5  # [pt]
+_POINT = 1.0 / 72.0  # [in]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -68,6 +72,7 @@ class Pen:
 
     def __init__(self, renderer: Any) -> None:
         self._renderer = renderer
+        self._measured: dict[tuple[str, float, str], tuple[float, float]] = {}
         self.axes: Any = None
         self.page_height = 0.0
 
@@ -84,9 +89,12 @@ class Pen:
         """Width and height of a line of text [in] at a size [pt]."""
         from matplotlib.font_manager import FontProperties
 
-        font = FontProperties(size=size, weight=weight)
-        width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
-        return width / DPI, height / DPI
+        key = (text, size, weight)
+        if key not in self._measured:
+            font = FontProperties(size=size, weight=weight)
+            width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
+            self._measured[key] = width / DPI, height / DPI
+        return self._measured[key]
 
     def write(self, x: float, y: float, text: str, size: float, *, halo: bool = False, **options: Any) -> None:
         """A text; with a halo it stays legible over colours and lines."""
@@ -101,11 +109,13 @@ class Pen:
         self, points: NDArray[np.float64], *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
     ) -> None:
         """A polyline (#N by 2); with a halo it stays visible on dark colours."""
+        from matplotlib.lines import Line2D
+
+        x, y = points.T
         if halo:
-            self.axes.plot(
-                points[:, 0], points[:, 1], color=(1.0, 1.0, 1.0, 0.7), linewidth=width + 1.6, zorder=HALO_LAYER
-            )
-        self.axes.plot(points[:, 0], points[:, 1], color=colour, linewidth=width, linestyle=style, zorder=5)
+            below: dict[str, Any] = {"color": (1.0, 1.0, 1.0, 0.7), "linewidth": width + 1.6, "zorder": HALO_LAYER}
+            self.axes.add_artist(Line2D(x, y, **below))
+        self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, linestyle=style, zorder=5))
 
     def arrow(self, ends: NDArray[np.float64], *, width: float, colour: Any, head: float, halo: bool = False) -> None:
         """A straight line (2 by 2) with a filled head at either end."""
@@ -207,17 +217,18 @@ def _feature_lines(
 ) -> list[str]:
     """Draw the lines of a view with their names, and return the names for which there was no room."""
     unnamed = []
+    stretches = {}
     for name, parts in drawn.view.lines.items():
         is_datum = name == datum
         style = (0, (9, 2.5, 2, 2.5)) if is_datum else "-"
-        for part in parts:
-            points = drawn.visible_line(part)
+        visible = [drawn.visible_line(part) for part in parts]
+        stretches[name] = max(visible, key=_length_of)
+        for part, points in zip(parts, visible, strict=True):
             if drawn.view.vectors is None or is_datum:
                 if len(points) > 1:
                     pen.line(points, width=1.3, colour=_GRAIN if is_datum else INK, style=style, halo=True)
             else:
                 drawn.draw_segments(pen.axes, np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True, zorder=5)
-    stretches = {name: _longest_visible(drawn, parts) for name, parts in drawn.view.lines.items()}
     for name, points in stretches.items():
         if len(points) < 2:
             continue
@@ -241,11 +252,9 @@ def _feature_lines(
     return unnamed
 
 
-def _longest_visible(drawn: DrawnView, parts: Sequence[NDArray[np.int32]]) -> NDArray[np.float64]:
-    """#N by 2 [in], of all parts of a line the longest stretch that can be seen."""
-    return max(
-        map(drawn.visible_line, parts), key=lambda line: float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    )
+def _length_of(line: NDArray[np.float64]) -> float:
+    """The length of a polyline (#N by 2) [in]."""
+    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _grain(
@@ -368,7 +377,6 @@ def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: fl
 
 def draw_colour_bar(
     pen: Pen,
-    figure: Any,
     row: Row,
     scale: float,
     density: NDArray[np.float64],
@@ -376,27 +384,58 @@ def draw_colour_bar(
     quantity: str,
 ) -> None:
     """The colour bar beside the first row, and what lies above its end."""
-    from matplotlib.cm import ScalarMappable
-    from matplotlib.colors import ListedColormap, Normalize
+    from matplotlib.patches import Polygon
+
+    from warpflat.export.picture_pixels import Pixels
 
     above = density > scale
     tall = float(np.clip(row.band, *_COLOUR_BAR))
     top = pen.page_height - TOP_MARGIN - row.head - max(0.0, 0.5 * (row.band - tall))
     left, bottom = PAGE_WIDTH - _RIGHT + 0.45, max(top - tall, 0.75)
-    box = (left / PAGE_WIDTH, bottom / pen.page_height, 0.2 / PAGE_WIDTH, (top - bottom) / pen.page_height)
-    colours = ListedColormap(energy_colours((np.arange(256) + 0.5) / 256, 1.0))
-    mapping = ScalarMappable(norm=Normalize(0.0, scale), cmap=colours)
-    bar = figure.colorbar(mapping, cax=figure.add_axes(box), extend="max" if above.any() else "neither")
-    bar.set_label(f"{quantity} [J/m²]", fontsize=9.5, color=INK, labelpad=6)
-    bar.ax.tick_params(labelsize=8.5, width=0.6, length=3)
-    bar.ax.yaxis.get_offset_text().set_fontsize(8)
-    bar.formatter.set_powerlimits((-3, 4))
-    bar.outline.set_linewidth(0.6)
+    right = left + _BAR_WIDTH
+    end = bottom + (top - bottom) / (1.0 + _BAR_TIP) if above.any() else top
+    first, last = round(bottom * DPI), round(end * DPI)
+    shades = energy_colours((np.arange(last - first)[::-1, None] + 0.5) / (last - first), 1.0)
+    strip = np.full((last - first, round(_BAR_WIDTH * DPI), 4), 255, dtype=np.uint8)
+    strip[..., :3] = np.round(255.0 * shades)
+    pen.axes.add_artist(Pixels(strip, left=round(left * DPI), bottom=first, zorder=1))
+    outline = [(left, bottom), (right, bottom), (right, end), (left, end)]
+    if above.any():
+        tip = (0.5 * (left + right), top)
+        # From a pixel further down, so that no white shows between.
+        corners = [(left, end - 1.0 / DPI), (right, end - 1.0 / DPI), (right, end), tip, (left, end)]
+        pen.axes.add_patch(Polygon(corners, facecolor=energy_colours([1.0], 1.0)[0], linewidth=0, zorder=1))
+        outline.insert(3, tip)
+    pen.axes.add_patch(Polygon(outline, fill=False, edgecolor="black", linewidth=0.6, zorder=6))
+    places, words, power = _ticks(scale, end - bottom)
+    for place, word in zip(bottom + (end - bottom) * places / scale, words, strict=True):
+        pen.line(np.array([(right, place), (right + 3 * _POINT, place)]), width=0.6, colour="black")
+        pen.write(right + 6.5 * _POINT, place, word, _TICK_SIZE, color="black", va="center_baseline")
+    if power:
+        pen.write(left, top + 3 * _POINT, power, 8, color="black", va="bottom")
+    wide = max(pen.measure(word, _TICK_SIZE)[0] for word in words)
+    aside: dict[str, Any] = {"rotation": 90, "rotation_mode": "anchor", "ha": "center", "va": "top"}
+    pen.write(right + 12.5 * _POINT + wide, 0.5 * (bottom + end), f"{quantity} [J/m²]", 9.5, **aside)
     total = float(areas.sum())
     if above.any() and total > 0.0:
         share = float(areas[above].sum()) / total
         text = f"clipped: {_percent(share)} of the\narea is above, up to\n{density.max():.3g} J/m²"
         pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=_GREY, va="top", linespacing=1.35)
+
+
+def _ticks(scale: float, length: float) -> tuple[NDArray[np.float64], list[str], str]:
+    """Round values from 0 to `scale` for a bar of this length [in], as words, and the power of ten that these leave out."""
+    from matplotlib.ticker import MaxNLocator, ScalarFormatter
+
+    most = int(np.clip(length / (2.0 * _TICK_SIZE * _POINT), 1, 9))
+    values = np.asarray(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, scale))
+    values = values[values <= scale * (1.0 + 1e-9)]
+    formatter: Any = ScalarFormatter()
+    formatter.create_dummy_axis()
+    formatter.axis.set_view_interval(0.0, scale)
+    formatter.set_powerlimits((-3, 4))
+    words = formatter.format_ticks(values)
+    return values, words, formatter.get_offset()
 
 
 def _percent(share: float) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
-from warpflat.export.raster import Samples, interpolate, rasterise, reduce_samples
+from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import triangulate
 
@@ -20,8 +20,8 @@ __all__ = ["DrawnView", "Facets", "View", "facets_of", "pattern_view", "surface_
 _FINE = 500_000  # triangles, about as many as pixels: from here on smooth light and smooth edges show no difference
 _SEGMENTS_TO_A_PATH = 500
 _MARGIN = 3  # pixels around the image of a mesh
-_LIGHT = np.array([-0.42, 0.55, 0.72]) / np.linalg.norm([-0.42, 0.55, 0.72])  # right, up, towards the viewer
-_BACK = np.array([0.80, 0.80, 0.79])
+_LIGHT = (-0.42, 0.55, 0.72)  # where it comes from: right, up, towards the viewer
+_BACK = (0.80, 0.80, 0.79)
 INK = (0.10, 0.11, 0.14)
 HALO_LAYER = 3.5  # below the outline
 
@@ -161,10 +161,10 @@ class DrawnView:
 
     def draw(self, axes: Any, face_colours: NDArray[np.float64]) -> None:
         """The coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
-        margin = _MARGIN / self._dpi
-        left, bottom = self.left - margin, self.bottom - margin
-        extent = (left, left + self._columns / self._dpi, bottom, bottom + self._rows / self._dpi)
-        axes.imshow(self._image(face_colours), extent=extent, interpolation="nearest", aspect="auto", zorder=1)
+        from warpflat.export.picture_pixels import Pixels
+
+        left, bottom = (round(place * self._dpi) - _MARGIN for place in (self.left, self.bottom))
+        axes.add_artist(Pixels(self._image(face_colours), left=left, bottom=bottom, zorder=1))
         self._draw_mesh(axes)
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
@@ -210,61 +210,27 @@ class DrawnView:
         return result
 
     def _image(self, face_colours: NDArray[np.float64]) -> NDArray[np.uint8]:
-        """#R by #C by 4, the pixels. One whose samples all show the same triangle is shaded once, others sample by sample."""
-        side = self._per_pixel
-        blocks = self._samples.triangle.reshape(self._rows, side, self._columns, side)
-        first = blocks[:, 0, :, 0]
-        alike = np.ones(first.shape, dtype=bool)
-        for i in range(side):
-            for j in range(side):
-                alike &= blocks[:, i, :, j] == first
-        pixels = np.zeros((self._rows, self._columns, 4), dtype=np.float32)
-        colours = face_colours[self.view.facets.face_of_triangle].astype(np.float32)
-        row, column = np.nonzero(alike & (first >= 0))
-        middle = np.column_stack([column + 0.5, row + 0.5]) * side
-        pixels[row, column, :3] = self._shaded(first[row, column], middle, colours)
-        pixels[row, column, 3] = 1.0
-        row, column = np.nonzero(~alike)
-        samples = blocks[row, :, column, :]
-        covered = samples >= 0
-        pixel, down, along = np.nonzero(covered)
-        spots = np.column_stack([column[pixel] * side + along + 0.5, row[pixel] * side + down + 0.5])
-        shaded = np.zeros((*samples.shape, 3), dtype=np.float32)
-        shaded[covered] = self._shaded(samples[covered], spots, colours)
-        across = (side, len(row) * side)
-        shaded, covered = shaded.transpose(1, 0, 2, 3).reshape(*across, 3), covered.transpose(1, 0, 2).reshape(across)
-        pixels[row, column] = reduce_samples(shaded, covered, side)[0]
-        return np.asarray(np.round(pixels * 255).astype(np.uint8))
+        """#R by #C by 4, the pixels, RGBA."""
+        facets = self.view.facets
+        return shade(
+            self._samples,
+            self._per_pixel,
+            self._grid,
+            facets.triangles,
+            face_colours,
+            face=facets.face_of_triangle,
+            normals=self._normals(),
+            blended=not self._fine,
+            light=_LIGHT,
+            back=_BACK,
+        )
 
-    def _shaded(
-        self, triangle: NDArray[np.int32], spots: NDArray[np.float64], colours: NDArray[np.float32]
-    ) -> NDArray[np.float32]:
-        """#S by 3, the colours (#T by 3) of triangles (#S) in the light at spots on them (#S by 2, column and row)."""
-        shown = colours[triangle]
-        if self.view.vectors is None:
-            return shown
-        normals = self._normals(triangle, spots)
-        lengths = np.sqrt(np.einsum("ij,ij->i", normals, normals))
-        towards = (normals @ _LIGHT.astype(np.float32)) / np.where(lengths > 0.0, lengths, 1.0)
-        behind = normals[:, 2] < 0.0
-        # The reverse of the cloth, seen through a neck or an armhole, is grey: the colours belong to its face.
-        shown[behind] = 0.25 * shown[behind] + 0.75 * _BACK.astype(np.float32)
-        lit = np.clip(np.where(behind, -towards, towards), 0.0, 1.0)
-        light = np.where(behind, np.float32(0.62), np.float32(0.55)) + np.where(behind, 0.25, 0.50) * lit
-        return np.asarray(np.clip(shown * light[:, None].astype(np.float32), 0.0, 1.0))
-
-    @cached_property
-    def _smooth(self) -> NDArray[np.float32]:
-        """#V by 3, the normals at the vertices."""
-        assert self.view.vectors is not None
-        return vertex_normals(self.view.vectors, self.view.facets.triangles, len(self.view.points)).astype(np.float32)
-
-    def _normals(self, triangle: NDArray[np.int32], spots: NDArray[np.float64]) -> NDArray[np.float32]:
-        """#S by 3, normals of any length at spots: blended, of a fine mesh each triangle's own."""
-        assert self.view.vectors is not None
-        if self._fine:
-            return self.view.vectors[triangle].astype(np.float32)
-        return interpolate(triangle, spots, self._grid, self.view.facets.triangles, self._smooth)
+    def _normals(self) -> NDArray[np.float64] | None:
+        """Of any length, at the vertices; of a fine mesh each triangle's own."""
+        vectors, facets = self.view.vectors, self.view.facets
+        if vectors is None or self._fine:
+            return vectors
+        return vertex_normals(vectors, facets.triangles, len(self.view.points))
 
     def _draw_mesh(self, axes: Any) -> None:
         faces = self.view.facets.faces
@@ -298,9 +264,9 @@ class DrawnView:
         """#N, whether points on the mesh (#N by 3, as samples) are in front, with room for the mesh's own slope."""
         if self.view.vectors is None:
             return np.ones(len(spots), dtype=bool)
-        rows, columns = self._samples.depth.shape
+        rows, columns = self._samples.triangle.shape
         row = np.clip(np.floor(spots[:, 1]).astype(int), 1, rows - 2)
         column = np.clip(np.floor(spots[:, 0]).astype(int), 1, columns - 2)
-        around = np.stack([self._samples.depth[row + i, column + j] for i in (-1, 0, 1) for j in (-1, 0, 1)])
-        tolerance = 0.01 * float(np.linalg.norm(self.view.size))
-        return np.asarray(spots[:, 2] >= around.min(axis=0) - tolerance)
+        around = np.arange(9)[:, None]
+        least = self._samples.depth_at(row + around // 3 - 1, column + around % 3 - 1).min(axis=0)
+        return np.asarray(spots[:, 2] >= least - 0.01 * float(np.linalg.norm(self.view.size)))

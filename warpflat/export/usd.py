@@ -36,6 +36,7 @@ from warpflat.export.usd_prims import (
     SampledLines,
     define_group,
     define_mesh,
+    extent_of,
     valid_name,
 )
 from warpflat.export.usd_validation import validate_usd
@@ -270,8 +271,8 @@ class FrameWriter:
 
         piece.frames += 1
         piece.last_density = density
-        piece.low = np.minimum(piece.low, flat.min(axis=0))
-        piece.high = np.maximum(piece.high, flat.max(axis=0))
+        low, high = extent_of(flat)
+        piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
         self._saved_now_and_then()
         return number
@@ -368,26 +369,11 @@ class FrameWriter:
                 attribute.SetCustomData(
                     {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
                 )
+        brushes = [_Brush(piece) for piece in shown]
         for number in range(_FIRST_FRAME, _FIRST_FRAME + max(piece.frames for piece in shown)):
-            for piece in shown:
-                if number < _FIRST_FRAME + piece.frames:
-                    self._colour_frame(piece, number, scale, table)
+            for brush in brushes:
+                brush.colour(number, scale, table)
             self._saved_now_and_then()
-
-    def _colour_frame(self, piece: _Piece, number: int, scale: float, table: NDArray[np.float32]) -> None:
-        from pxr import Vt
-
-        density = np.asarray(_density(piece.on_pattern).Get(number), dtype=np.float64)
-        face = np.nonzero(piece.surface.faces >= 0)[0].astype(np.int32)
-        done: tuple[int, NDArray[np.int32], Any] | None = None
-        for samples in (piece.on_surface, piece.on_pattern):
-            vertex = np.asarray(samples.mesh.GetFaceVertexIndicesAttr().Get(number))
-            size = len(samples.mesh.GetPointsAttr().Get(number))
-            if done is None or done[0] != size or not np.array_equal(done[1], vertex):
-                share = corner_average(density, piece.areas, face, vertex, size) / scale
-                step = np.clip(share * (_COLOUR_STEPS - 1) + 0.5, 0, _COLOUR_STEPS - 1).astype(np.int32)
-                done = (size, vertex, Vt.Vec3fArray.FromNumpy(table[step]))
-            samples.mesh.GetDisplayColorPrimvar().GetAttr().Set(done[2], number)
 
     def _author_defaults(self) -> None:
         """Give every sampled attribute its last value as default."""
@@ -399,6 +385,55 @@ class FrameWriter:
     def _cannot_write(self, error: Exception) -> InputError:
         reason = " ".join(str(error).split())[:200]
         return InputError(f"cannot write {self._final}: {reason or 'USD failed'} (folder still there? disk full?)")
+
+
+class _Brush:
+    """Colours a piece frame by frame; reads its topology only where that changes."""
+
+    def __init__(self, piece: _Piece) -> None:
+        self._piece = piece
+        own = piece.surface.faces
+        self._face = np.nonzero(own >= 0)[0].astype(np.int32)
+        self._surface = (own[own >= 0], len(piece.surface.vertices))
+        self._pattern = self._surface
+        pattern = piece.on_pattern.mesh
+        self._indices, self._points = pattern.GetFaceVertexIndicesAttr(), pattern.GetPointsAttr()
+        self._changes = set(self._indices.GetTimeSamples())
+        self._density = _density(piece.on_pattern)
+        self._on_surface, self._on_pattern = (
+            samples.mesh.GetDisplayColorPrimvar().GetAttr() for samples in (piece.on_surface, piece.on_pattern)
+        )
+
+    def colour(self, number: int, scale: float, table: NDArray[np.float32]) -> None:
+        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as the rows of `table`."""
+        if number >= _FIRST_FRAME + self._piece.frames:
+            return
+        if number in self._changes:
+            # Copies: what USD hands out may lie in the file, which grows.
+            vertex, size = np.array(self._indices.Get(number)), len(self._points.Get(number))
+            same = size == self._surface[1] and np.array_equal(vertex, self._surface[0])
+            self._pattern = self._surface if same else (vertex, size)
+        density = np.asarray(self._density.Get(number), dtype=np.float64)
+        colours = self._mixed(density, *self._surface, scale, table)
+        self._on_surface.Set(colours, number)
+        if self._pattern is not self._surface:
+            colours = self._mixed(density, *self._pattern, scale, table)
+        self._on_pattern.Set(colours, number)
+
+    def _mixed(
+        self,
+        density: NDArray[np.float64],
+        vertex: NDArray[np.int32],
+        size: int,
+        scale: float,
+        table: NDArray[np.float32],
+    ) -> Any:
+        """The colours of the vertices, of which there are `size`; `vertex` is that of each corner."""
+        from pxr import Vt
+
+        share = corner_average(density, self._piece.areas, self._face, vertex, size) / scale
+        step = np.clip(share * (len(table) - 1) + 0.5, 0, len(table) - 1).astype(np.int32)
+        return Vt.Vec3fArray.FromNumpy(table[step])
 
 
 def _density(samples: MeshSamples) -> Any:

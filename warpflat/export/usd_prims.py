@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.export.geometry import Polylines
 
-__all__ = ["MeshSamples", "SampledLines", "define_group", "define_mesh", "valid_name"]
+__all__ = ["MeshSamples", "SampledLines", "define_group", "define_mesh", "extent_of", "valid_name"]
 
 _CONSTANT = "constant"
 
@@ -67,9 +67,11 @@ def define_mesh(stage: Any, path: str, normals: NDArray[np.float64], *, per_face
     return mesh
 
 
-def extent_of(points: NDArray[np.float32], margin: float = 0.0) -> NDArray[np.float32]:
-    """2 by 3, the corners of the box around `points` (#P by 3) [m]."""
-    return np.array([points.min(axis=0) - margin, points.max(axis=0) + margin], dtype=np.float32)
+def extent_of(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
+    """2 by #D, the corners of the box around `points` (#P by #D) [m]."""
+    # By columns: NumPy takes ten times as long for all of them at once.
+    corners = np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
+    return np.asarray(corners + np.array([[-margin], [margin]], dtype=corners.dtype))
 
 
 class MeshSamples:
