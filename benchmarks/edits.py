@@ -52,7 +52,8 @@ def measure(name: str, run: Callable[[Look], Flattening], repeats: int) -> None:
 
 def flatten_with(mesh: Mesh, given: dict[str, Any], look: Look) -> Flattening:
     """From nothing."""
-    return warpflat.flatten(replace(mesh.surface), callback=look, **given)
+    surface = replace(mesh.surface, faces=mesh.surface.faces.copy())
+    return warpflat.flatten(surface, callback=look, **given)
 
 
 def change_with(start: Flattening, fabric: Fabric, look: Look) -> Flattening:

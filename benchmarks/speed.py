@@ -144,7 +144,7 @@ class Runner:
         for _ in range(self.repeats):
             looks: list[Look] = []
             # A surface of its own each time: nothing that the run before has worked out of it is given.
-            surface = replace(self.mesh.surface)
+            surface = replace(self.mesh.surface, faces=self.mesh.surface.faces.copy())
             begun = now()
 
             def look(at: Progress, begun: float = begun, looks: list[Look] = looks) -> None:

@@ -45,7 +45,7 @@ def test_a_smooth_layout_comes_back_sixteen_times_as_well_from_twice_as_many(cou
         layout = np.stack([u + 0.1 * np.sin(3.0 * v), v + 0.1 * np.cos(2.0 * u + v)], axis=-1)
         grid = np.arange(layout[..., 0].size, dtype=np.int32).reshape(layout.shape[:2])
         rows, columns = every_second(side + 4), every_second(side)
-        carry = GridCarry(space.reshape(-1, 3), grid, rows, columns)
+        carry = GridCarry(space.reshape(-1, 3), grid, (rows, columns))
         carried = carry(layout[np.ix_(rows, columns)].reshape(-1, 2))
         errors.append(np.abs(carried - layout.reshape(-1, 2)).max())
     assert errors[0] / errors[1] > 10
@@ -59,7 +59,7 @@ def test_any_numbering_of_the_grid_and_rows_of_any_width() -> None:
     space = in_space(np.cumsum(rng.uniform(0.5, 2.0, 12)), np.cumsum(rng.uniform(0.5, 2.0, 9)))
     vertices, layout = np.empty((grid.size, 3)), np.empty((grid.size, 2))
     vertices[grid], layout[grid] = space, space[..., :2]
-    carried = GridCarry(vertices, grid, rows, columns)(layout[grid[np.ix_(rows, columns)]].reshape(-1, 2))
+    carried = GridCarry(vertices, grid, (rows, columns))(layout[grid[np.ix_(rows, columns)]].reshape(-1, 2))
     np.testing.assert_allclose(carried, layout, atol=1e-12)
 
 
@@ -67,5 +67,5 @@ def test_rows_at_one_place_are_told_apart_by_number() -> None:
     space = in_space(np.linspace(0.0, 1.0, 7), np.array([0.0, 0.5, 0.5, 1.0, 1.5, 2.0, 2.5]))
     grid = np.arange(49, dtype=np.int32).reshape(7, 7)
     keep = every_second(7)
-    carried = GridCarry(space.reshape(-1, 3), grid, keep, keep)(np.ones((16, 2)))
+    carried = GridCarry(space.reshape(-1, 3), grid, (keep, keep))(np.ones((16, 2)))
     np.testing.assert_allclose(carried, 1.0, rtol=1e-12)

@@ -82,15 +82,15 @@ def _places(lines: FloatArray) -> FloatArray:
 class GridCarry:
     """From the layout of a coarser grid to that of the finer one."""
 
-    def __init__(self, vertices: FloatArray, grid: IntArray, rows: IntArray, columns: IntArray) -> None:
+    def __init__(self, vertices: FloatArray, grid: IntArray, keep: tuple[IntArray, IntArray]) -> None:
         """Of a grid.
 
         Args:
             vertices: #V by 3, the finer grid's, in space [m].
             grid: #rows by #columns, their numbers.
-            rows, columns: those that the coarser one keeps; its vertices are numbered row by row.
+            keep: rows and columns that the coarser one keeps; its vertices are numbered row by row.
         """
-        self._vertices, self._grid, self._keep = vertices, grid, (rows, columns)
+        self._vertices, self._grid, self._keep = vertices, grid, keep
 
     @cached_property
     def _cubics(self) -> tuple[Cubics, Cubics]:

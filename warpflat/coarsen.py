@@ -12,11 +12,10 @@ that stay are kept up to date. The triangles are made at the end, of those that 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import cached_property, partial
 from itertools import pairwise
 
 import numpy as np
@@ -27,9 +26,10 @@ from scipy.sparse import csr_array, eye, vstack
 from warpflat.carry import GridCarry, LatticeCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
-from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import triangulate
+from warpflat.thinning import Transfer, thinned_of
 
 __all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_meanwhile"]
 
@@ -50,8 +50,6 @@ _GOOD = 0.6
 _LEAST_QUALITIES = (0.3, 0.15)
 # Levels of a surface of more vertices are worth a thread of their own.
 _WORTH_A_THREAD = 5_000
-# Quads across the narrowest strip of a coarser lattice.
-_LEAST_QUADS = 2
 # Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
 _ROOM = 16
 
@@ -63,26 +61,21 @@ class Coarser:
     Attributes:
         surface: of the level; its vertices are the finer level's, without lines.
         kept: #C, the finer level's vertices that it has.
-        weigh: makes the prolongation, which grids seldom need.
+        transfer: weights by which layouts go up, and forces down.
         face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
         smooth_carry: of quads on a lattice, what carries layouts up by cubics.
     """
 
     surface: Surface
     kept: IntArray
-    weigh: Callable[[], csr_array]
+    transfer: Transfer
     face_of: IntArray
     smooth_carry: GridCarry | LatticeCarry | None = None
 
-    @cached_property
+    @property
     def prolongation(self) -> csr_array:
         """#V by #C, rows add up to 1."""
-        return self.weigh()
-
-    @cached_property
-    def restriction(self) -> csr_array:
-        """#C by #V, the prolongation's transpose."""
-        return csr_array(self.prolongation.T.tocsr())
+        return self.transfer.prolongation
 
 
 def is_coarsest(surface: Surface) -> bool:
@@ -98,11 +91,16 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
         layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either. Without,
             they are good on the body only.
     """
-    grid = rows_and_columns(surface)
-    if grid is not None:
-        return _every_second(surface, grid)
-    lattice = lattice_of(surface)
-    return (lattice and _every_other(surface, lattice)) or _collapsed(surface, layout)
+    thinned = thinned_of(surface)
+    if thinned is not None:
+        return Coarser(
+            surface=_part(surface, thinned.kept, thinned.faces),
+            kept=thinned.kept,
+            transfer=thinned.transfer,
+            face_of=thinned.face_of,
+            smooth_carry=thinned.carry(surface.vertices),
+        )
+    return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
 
 
 @once_per_surface
@@ -140,138 +138,11 @@ def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surfa
     vertices = surface.vertices[kept]
     return Surface(
         vertices=vertices,
-        faces=faces.astype(np.int32),
+        faces=faces.astype(np.int32, copy=False),
         name=surface.name,
         input_vertices=vertices,
         input_index=np.arange(len(kept), dtype=np.int32),
     )
-
-
-# --- rectangular grids
-
-
-def _every_second(surface: Surface, grid: IntArray) -> Coarser | None:
-    """Every second row and column, and the last ones; between them linear by index."""
-    rows, columns = grid.shape
-    if min(rows, columns) < 5:
-        return None
-    keep = [_second(rows), _second(columns)]
-    kept = grid[np.ix_(*keep)]
-    number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
-    faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
-    return Coarser(
-        surface=_part(surface, kept.ravel(), faces),
-        kept=kept.ravel(),
-        weigh=partial(_bilinear, grid, keep),
-        face_of=_some_face(surface, kept[:-1, :-1].ravel()),
-        smooth_carry=GridCarry(surface.vertices, grid, keep[0], keep[1]),
-    )
-
-
-def _bilinear(grid: IntArray, keep: Sequence[IntArray]) -> csr_array:
-    """#V by #kept, a grid's values from those at the rows and columns kept, by the four around each vertex."""
-    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
-    height, width = map(len, keep)
-    parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
-    for k, (i, j) in enumerate(np.ndindex(2, 2)):
-        parents[grid, k] = np.add.outer(row[:, i] * width, column[:, j])
-        weights[grid, k] = np.multiply.outer(row_share[:, i], column_share[:, j])
-    offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
-    prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
-    prolongation.eliminate_zeros()
-    return prolongation
-
-
-def _second(count: int) -> IntArray:
-    """Every second of so many, and the last; of an even number the last step goes over three, since a thin row of quads would be
-    stiffer than its cloth along it."""
-    return np.append(np.arange(0, count - 3 + count % 2, 2), count - 1).astype(np.int32)
-
-
-def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
-    """#count by 2, of each index the places in `keep` before and after, and their shares, linear by index."""
-    index = np.arange(count, dtype=np.int32)
-    place = np.minimum(index // 2, len(keep) - 2)
-    share = (index - keep[place]) / (keep[place + 1] - keep[place])
-    return np.column_stack([place, place + 1]), np.column_stack([1.0 - share, share])
-
-
-def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
-    """For each of a grid's vertices a face that has it."""
-    face = np.empty(len(surface.vertices), dtype=np.int32)
-    face[surface.faces] = np.arange(len(surface.faces), dtype=np.int32)[:, None]
-    return face[vertices]
-
-
-# --- quads on any other lattice
-
-
-def _every_other(surface: Surface, lattice: Lattice) -> Coarser | None:
-    """Every second row and column between those in which the border turns, which all stay; None where too little would go, or a
-    strip between two of them would be a single quad wide, which bends several times as stiffly as its cloth."""
-    keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
-    for line, lines in zip((lattice.row, lattice.column), keep, strict=True):
-        if np.diff(np.searchsorted(lines, np.unique(line[lattice.bends]))).min() < _LEAST_QUADS:
-            return None
-    places = lattice.face_row, lattice.face_column
-    block_row, block_column = (
-        np.searchsorted(lines, place, side="right") - 1 for lines, place in zip(keep, places, strict=True)
-    )
-    # The faces at the corners of each block between kept lines.
-    width = len(keep[1])
-    block = block_row * width + block_column
-    first = [place == lines[at] for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)]
-    last = [
-        place == lines[at + 1] - 1 for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)
-    ]
-    at_corner = np.full((4, len(keep[0]) * width), -1, dtype=np.int32)
-    for k, (up, right) in enumerate(((first, first), (first, last), (last, last), (last, first))):
-        here = np.flatnonzero(up[0] & right[1])
-        at_corner[k, block[here]] = here
-    blocks = np.flatnonzero(at_corner[0] >= 0)
-    at_corner = at_corner[:, blocks]
-    corners = np.stack([lattice.corner[at_corner[k], k] for k in range(4)], axis=1)
-    kept = np.unique(corners)
-    count = len(surface.vertices)
-    if len(kept) > (1.0 - _LEAST_GAIN) * count:
-        return None
-    number = np.full(count, -1, dtype=np.int32)
-    number[kept] = np.arange(len(kept), dtype=np.int32)
-    return Coarser(
-        surface=_part(surface, kept, number[corners]),
-        kept=kept,
-        weigh=partial(_between_corners, lattice, keep, block, blocks, number[corners]),
-        face_of=at_corner[0],
-        smooth_carry=LatticeCarry(surface.vertices, lattice, keep),
-    )
-
-
-def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
-    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second."""
-    fixed = np.unique(line[bends])
-    between = [begin + _second(end - begin + 1) for begin, end in pairwise(fixed.tolist())]
-    return np.unique(np.concatenate([fixed, *between])).astype(np.int32)
-
-
-def _between_corners(
-    lattice: Lattice, keep: Sequence[IntArray], block: IntArray, blocks: NDArray[np.integer], corners: IntArray
-) -> csr_array:
-    """#V by #C, linear by index along rows and columns between the corners of the block that a vertex lies in."""
-    count = len(lattice.row)
-    face = np.empty(count, dtype=np.int32)
-    face[lattice.corner] = np.arange(len(block), dtype=np.int32)[:, None]
-    number = np.empty(int(blocks.max()) + 1, dtype=np.int32)
-    number[blocks] = np.arange(len(blocks), dtype=np.int32)
-    shares = []
-    for line, lines, at in zip((lattice.row, lattice.column), keep, np.divmod(block[face], len(keep[1])), strict=True):
-        share = (line - lines[at]) / (lines[at + 1] - lines[at])
-        shares.append((1.0 - share, share))
-    weights = np.stack([shares[0][up] * shares[1][right] for up, right in ((0, 0), (0, 1), (1, 1), (1, 0))], axis=1)
-    offset = np.arange(0, 4 * count + 1, 4, dtype=np.int32)
-    size = int(corners.max()) + 1
-    prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
-    prolongation.eliminate_zeros()
-    return prolongation
 
 
 # --- any other mesh
@@ -314,7 +185,7 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     return Coarser(
         surface=_part(surface, kept, np.column_stack([corners, np.full(len(corners), -1)])),
         kept=kept,
-        weigh=lambda: prolongation,
+        transfer=Transfer(lambda: prolongation),
         face_of=face[whole],
     )
 

@@ -191,7 +191,7 @@ class Levels:
         ids = np.concatenate([step.kept + at for step, at in zip(steps, first, strict=False)])
         kept = wp.array(ids, dtype=wp.int32, device=device)
         prolongation = _weights([step.prolongation for step in steps], device)
-        restriction = _weights([step.restriction for step in steps], device)
+        restriction = _weights([step.transfer.restriction for step in steps], device)
         base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
         difference = wp.zeros(c, dtype=wp.vec2d, device=device)
         return _Way(

@@ -50,7 +50,7 @@ from warpflat.kernels.stiffness import (
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
-from warpflat.surface.mesh import Surface, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.topology import (
     corner_triangles,
     half_edges_of,
@@ -181,12 +181,18 @@ def _creases_of(surface: Surface) -> NDArray[np.int8]:
 @once_per_surface
 def cells_of(surface: Surface) -> CellArrays:
     """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
-    corner, face, weight = corner_triangles(surface.faces)
     edges, area = lay_cells(surface.vertices, surface.faces, _creases_of(surface), _first_of(surface, 4, 1))
+    corner, face, weight, around = _corners_of(surface)
+    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area, around=around))
+
+
+@once_per_faces
+def _corners_of(surface: Surface) -> tuple[IntArray, IntArray, FloatArray, ByVertex]:
+    """Corners, faces and weights of the cells, and the corners around each vertex."""
+    corner, face, weight = corner_triangles(surface.faces)
     if len(weight) and (weight == weight[0]).all():
         weight = np.broadcast_to(weight[0], weight.shape)
-    around = _corners_at(corner, len(surface.vertices))
-    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area, around=around))
+    return corner, face, weight, _corners_at(corner, len(surface.vertices))
 
 
 def _first_of(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
@@ -203,23 +209,29 @@ def _corners_at(corner: IntArray, count: int) -> ByVertex:
 
 @once_per_surface
 def _unweighed(surface: Surface) -> _Unweighed:
-    vertices, edges = surface.vertices, half_edges_of(surface).edges
+    vertices, edge_count = surface.vertices, len(half_edges_of(surface).edges)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=_creases_of(surface))
-    corner = rows_of(surface.faces, surface.is_quad)
-    ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
+    ends, around = _ends_of(surface)
     rest_length = np.empty(len(ends))
-    rest_length[len(edges) :] = diagonal.T.ravel()
-    launch_each(measure_edges, len(edges), [vertices, ends], [rest_length])
-    around = _springs_at(ends, len(vertices))
+    rest_length[edge_count:] = diagonal.T.ravel()
+    launch_each(measure_edges, edge_count, [vertices, ends], [rest_length])
     return read_only(
         _Unweighed(
             ends=ends,
             rest_length=rest_length,
-            edge_count=len(edges),
+            edge_count=edge_count,
             around=around,
             listed_length=np.take(rest_length, around.entry),
         )
     )
+
+
+@once_per_faces
+def _ends_of(surface: Surface) -> tuple[IntArray, SpringsAround]:
+    """#S by 2, the ends of the springs, edges first, then diagonals; and the springs around each vertex."""
+    corner = rows_of(surface.faces, surface.is_quad)
+    ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
+    return ends, _springs_at(ends, len(surface.vertices))
 
 
 def _springs_at(ends: IntArray, count: int) -> SpringsAround:

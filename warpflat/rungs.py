@@ -13,6 +13,7 @@ from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
 from warpflat.network import SpringNetwork, cells_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import signed_cell_areas, untangle
+from warpflat.thinning import Transfer
 
 __all__ = ["Rung", "far_below", "rungs_of", "stay"]
 
@@ -130,6 +131,6 @@ def stay(surface: Surface) -> Coarser:
     return Coarser(
         surface=surface,
         kept=every,
-        weigh=lambda: csr_array(eye(len(every), format="csr")),
+        transfer=Transfer(lambda: csr_array(eye(len(every), format="csr"))),
         face_of=np.arange(len(surface.faces), dtype=np.int32),
     )

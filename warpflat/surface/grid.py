@@ -9,7 +9,7 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.kernels.lattice import number_faces
-from warpflat.surface.mesh import Surface, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.topology import half_edges_of, twins_of
 
 __all__ = ["Lattice", "lattice_of", "rows_and_columns"]
@@ -40,7 +40,7 @@ class Lattice:
     bends: BoolArray
 
 
-@once_per_surface
+@once_per_faces
 def lattice_of(surface: Surface) -> Lattice | None:
     """Rows and columns of a mesh, None where it has none: triangles, inner vertices of three or five faces, tubes, or a piece that
     overlaps itself on the lattice."""
@@ -86,7 +86,7 @@ def lattice_of(surface: Surface) -> Lattice | None:
     )
 
 
-@once_per_surface
+@once_per_faces
 def rows_and_columns(surface: Surface) -> IntArray | None:
     """#rows by #columns vertices of a rectangular grid of quads, else None."""
     faces, count = surface.faces, len(surface.vertices)

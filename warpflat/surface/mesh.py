@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
-from typing import TypeVar
+from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "once_per_surface", "read_only"]
+__all__ = ["Surface", "once_per_faces", "once_per_surface", "read_only"]
 
 Result = TypeVar("Result")
 
@@ -30,6 +30,7 @@ class Surface:
         input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it.
         input_index: #V, for each vertex its row in `input_vertices`.
         notes: what was mended on the way in, one sentence each.
+        of_faces: what has been worked out of the faces (see `once_per_faces`).
     """
 
     vertices: NDArray[np.float64]
@@ -39,6 +40,11 @@ class Surface:
     input_vertices: NDArray[np.float64]
     input_index: NDArray[np.int32]
     notes: tuple[str, ...] = ()
+    of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Without what can be worked out again."""
+        return {**vars(self), "of_faces": {}}
 
     @property
     def is_quad(self) -> NDArray[np.bool_]:
@@ -55,6 +61,25 @@ def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface]
         if surface not in known:
             known[surface] = measure(surface)
         return known[surface]
+
+    return remembered
+
+
+def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
+    """The same of what the places of the vertices do not change: a surface that was made from another by `dataclasses.replace`, with the
+    same array of faces, has its results too."""
+    name = f"{measure.__module__}.{measure.__qualname__}"
+
+    @wraps(measure)
+    def remembered(surface: Surface) -> Result:
+        known = surface.of_faces
+        if known.get("faces") is not surface.faces:
+            known = {"faces": surface.faces}
+            object.__setattr__(surface, "of_faces", known)
+        if name not in known:
+            known[name] = measure(surface)
+        result: Result = known[name]
+        return result
 
     return remembered
 

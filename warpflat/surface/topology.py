@@ -8,6 +8,7 @@ may have any number of faces, so the same functions serve to check a mesh at the
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
@@ -16,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError
 from warpflat.kernels.surface_cells import unfold_diagonals
 from warpflat.launching import launch_each
-from warpflat.surface.mesh import Surface, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, once_per_faces, read_only
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -55,6 +56,7 @@ class HalfEdges:
     """Every side of every face, in the order of the faces: half-edge h runs from corner h to the next of its face.
 
     Attributes:
+        faces: #F by 4.
         tail, head: #H, the vertices it runs from and to.
         face: #H, the face it bounds.
         slot: #H, the column of `tail` in that face.
@@ -64,14 +66,48 @@ class HalfEdges:
         count: #E, how many faces lie at each edge.
     """
 
-    tail: NDArray[np.int32]
-    head: NDArray[np.int32]
-    face: NDArray[np.int32]
-    slot: NDArray[np.int32]
-    next: NDArray[np.int32]
+    faces: NDArray[np.int32]
     edge: NDArray[np.int32]
     edges: NDArray[np.int32]
     count: NDArray[np.int32]
+
+    # What follows from the faces is made when it is first asked for: together it takes twice the memory of the rest.
+
+    @cached_property
+    def tail(self) -> NDArray[np.int32]:
+        """#H."""
+        return _fixed(_sides_of(self.faces)[0])
+
+    @cached_property
+    def head(self) -> NDArray[np.int32]:
+        """#H."""
+        return _fixed(_sides_of(self.faces)[1])
+
+    @cached_property
+    def face(self) -> NDArray[np.int32]:
+        """#H."""
+        return _fixed(np.repeat(np.arange(len(self.faces), dtype=np.int32), _side_counts(self.faces)))
+
+    @cached_property
+    def slot(self) -> NDArray[np.int32]:
+        """#H."""
+        slots = np.broadcast_to(np.arange(4, dtype=np.int32), self.faces.shape)
+        return _fixed(slots[self.faces >= 0])
+
+    @cached_property
+    def next(self) -> NDArray[np.int32]:
+        """#H."""
+        sides = _side_counts(self.faces)
+        follow = np.arange(1, len(self.edge) + 1, dtype=np.int32)
+        follow[np.cumsum(sides) - 1] -= sides
+        return _fixed(follow)
+
+
+def _fixed(values: NDArray[np.int32]) -> NDArray[np.int32]:
+    """A view that is not to be written to: what is asked for twice is the same."""
+    view = values.view()
+    view.flags.writeable = False
+    return view
 
 
 def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
@@ -88,9 +124,7 @@ def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
 def half_edges(faces: ArrayLike) -> HalfEdges:
     """The sides of all faces with their unique edges: what the other functions here are built on."""
     quads = _four_columns(faces)
-    sides, tail, head, slot = _sides_of(quads)
-    follow = np.arange(1, len(tail) + 1, dtype=np.int32)
-    follow[np.cumsum(sides) - 1] -= sides
+    tail, head = _sides_of(quads)
     low, high = np.minimum(tail, head), np.maximum(tail, head)
     digits = int(high.max(initial=0)).bit_length()
     joined = low.astype(np.int64)
@@ -106,18 +140,14 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
     edges = np.empty((len(begin), 2), dtype=np.int32)
     edges[:, 0], edges[:, 1] = keys[begin] >> digits, keys[begin] & ((1 << digits) - 1)
     return HalfEdges(
-        tail=tail,
-        head=head,
-        face=np.repeat(np.arange(len(quads), dtype=np.int32), sides),
-        slot=slot,
-        next=follow,
+        faces=quads.view(),
         edge=edge,
         edges=edges,
         count=np.diff(begin, append=len(tail)).astype(np.int32),
     )
 
 
-@once_per_surface
+@once_per_faces
 def half_edges_of(surface: Surface) -> HalfEdges:
     """The sides of the surface's faces, worked out once."""
     return read_only(half_edges(surface.faces))
@@ -130,22 +160,22 @@ def twins_of(he: HalfEdges) -> NDArray[np.int64]:
     return np.where(he.count[he.edge] == 2, both[he.edge] - here, -1)
 
 
-def _sides_of(
-    quads: NDArray[np.int32],
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
-    """#F, how many sides each face has; and #H each, tail, head and slot of them all."""
+def _side_counts(quads: NDArray[np.int32]) -> NDArray[np.int32]:
+    """#F, how many sides each face has."""
+    return 3 + (quads[:, 3] >= 0).astype(np.int32)
+
+
+def _sides_of(quads: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    """#H each, tail and head of every side."""
     is_quad = quads[:, 3] >= 0
     for sides, only in ((4, is_quad.all()), (3, not is_quad.any())):
         if only:
             corner = quads[:, :sides]
-            slot = np.tile(np.arange(sides, dtype=np.int32), len(quads))
-            after = np.take(quads, np.roll(np.arange(sides), -1), axis=1)
-            return np.full(len(quads), sides, dtype=np.int32), corner.ravel(), after.ravel(), slot
+            return corner.ravel(), np.take(quads, np.roll(np.arange(sides), -1), axis=1).ravel()
     there = quads >= 0
     after = quads[:, [1, 2, 3, 0]]
     after[~is_quad, 2] = quads[~is_quad, 0]
-    slots = np.broadcast_to(np.arange(4, dtype=np.int32), quads.shape)
-    return 3 + is_quad.astype(np.int32), quads[there], after[there], slots[there]
+    return quads[there], after[there]
 
 
 def rows_of(array: NDArray[Number], chosen: NDArray[np.bool_]) -> NDArray[Number]:
@@ -253,7 +283,7 @@ def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) ->
     return _components(half_edges(faces), len(_four_columns(faces)), barrier)
 
 
-@once_per_surface
+@once_per_faces
 def components_of(surface: Surface) -> NDArray[np.int32]:
     """`components` of the surface's faces, worked out once."""
     return _components(half_edges_of(surface), len(surface.faces), None)

@@ -1,0 +1,203 @@
+"""Quads on a lattice with fewer rows and columns: all that the faces alone tell of the next coarser level.
+
+A rectangular grid keeps every second row and column, any other lattice those too in which its border turns, at corners and at the tips
+of cracks: then between two kept rows and two kept columns there is cloth everywhere or nowhere. Surfaces that differ only in where their
+vertices lie, such as the sizes of a pattern, share what is worked out here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.sparse import csr_array
+
+from warpflat.carry import GridCarry, LatticeCarry
+from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
+from warpflat.surface.mesh import Surface, once_per_faces
+
+__all__ = ["Thinned", "Transfer", "thinned_of"]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+BoolArray = NDArray[np.bool_]
+
+# Quads across the narrowest strip of a coarser lattice: a single one bends several times as stiffly as its cloth.
+_LEAST_QUADS = 2
+# A level of a lattice with more than this share of the finer one's vertices is not worth having.
+_MOST_LEFT = 0.7
+
+
+class Transfer:
+    """Weights between a level and a coarser one, made when they are first asked for."""
+
+    def __init__(self, weigh: Callable[[], csr_array]) -> None:
+        """Of a function that makes the prolongation."""
+        self._weigh = weigh
+
+    @cached_property
+    def prolongation(self) -> csr_array:
+        """#V by #C, rows add up to 1."""
+        return self._weigh()
+
+    @cached_property
+    def restriction(self) -> csr_array:
+        """#C by #V, the prolongation's transpose."""
+        return csr_array(self.prolongation.T.tocsr())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Thinned:
+    """The next coarser level of a lattice.
+
+    Attributes:
+        kept: #C, the finer level's vertices that it has.
+        faces: #G by 4, among these.
+        face_of: #G, for each of them one of the finer level's that lies in it.
+        transfer: linear by index.
+        carry: of the finer level's vertices (#V by 3 [m]), what carries layouts up by cubics.
+    """
+
+    kept: IntArray
+    faces: IntArray
+    face_of: IntArray
+    transfer: Transfer
+    carry: Callable[[FloatArray], GridCarry | LatticeCarry]
+
+
+@once_per_faces
+def thinned_of(surface: Surface) -> Thinned | None:
+    """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having."""
+    grid = rows_and_columns(surface)
+    if grid is not None:
+        return _every_second(surface, grid)
+    lattice = lattice_of(surface)
+    return None if lattice is None else _every_other(lattice)
+
+
+def _every_second(surface: Surface, grid: IntArray) -> Thinned | None:
+    """Every second row and column, and the last ones; between them linear by index."""
+    rows, columns = grid.shape
+    if min(rows, columns) < 5:
+        return None
+    keep = _second(rows), _second(columns)
+    kept = grid[np.ix_(*keep)]
+    number = np.arange(kept.size, dtype=np.int32).reshape(kept.shape)
+    faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
+    return Thinned(
+        kept=kept.ravel(),
+        faces=faces,
+        face_of=_some_face(surface, kept[:-1, :-1].ravel()),
+        transfer=Transfer(lambda: _bilinear(grid, keep)),
+        carry=lambda vertices: GridCarry(vertices, grid, keep),
+    )
+
+
+def _bilinear(grid: IntArray, keep: tuple[IntArray, IntArray]) -> csr_array:
+    """#V by #kept, a grid's values from those at the rows and columns kept, by the four around each vertex."""
+    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
+    height, width = map(len, keep)
+    parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
+    for k, (i, j) in enumerate(np.ndindex(2, 2)):
+        parents[grid, k] = np.add.outer(row[:, i] * width, column[:, j])
+        weights[grid, k] = np.multiply.outer(row_share[:, i], column_share[:, j])
+    offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
+    prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
+    prolongation.eliminate_zeros()
+    prolongation.prune()
+    return prolongation
+
+
+def _second(count: int) -> IntArray:
+    """Every second of so many, and the last; of an even number the last step goes over three, since a thin row of quads would be
+    stiffer than its cloth along it."""
+    return np.append(np.arange(0, count - 3 + count % 2, 2), count - 1).astype(np.int32)
+
+
+def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
+    """#count by 2, of each index the places in `keep` before and after, and their shares, linear by index."""
+    index = np.arange(count, dtype=np.int32)
+    place = np.minimum(index // 2, len(keep) - 2)
+    share = (index - keep[place]) / (keep[place + 1] - keep[place])
+    return np.column_stack([place, place + 1]), np.column_stack([1.0 - share, share])
+
+
+def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
+    """For each of a grid's vertices a face that has it."""
+    face = np.empty(len(surface.vertices), dtype=np.int32)
+    face[surface.faces] = np.arange(len(surface.faces), dtype=np.int32)[:, None]
+    return face[vertices]
+
+
+def _every_other(lattice: Lattice) -> Thinned | None:
+    """Every second row and column between those in which the border turns, which all stay; None where too little would go, or a
+    strip between two of them would be a single quad wide, which bends several times as stiffly as its cloth."""
+    keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
+    for line, lines in zip((lattice.row, lattice.column), keep, strict=True):
+        if np.diff(np.searchsorted(lines, np.unique(line[lattice.bends]))).min() < _LEAST_QUADS:
+            return None
+    places = lattice.face_row, lattice.face_column
+    block_row, block_column = (
+        np.searchsorted(lines, place, side="right") - 1 for lines, place in zip(keep, places, strict=True)
+    )
+    # The faces at the corners of each block between kept lines.
+    width = len(keep[1])
+    block = block_row * width + block_column
+    first = [place == lines[at] for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)]
+    last = [
+        place == lines[at + 1] - 1 for place, lines, at in zip(places, keep, (block_row, block_column), strict=True)
+    ]
+    at_corner = np.full((4, len(keep[0]) * width), -1, dtype=np.int32)
+    for k, (up, right) in enumerate(((first, first), (first, last), (last, last), (last, first))):
+        here = np.flatnonzero(up[0] & right[1])
+        at_corner[k, block[here]] = here
+    blocks = np.flatnonzero(at_corner[0] >= 0)
+    at_corner = at_corner[:, blocks]
+    corners = np.stack([lattice.corner[at_corner[k], k] for k in range(4)], axis=1)
+    kept = np.unique(corners)
+    count = len(lattice.row)
+    if len(kept) > _MOST_LEFT * count:
+        return None
+    number = np.full(count, -1, dtype=np.int32)
+    number[kept] = np.arange(len(kept), dtype=np.int32)
+    faces = number[corners]
+    return Thinned(
+        kept=kept,
+        faces=faces,
+        face_of=at_corner[0],
+        transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
+        carry=lambda vertices: LatticeCarry(vertices, lattice, keep),
+    )
+
+
+def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
+    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second."""
+    fixed = np.unique(line[bends])
+    between = [begin + _second(end - begin + 1) for begin, end in pairwise(fixed.tolist())]
+    return np.unique(np.concatenate([fixed, *between])).astype(np.int32)
+
+
+def _between_corners(
+    lattice: Lattice, keep: tuple[IntArray, IntArray], block: IntArray, blocks: NDArray[np.integer], corners: IntArray
+) -> csr_array:
+    """#V by #C, linear by index along rows and columns between the corners of the block that a vertex lies in."""
+    count = len(lattice.row)
+    face = np.empty(count, dtype=np.int32)
+    face[lattice.corner] = np.arange(len(block), dtype=np.int32)[:, None]
+    number = np.empty(int(blocks.max()) + 1, dtype=np.int32)
+    number[blocks] = np.arange(len(blocks), dtype=np.int32)
+    shares = []
+    for line, lines, at in zip((lattice.row, lattice.column), keep, np.divmod(block[face], len(keep[1])), strict=True):
+        share = (line - lines[at]) / (lines[at + 1] - lines[at])
+        shares.append((1.0 - share, share))
+    weights = np.stack([shares[0][up] * shares[1][right] for up, right in ((0, 0), (0, 1), (1, 1), (1, 0))], axis=1)
+    offset = np.arange(0, 4 * count + 1, 4, dtype=np.int32)
+    size = int(corners.max()) + 1
+    prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
+    prolongation.eliminate_zeros()
+    prolongation.prune()
+    return prolongation
