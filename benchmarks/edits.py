@@ -1,9 +1,9 @@
-"""An edit against a fresh start: another fabric, and a cut, on pieces that lie relaxed.
+"""An edit against a fresh start: another fabric, a moved surface and a cut, on pieces that lie relaxed.
 
     OMP_NUM_THREADS=1 python benchmarks/edits.py [--sizes 10000] [--shapes dome bodice] [--kinds grid irregular]
 
 Milliseconds until the energy is within 0.1 % of where the edit ends, and until it has come to rest; the fastest of several. A cut runs
-from the middle of the lower edge up to half of the height of a grid.
+from the middle of the lower edge up to half of the height of a grid; what has moved is a line across the middle, outwards by 5 mm.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ import warpflat
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, Progress
+from warpflat.surface import Surface
 
 Look = Callable[[Progress], None]
 
@@ -61,6 +62,22 @@ def change_with(start: Flattening, fabric: Fabric, look: Look) -> Flattening:
     return warpflat.change_fabric(start, fabric, callback=look)
 
 
+def move_with(start: Flattening, surface: Surface, look: Look) -> Flattening:
+    """A line that has moved."""
+    # As if read anew each time.
+    return warpflat.change_surface(start, replace(surface, faces=surface.faces.copy(), of_faces={}), callback=look)
+
+
+def bulged(surface: Surface) -> Surface:
+    """The surface with the middle of its height 5 mm further out."""
+    y = surface.vertices[:, 1]
+    middle, height = 0.5 * (y.min() + y.max()), np.ptp(y)
+    away = surface.vertices * np.array([1.0, 0.0, 1.0])
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    vertices = surface.vertices + 0.005 * np.exp(-((8.0 * (y - middle) / height) ** 2))[:, None] * away
+    return replace(surface, vertices=vertices)
+
+
 def cut_with(start: Flattening, plan: CutPlan, look: Look) -> Flattening:
     """A cut."""
     return cut(start, plan, callback=look)
@@ -87,6 +104,7 @@ def main() -> None:
                 line = partial(measure, repeats=chosen.repeats)
                 line("flattened afresh", partial(flatten_with, mesh, given))
                 line("another fabric", partial(change_with, start, other))
+                line("a line moved", partial(move_with, start, bulged(mesh.surface)))
                 if kind == "grid":
                     side = round(count**0.5)
                     path = np.arange(count, dtype=np.int32).reshape(side, side)[: side // 2, side // 3]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, levels_meanwhile
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, inherit_levels, is_coarsest, levels_meanwhile
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
@@ -316,3 +317,27 @@ def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
         np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
     with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70)):
         _ = 1 / 0
+
+
+@pytest.mark.parametrize("kind", ["triangles", "grid", "crack"])
+def test_levels_are_inherited_by_a_surface_that_has_moved(kind: str, monkeypatch):
+    surface = make_shape("bodice", resolution=41, triangles=kind == "triangles")
+    if kind == "crack":
+        column = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:23, 8]
+        cut = cut_along(surface.faces, column, vertex_count=len(surface.vertices))
+        surface = make_surface(surface.vertices[cut.vertex_origin], cut.faces)
+    steps = coarser_surfaces(surface)
+    assert len(steps) > 1
+    moved = replace(surface, vertices=surface.vertices * np.array([1.1, 1.0, 0.9]), faces=surface.faces)
+    inherit_levels(moved, surface)
+    # Nothing is collapsed again.
+    monkeypatch.setattr("warpflat.coarsen._collapsed", None)
+    inherited = coarser_surfaces(moved)
+    assert len(inherited) == len(steps)
+    fine = moved
+    for mine, step in zip(inherited, steps, strict=True):
+        np.testing.assert_array_equal(mine.surface.vertices, fine.vertices[step.kept])
+        np.testing.assert_array_equal(mine.surface.faces, step.surface.faces)
+        assert mine.transfer is step.transfer
+        assert (mine.smooth_carry is None) == (step.smooth_carry is None)
+        fine = mine.surface

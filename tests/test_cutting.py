@@ -14,8 +14,9 @@ from numpy.typing import NDArray
 import warpflat
 from warpflat.candidates import find_candidates, find_peaks
 from warpflat.cutting import CutPlan, cut, draw_line, line_part, move_dart, refine_along, separate
+from warpflat.edits import relax_cut
 from warpflat.errors import InputError
-from warpflat.flattening import Flattening, Progress, relax_cut
+from warpflat.flattening import Flattening, Progress
 from warpflat.ledger import AutoCut, cut_automatically, make_ledger
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions

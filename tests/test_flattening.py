@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
@@ -18,7 +17,7 @@ import warpflat
 from warpflat.compare import laid_upon
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric
-from warpflat.flattening import Flattening, Progress, change_fabric, flatten
+from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.relax import RelaxOptions
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, border_edges, make_surface, mesh_edges
@@ -185,27 +184,6 @@ def test_a_cylinder_keeps_its_pattern_whatever_the_cloth_and_its_grain(triangles
         piece = flatten(surface, fabric=cloth(50.0, weft=300.0), datum="centre", grain_angle=grain_angle, device="cpu")
         assert piece.converged
         assert piece.measures["length_error"] < 1e-6
-
-
-@pytest.mark.parametrize("triangles", [False, True])
-def test_changing_the_fabric_gives_what_flattening_in_it_gives(triangles: bool):
-    surface = make_shape("bodice", resolution=33, triangles=triangles)
-    first = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
-    stages: list[str] = []
-    fabric = replace(cloth(250.0), name="softer cloth")
-    changed = change_fabric(first, fabric, callback=lambda at: stages.append(at.stage))
-    fresh = flatten(surface, fabric=fabric, datum="centre", device="cpu")
-    assert changed.converged
-    assert changed.flipped_faces == 0
-    assert changed.fabric is fabric
-    assert changed.stages[:-1] == first.stages
-    assert changed.stages[-1].name == "fabric:softer cloth"
-    assert set(stages) == {"fabric:softer cloth"}
-    energies = [piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j for piece in (changed, fresh, first)]
-    assert energies[0] == pytest.approx(energies[1], rel=1e-3)
-    assert energies[0] < 0.95 * energies[2]
-    with pytest.raises(InputError, match="fabric"):
-        change_fabric(first, "no such cloth")
 
 
 def test_on_the_bias_the_same_piece_takes_another_shape():

@@ -14,9 +14,10 @@ from warpflat._version import __version__
 
 if TYPE_CHECKING:
     from warpflat.batch import flatten_all
+    from warpflat.edits import change_fabric, change_surface
     from warpflat.errors import InputError
     from warpflat.fabric import Fabric, find_fabric, load_library
-    from warpflat.flattening import Flattening, Progress, change_fabric, flatten
+    from warpflat.flattening import Flattening, Progress, flatten
     from warpflat.relax import RelaxOptions
     from warpflat.surface import Surface, make_surface, read_surface
 
@@ -32,7 +33,8 @@ _HOME = {
     "Progress": "flattening",
     "RelaxOptions": "relax",
     "Surface": "surface",
-    "change_fabric": "flattening",
+    "change_fabric": "edits",
+    "change_surface": "edits",
     "find_fabric": "fabric",
     "flatten": "flattening",
     "flatten_all": "batch",
@@ -50,6 +52,7 @@ __all__ = [
     "Surface",
     "__version__",
     "change_fabric",
+    "change_surface",
     "find_fabric",
     "flatten",
     "flatten_all",

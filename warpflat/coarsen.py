@@ -15,8 +15,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
@@ -31,7 +33,7 @@ from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import triangulate
 from warpflat.thinning import Transfer, thinned_of
 
-__all__ = ["Coarser", "coarser", "coarser_surfaces", "is_coarsest", "levels_meanwhile"]
+__all__ = ["Coarser", "coarser", "coarser_surfaces", "inherit_levels", "is_coarsest", "levels_meanwhile"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -94,7 +96,7 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     thinned = thinned_of(surface)
     if thinned is not None:
         return Coarser(
-            surface=_part(surface, thinned.kept, thinned.faces),
+            surface=_part(surface, thinned.kept, thinned.faces, thinned.of_faces),
             kept=thinned.kept,
             transfer=thinned.transfer,
             face_of=thinned.face_of,
@@ -103,9 +105,27 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
 
 
+_inherited: WeakKeyDictionary[Surface, Coarser] = WeakKeyDictionary()
+
+
 @once_per_surface
 def _next(surface: Surface) -> Coarser | None:
-    return coarser(surface)
+    return _inherited.pop(surface, None) or coarser(surface)
+
+
+def inherit_levels(surface: Surface, other: Surface) -> None:
+    """Let a surface have the coarser levels of another one of the same faces, whose vertices do not lie far from its own."""
+    for step in coarser_surfaces(other):
+        mine = replace(step, surface=_part(surface, step.kept, step.surface.faces, step.surface.of_faces))
+        if step.smooth_carry is None:
+            _inherited[surface] = mine
+        else:
+            # Lattices share what their faces tell anyway.
+            following = _next(surface)
+            if following is None:
+                return
+            mine = following
+        surface = mine.surface
 
 
 @once_per_surface
@@ -133,8 +153,10 @@ def levels_meanwhile(surface: Surface) -> Iterator[None]:
         made.result()
 
 
-def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surface:
-    """The surface with these vertices and faces (numbered among the kept)."""
+def _part(
+    surface: Surface, kept: IntArray, faces: NDArray[np.integer], of_faces: dict[str, Any] | None = None
+) -> Surface:
+    """The surface with these vertices and faces (numbered among the kept), and what is known of the faces."""
     vertices = surface.vertices[kept]
     return Surface(
         vertices=vertices,
@@ -142,6 +164,7 @@ def _part(surface: Surface, kept: IntArray, faces: NDArray[np.integer]) -> Surfa
         name=surface.name,
         input_vertices=vertices,
         input_index=np.arange(len(kept), dtype=np.int32),
+        of_faces={} if of_faces is None else of_faces,
     )
 
 

@@ -17,14 +17,16 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.darts import AppliedCut, seam_kind
 from warpflat.develop import choose_datum, develop
+from warpflat.edits import relax_cut
 from warpflat.errors import InputError, nearest
-from warpflat.flattening import Flattening, Progress, relax_cut
+from warpflat.flattening import Flattening, Progress
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.strain import strain_energy
 from warpflat.surface.cut import Cut, Seam, cut_along_many
 from warpflat.surface.dart import dart_measure
 from warpflat.surface.mesh import Surface
+from warpflat.surface.paths import path_length
 from warpflat.surface.pieces import Piece, apply_cut, split_pieces
 from warpflat.surface.split import split_faces_along
 from warpflat.surface.topology import mesh_edges
@@ -40,7 +42,6 @@ __all__ = [
     "draw_line",
     "line_part",
     "move_dart",
-    "path_length",
     "refine_along",
     "replace_paths",
     "separate",
@@ -65,12 +66,6 @@ class CutPlan:
     name: str
     paths: tuple[IntArray, ...]
     tip_back: float = 0.0
-
-
-def path_length(surface: Surface, paths: Sequence[ArrayLike]) -> float:
-    """Length of paths together [m]."""
-    steps = [np.diff(surface.vertices[np.asarray(path)], axis=0) for path in paths]
-    return float(sum(np.linalg.norm(step, axis=1).sum() for step in steps))
 
 
 def line_part(surface: Surface, name: str, part: tuple[float, float] = (0.0, 1.0)) -> IntArray:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,13 +27,12 @@ from warpflat.running import Relaxed, Run, relax_runs
 from warpflat.strain import WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, line_from_indices, read_surface
-from warpflat.surface.topology import components_of
 from warpflat.tightness import Wear, WornFit, assess_fit
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
 
-__all__ = ["Flattening", "Progress", "Stage", "change_fabric", "flatten", "relax_cut"]
+__all__ = ["Flattening", "Progress", "Stage", "flatten"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -362,92 +361,6 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
         history=np.array(run.history),
         notes=(*run.surface.notes, *piece.notes, *development.notes, *run.notes),
         wear=run.wear,
-    )
-
-
-def relax_cut(
-    result: Flattening,
-    surface: Surface,
-    positions: FloatArray,
-    *,
-    stage: str,
-    cuts: Sequence[AppliedCut],
-    options: RelaxOptions,
-    callback: Callable[[Progress], None] | None = None,
-) -> Flattening:
-    """Go on from a layout of a piece whose topology has changed; `warpflat.cutting.cut` makes such.
-
-    Args:
-        result: of the piece before.
-        surface: `result.surface` with vertices doubled (#P), of which the first keep their numbers.
-        positions: #P by 2, where to go on from [m].
-        stage: what it is called in the history.
-        cuts: all that `surface` has.
-        options: of the relaxation.
-        callback: called with a `Progress` before the first step and after every step.
-    """
-    run = _later_run(result, surface, result.fabric, stage, options, callback)
-    # What opens turns, and its threads with it.
-    return replace(_gone_on(result, run, positions, measure_again=run.directions_matter()), cuts=tuple(cuts))
-
-
-def change_fabric(
-    result: Flattening,
-    fabric: Fabric | str,
-    *,
-    relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
-) -> Flattening:
-    """The same piece in another cloth, relaxed from where it lies: a fraction of what `flatten` takes.
-
-    Args:
-        result: the piece, with the cuts it has; it stays as it is.
-        fabric: a `Fabric`, or a name of the library.
-        relax: options of the relaxation.
-        callback: called with a `Progress` before the first step and after every step; the stage is "fabric:NAME".
-
-    Raises:
-        InputError: an unknown fabric or an option out of its bounds.
-    """
-    cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
-    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", relax or RelaxOptions(), callback)
-    return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
-
-
-def _later_run(
-    result: Flattening,
-    surface: Surface,
-    fabric: Fabric,
-    stage: str,
-    options: RelaxOptions,
-    callback: Callable[[Progress], None] | None,
-) -> Run:
-    """A run that goes on from a result."""
-    options.validate()
-    datum = result.datum
-    if surface is not result.surface:
-        # A cut may part the datum: then the first part of it stays upright.
-        part = components_of(surface)
-        part_of = np.full(len(surface.vertices), -1)
-        used = surface.faces >= 0
-        part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
-        datum = datum[part_of[datum] == part_of[datum[0]]]
-    device, model = result.network.device, result.network.model
-    return Run(
-        surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
-    )
-
-
-def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
-    """The result of a run from a layout, with what it adds to the history."""
-    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[measure_again])
-    return replace(
-        result,
-        network=end.network,
-        positions=end.positions,
-        stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
-        history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
-        notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
     )
 
 

@@ -10,12 +10,14 @@ from typing import Any, Literal
 import numpy as np
 
 from warpflat.candidates import Candidate, Peaks, find_candidates, find_peaks
-from warpflat.cutting import CutPlan, cut, path_length, refine_along
+from warpflat.cutting import CutPlan, cut, refine_along
 from warpflat.darts import seam_kind
+from warpflat.edits import relax_cut
 from warpflat.errors import InputError
-from warpflat.flattening import Flattening, Progress, relax_cut
+from warpflat.flattening import Flattening, Progress
 from warpflat.relax import RelaxOptions
 from warpflat.surface.dart import dart_measure, fish_eye_measure
+from warpflat.surface.paths import path_length
 
 __all__ = ["AutoCut", "Ledger", "LedgerEntry", "RankedBy", "coarse", "cut_automatically", "evaluate", "make_ledger"]
 

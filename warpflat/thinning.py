@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -67,6 +68,11 @@ class Thinned:
     face_of: IntArray
     transfer: Transfer
     carry: Callable[[FloatArray], GridCarry | LatticeCarry]
+
+    @cached_property
+    def of_faces(self) -> dict[str, Any]:
+        """Room for what is worked out of the faces (`warpflat.surface.mesh.once_per_faces`), for all surfaces that have them."""
+        return {"faces": self.faces}
 
 
 @once_per_faces

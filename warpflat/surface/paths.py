@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,7 +15,7 @@ from warpflat.surface.topology import half_edges_of, mesh_edges
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-__all__ = ["EdgeGraph", "as_vertex", "chain_positions"]
+__all__ = ["EdgeGraph", "as_vertex", "chain_positions", "path_length"]
 
 # A point given by coordinates must lie this close to the piece: as a share of its diagonal, or in edge lengths.
 _NEAR_SHARE = 0.1
@@ -130,3 +131,9 @@ def _by_index(surface: Surface, place: object, as_read: bool) -> int:
 def chain_positions(points: NDArray[np.float64]) -> NDArray[np.float64]:
     """#P, the arc length [m] at each point of a polyline."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def path_length(surface: Surface, paths: Sequence[ArrayLike]) -> float:
+    """Length of paths together [m]."""
+    steps = [np.diff(surface.vertices[np.asarray(path)], axis=0) for path in paths]
+    return float(sum(np.linalg.norm(step, axis=1).sum() for step in steps))

@@ -1,0 +1,91 @@
+"""Another fabric, and a surface that has moved: the minimum that flattening afresh finds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpflat.cutting import CutPlan, cut
+from warpflat.edits import change_fabric, change_surface
+from warpflat.errors import InputError
+from warpflat.fabric import Fabric
+from warpflat.flattening import Flattening, flatten
+from warpflat.shapes import make_shape
+from warpflat.surface import Surface
+from warpflat.surface.topology import half_edges_of
+
+
+def cloth(shear: float) -> Fabric:
+    return Fabric(name="cloth", stiffness_warp=1000.0, stiffness_weft=1000.0, shear_stiffness=shear, areal_density=0.15)
+
+
+def minimum(piece: Flattening) -> float:
+    return piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j
+
+
+def moved(surface: Surface) -> Surface:
+    """The bust 5 mm higher and fuller, as a feature line that was moved would have it; read anew, so with faces of its own."""
+    x, y, z = surface.vertices.T
+    bump = np.exp(-(((y - 0.28) / 0.05) ** 2))
+    vertices = np.column_stack([x * (1.0 + 0.03 * bump), y + 0.005 * bump, z * (1.0 + 0.05 * bump)])
+    return replace(
+        surface, vertices=vertices, input_vertices=vertices, name="fuller", faces=surface.faces.copy(), of_faces={}
+    )
+
+
+@pytest.mark.parametrize("triangles", [False, True])
+def test_changing_the_fabric_gives_what_flattening_in_it_gives(triangles: bool):
+    surface = make_shape("bodice", resolution=33, triangles=triangles)
+    first = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
+    stages: list[str] = []
+    fabric = replace(cloth(250.0), name="softer cloth")
+    changed = change_fabric(first, fabric, callback=lambda at: stages.append(at.stage))
+    fresh = flatten(surface, fabric=fabric, datum="centre", device="cpu")
+    assert changed.converged
+    assert changed.flipped_faces == 0
+    assert changed.fabric is fabric
+    assert changed.stages[:-1] == first.stages
+    assert changed.stages[-1].name == "fabric:softer cloth"
+    assert set(stages) == {"fabric:softer cloth"}
+    energies = [piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j for piece in (changed, fresh, first)]
+    assert energies[0] == pytest.approx(energies[1], rel=1e-3)
+    assert energies[0] < 0.95 * energies[2]
+    with pytest.raises(InputError, match="fabric"):
+        change_fabric(first, "no such cloth")
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+@pytest.mark.parametrize("with_cut", [False, True], ids=["whole", "cut"])
+def test_a_moved_surface_gives_what_flattening_it_afresh_gives(triangles: bool, with_cut: bool):
+    surface = make_shape("bodice", resolution=33, triangles=triangles)
+    plan = CutPlan(name="dart", paths=(np.arange(33 * 33, dtype=np.int32).reshape(33, 33)[:14, 10],))
+    given = {"fabric": cloth(200.0), "datum": "centre", "device": "cpu"}
+    first = flatten(surface, **given)
+    first = cut(first, plan) if with_cut else first
+    other, stages = moved(surface), set[str]()
+    after = change_surface(first, other, callback=lambda at: stages.add(at.stage))
+    fresh = flatten(other, **given)
+    fresh = cut(fresh, plan) if with_cut else fresh
+    assert after.converged
+    assert after.flipped_faces == 0
+    assert stages == {"surface:fuller"}
+    assert after.stages[:-1] == first.stages
+    # On triangles stiffnesses are of the directions in which they were measured last: here closer to where the piece ends.
+    assert minimum(after) == pytest.approx(minimum(fresh), rel=3e-3 if triangles else 1e-3)
+    assert abs(minimum(after) / minimum(first) - 1.0) > 0.1
+    np.testing.assert_array_equal(after.surface.vertices, other.vertices)
+    np.testing.assert_array_equal(after.network.surface.vertices, fresh.network.surface.vertices)
+    assert [made.length for made in after.cuts] == [made.length for made in fresh.cuts]
+    # What the faces alone tell is not worked out again, and nothing of the first result has changed.
+    assert half_edges_of(after.network.surface) is half_edges_of(first.network.surface)
+    assert first.surface is surface
+    assert first.network.surface.vertices is not after.network.surface.vertices
+
+
+def test_another_mesh_is_refused():
+    first = flatten(make_shape("dome", resolution=9), datum="centre", device="cpu")
+    for other in (make_shape("dome", resolution=11), make_shape("dome", resolution=9, triangles=True)):
+        with pytest.raises(InputError, match=r"another mesh .* flatten it afresh"):
+            change_surface(first, other)

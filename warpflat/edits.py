@@ -1,0 +1,163 @@
+"""Edits of a pattern: another fabric, a surface that has moved, a cut; relaxed on from where the piece lies.
+
+An edit takes a fraction of what `flatten` takes: the piece is not developed again, what its faces tell is known already, and it lies near
+its new minimum, or is carried there from its coarser levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.coarsen import inherit_levels
+from warpflat.darts import AppliedCut
+from warpflat.errors import InputError
+from warpflat.fabric import Fabric, find_fabric
+from warpflat.flattening import Flattening
+from warpflat.progress import Progress
+from warpflat.relax import RelaxOptions
+from warpflat.running import Run, relax_runs
+from warpflat.surface import Surface
+from warpflat.surface.paths import path_length
+from warpflat.surface.topology import components_of
+
+__all__ = ["change_fabric", "change_surface", "relax_cut"]
+
+FloatArray = NDArray[np.float64]
+
+
+def change_fabric(
+    result: Flattening,
+    fabric: Fabric | str,
+    *,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """The same piece in another cloth, relaxed from where it lies: a fraction of what `flatten` takes.
+
+    Args:
+        result: the piece, with the cuts it has; it stays as it is.
+        fabric: a `Fabric`, or a name of the library.
+        relax: options of the relaxation.
+        callback: called with a `Progress` before the first step and after every step; the stage is "fabric:NAME".
+
+    Raises:
+        InputError: an unknown fabric or an option out of its bounds.
+    """
+    cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
+    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", relax or RelaxOptions(), callback)
+    return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
+
+
+def change_surface(
+    result: Flattening,
+    surface: Surface,
+    *,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """The same piece with its vertices elsewhere, relaxed from where it lies: after a feature line has been moved, or in another size.
+
+    Args:
+        result: the piece, with the cuts it has; it stays as it is.
+        surface: the same mesh, uncut, faces and all in the same order; its vertices may lie anywhere.
+        relax: options of the relaxation.
+        callback: called with a `Progress` before the first step and after every step; the stage is "surface:NAME".
+
+    Returns:
+        The piece on that surface, with the same cuts. Its development stays that of the surface before.
+
+    Raises:
+        InputError: the mesh is another one, or an option out of its bounds.
+    """
+    before = result.surface
+    if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
+        raise InputError(
+            f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
+            f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
+        )
+    # What the faces tell is known of the ones before.
+    surface = replace(surface, faces=before.faces, of_faces=before.of_faces)
+    cut = result.network.surface
+    origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
+    origin[cut.faces[used]] = before.faces[used]
+    moved = surface
+    if cut is not before:
+        moved = replace(
+            cut,
+            vertices=surface.vertices[origin],
+            name=surface.name,
+            input_vertices=surface.input_vertices,
+            input_index=surface.input_index[origin],
+        )
+    inherit_levels(moved, cut)
+    run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", relax or RelaxOptions(), callback)
+    cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
+    gone_on = _gone_on(result, run, result.positions, measure_again=run.directions_matter())
+    return replace(gone_on, surface=surface, cuts=cuts)
+
+
+def relax_cut(
+    result: Flattening,
+    surface: Surface,
+    positions: FloatArray,
+    *,
+    stage: str,
+    cuts: Sequence[AppliedCut],
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """Go on from a layout of a piece whose topology has changed; `warpflat.cutting.cut` makes such.
+
+    Args:
+        result: of the piece before.
+        surface: `result.surface` with vertices doubled (#P), of which the first keep their numbers.
+        positions: #P by 2, where to go on from [m].
+        stage: what it is called in the history.
+        cuts: all that `surface` has.
+        options: of the relaxation.
+        callback: called with a `Progress` before the first step and after every step.
+    """
+    run = _later_run(result, surface, result.fabric, stage, options, callback)
+    # What opens turns, and its threads with it.
+    return replace(_gone_on(result, run, positions, measure_again=run.directions_matter()), cuts=tuple(cuts))
+
+
+def _later_run(
+    result: Flattening,
+    surface: Surface,
+    fabric: Fabric,
+    stage: str,
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None,
+) -> Run:
+    """A run that goes on from a result."""
+    options.validate()
+    datum = result.datum
+    if surface is not result.surface:
+        # A cut may part the datum: then the first part of it stays upright.
+        part = components_of(surface)
+        part_of = np.full(len(surface.vertices), -1)
+        used = surface.faces >= 0
+        part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
+        datum = datum[part_of[datum] == part_of[datum[0]]]
+    device, model = result.network.device, result.network.model
+    return Run(
+        surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
+    )
+
+
+def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
+    """The result of a run from a layout, with what it adds to the history."""
+    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[measure_again])
+    return replace(
+        result,
+        network=end.network,
+        positions=end.positions,
+        stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
+        history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
+        notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
+    )
