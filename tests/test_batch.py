@@ -317,22 +317,20 @@ def test_pieces_that_leave_are_given_back():
     assert kept.last.total == whole.last.of([1]).total
 
 
-def test_pieces_of_another_pace_are_cycled_apart():
+def test_pieces_that_are_done_are_cycled_no_more():
     surfaces = [shape("dome", 13), shape("bodice", 13), shape("saddle", 13), shape("dome", 13, size=0.8)]
     parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device="cpu") for each in surfaces]
     start = np.concatenate([each.vertices[:, :2] for each in surfaces])
     state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
     state.begin()
-    cycles = _Cycles(state=state, levels=Levels(state), paces=[_Pace(steps=4) for _ in parts])
-    assert cycles.parts() == []
-    cycles.paces[1].steps = 8
-    assert [list(part.state.numbers) for part in cycles.parts()] == [[1], [0, 2, 3]]
-    cycles.paces[2].near = True
-    slow, others = cycles.parts()
-    assert [list(part.state.numbers) for part in (slow, others)] == [[1], [0, 3]]
-    assert others.paces == [cycles.paces[0], cycles.paces[3]]
-    assert others.levels.sizes[0] == others.state.network.vertex_count == 2 * 13**2
-    np.testing.assert_array_equal(others.state.positions(), start.reshape(4, -1, 2)[[0, 3]].reshape(-1, 2))
+    cycles = _Cycles(state=state, levels=Levels(state), paces=[_Pace() for _ in parts])
+    assert cycles.without_done() is None
+    cycles.paces[1].near = cycles.paces[2].near = True
+    left = cycles.without_done()
+    assert list(left.state.numbers) == [0, 3]
+    assert left.paces == [cycles.paces[0], cycles.paces[3]]
+    assert left.levels.sizes[0] == left.state.network.vertex_count == 2 * 13**2
+    np.testing.assert_array_equal(left.state.positions(), start.reshape(4, -1, 2)[[0, 3]].reshape(-1, 2))
 
 
 def test_what_is_cycled_apart_comes_to_the_same_minimum(monkeypatch: pytest.MonkeyPatch):

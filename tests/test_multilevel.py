@@ -113,6 +113,28 @@ def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     assert min(work for work, energy in seen if energy < 1.001 * minimum(done)) <= 60.0
 
 
+@pytest.mark.parametrize("kind", ["irregular", "split bodice", "crack near a border"])
+def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousandth(kind: str):
+    """The coarse corrections are of use once they have been smoothed, however much they strain the piece before."""
+    shear = 375.0 if kind == "crack near a border" else 10.0
+    surface = {
+        "irregular": lambda: irregular(2_500),
+        "split bodice": lambda: make_shape("bodice", resolution=51, triangles=True),
+        "crack near a border": lambda: cracked(51, column=5),
+    }[kind]()
+    done = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu")
+    works, energies = [], []
+    for solve in (relax, relax_multilevel):
+        seen: list[tuple[float, float]] = []
+        state = Relaxation(done.network, LEVELS, start=done.development.positions)
+        solve(state, watch=lambda now, energies, _, seen=seen: seen.append((now.work_units, energies.potential)))
+        assert not state.mirrored_pieces().any()
+        works.append(seen)
+        energies.append(seen[-1][1])
+    plain, levels = (next(work for work, energy in seen if energy < 1.001 * min(energies)) for seen in works)
+    assert levels <= 0.55 * plain
+
+
 def start_of(piece: Flattening) -> Relaxation:
     """Its relaxation, before the first step."""
     ends = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
@@ -127,7 +149,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
     for side, between in ((101, 0), (201, 10_201)):
         done = flatten(make_shape("bodice", resolution=side), fabric=cloth(375.0), datum="centre", device="cpu")
         state = start_of(done)
-        below = _carry_up(state, 4)
+        below = _carry_up(state)
         assert below is not None
         assert state.last.potential[0] < 1.001 * minimum(done)
         assert state.work_units < 12.0
@@ -144,7 +166,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
 def test_small_grids_and_triangles_rise_level_by_level():
     for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
         state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu"))
-        assert _carry_up(state, 4) is None
+        assert _carry_up(state) is None
 
 
 def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
@@ -153,7 +175,7 @@ def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
     state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
     before = state.begin()
-    assert _carry_up(state, 4) is None
+    assert _carry_up(state) is None
     np.testing.assert_array_equal(state.positions(), done.positions)
     assert state.last is before
     outcome = relax_multilevel(state)
@@ -161,9 +183,10 @@ def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     assert outcome.energies.potential <= minimum(done) * (1.0 + 1e-12)
 
 
-def test_a_cycle_never_raises_the_energy_and_mirrors_nothing():
-    surface = make_shape("bodice", resolution=33)
-    piece = flatten(surface, fabric=cloth(20.0), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+@pytest.mark.parametrize(("triangles", "shear"), [(False, 20.0), (True, 20.0), (True, 5.0)])
+def test_a_cycle_never_raises_the_energy_and_mirrors_nothing(triangles: bool, shear: float):
+    surface = make_shape("bodice", resolution=33, triangles=triangles)
+    piece = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
     state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
     energies = [state.energies().potential]
     relax_multilevel(state, watch=lambda s, e, r: energies.append(e.potential))
@@ -171,9 +194,10 @@ def test_a_cycle_never_raises_the_energy_and_mirrors_nothing():
     assert not state.mirrored_pieces().any()
 
 
-def test_from_near_the_minimum_little_work_is_left():
+@pytest.mark.parametrize(("shape", "triangles", "most"), [("bodice", False, 57.0), ("dome", True, 90.0)])
+def test_from_near_the_minimum_little_work_is_left(shape: str, triangles: bool, most: float):
     """A warmer cloth: the pattern of one fabric is the start of the next."""
-    surface = make_shape("bodice", resolution=33)
+    surface = make_shape(shape, resolution=33, triangles=triangles)
     first = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu")
     network = SpringNetwork.build(surface, cloth(180.0), first.positions, device="cpu")
     works = []
@@ -182,7 +206,7 @@ def test_from_near_the_minimum_little_work_is_left():
         outcome = relax_multilevel(state, nested=nested)
         assert outcome.converged
         works.append(outcome.work_units)
-    assert works[1] < 0.6 * works[0]
+    assert works[1] < min(most, 0.7 * works[0])
 
 
 def test_a_cut_goes_on_from_the_layout_that_is_there():

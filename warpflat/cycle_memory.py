@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["CycleMemory"]
+__all__ = ["CycleMemory", "Mark"]
 
 FloatArray = NDArray[np.float64]
 
@@ -13,37 +16,51 @@ FloatArray = NDArray[np.float64]
 _SOUND = 1e-3
 
 
+Mark = tuple[FloatArray, FloatArray]
+"""#V by 2, a layout [m], and the forces there [N]."""
+
+
 class CycleMemory:
-    """The last few cycles: how far they led, and how much the forces fell on the way. In the plane of these ways the energy is known,
-    to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
+    """The last few cycles: where they led, and how much the forces fell on the way. In the plane of these ways the energy is known, to
+    second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
 
     A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
     share with each cycle.
     """
 
     def __init__(self, depth: int) -> None:
-        """Of so many cycles."""
+        """Of so many cycles, besides the one that has just ended."""
         self._depth = depth
-        self._ways: list[FloatArray] = []
-        self._falls: list[FloatArray] = []
+        self._begin: Mark | None = None
+        self._past: list[Mark] = []
 
-    def lowest(self, begin: FloatArray, force: FloatArray, end: FloatArray, left: FloatArray) -> FloatArray | None:
-        """#V by 2, where the energy is least [m]; None where that cannot be told.
+    def lowest(self, marks: Sequence[Mark]) -> FloatArray | None:
+        """#V by 2, the way from where the last cycle has ended to where the energy is least [m]; None where that cannot be told.
 
         Args:
-            begin, end: #V by 2, of the last cycle [m].
-            force, left: #V by 2, forces at its begin and end [N].
+            marks: of the last cycle, its begin, where its parts have met, and its end: each part is a way of its own.
         """
-        self._ways.append((end - begin).ravel())
-        self._falls.append((force - left).ravel())
-        del self._ways[: -self._depth], self._falls[: -self._depth]
-        ways = np.stack(self._ways)
-        curvature = ways @ np.stack(self._falls).T
+        if self._begin is not None:
+            # A cycle before counts to where the next began: its leap is part of it, and holds what cycles before it have told.
+            self._past.append(_between(self._begin, marks[0]))
+            del self._past[: -self._depth]
+        self._begin = marks[0]
+        parts = [*self._past, *(_between(*ends) for ends in pairwise(marks))]
+        ways, falls = (np.stack([part[k].ravel() for part in parts]) for k in (0, 1))
+        moved = (ways != 0.0).any(axis=1)
+        ways, falls = ways[moved], falls[moved]
+        curvature = ways @ falls.T
         curvature = 0.5 * (curvature + curvature.T)
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not (size > 0.0).all():
             return None
+        left = marks[-1][1]
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (ways @ left.ravel() / size)) / values[sound]) / size
-        return end + (share @ ways).reshape(end.shape)
+        return (share @ ways).reshape(left.shape)
+
+
+def _between(first: Mark, second: Mark) -> Mark:
+    """The way from one to the other, and how much the forces fell."""
+    return second[0] - first[0], first[1] - second[1]

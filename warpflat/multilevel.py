@@ -7,8 +7,10 @@ spring network of its own, with the same fabric, guard and steps, on a quarter o
 1. a few steps from rest on the fine level;
 2. the coarse level starts where its vertices are, under the load that gives it the fine level's residual forces there;
 3. the same on the coarse level, down to the coarsest, which is relaxed by steps;
-4. the way the coarse vertices have gone is carried up, as far as it lowers the fine energy and mirrors no face;
-5. a few steps from rest again.
+4. the way the coarse vertices have gone is carried up;
+5. a few steps from rest again, after which the energy must not be higher than before 4: straight between the coarse vertices, the way
+   strains what lies between them, and only these steps let go of that. If it is higher, a half of both is taken, a quarter ...;
+6. on the finest level, the piece goes on to where what it remembers of its cycles says that the energy is least.
 
 Nested iteration gives the start: the coarsest level is relaxed first, and each finer one is moved as far as the coarser
 went. The minimum is that of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's
@@ -31,7 +33,7 @@ from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array
 
 from warpflat.coarsen import Coarser
-from warpflat.cycle_memory import CycleMemory
+from warpflat.cycle_memory import CycleMemory, Mark
 from warpflat.fabric import Fabric
 from warpflat.joined import begins, join_networks
 from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
@@ -48,32 +50,32 @@ FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
 
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
-# the very first, or so many times the vertices along its side: a crack that opens is slow there too.
+# the very first, or so many times the vertices along its side: a crack that opens is slow there too. In a cycle it is enough, too, once
+# they take no more than this share of what all before have taken of its energy: it is not the fine level's to the last per cent.
 _BOTTOM_STEPS = 8
 _AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
+_LITTLE_GAIN = 0.07
 # Grids of more vertices start where a coarser one of at most so many has come to rest: cubics from this size on leave a few hundredths
 # of a per cent.
 _CYCLED = 5_000
-# Steps before and after, at least, and at most where cycles gain little: after one that gains more than this share of what the one
-# before gained, they are twice as many.
-_LEAST_STEPS = 4
-_MOST_STEPS = 256
-_VERY_SLOW = 0.6
-# From this share on, cycles are followed by a leap, from what is remembered of so many of them.
-_SLOW = 0.05
+# Steps before and after.
+_STEPS = 4
+# Of so many cycles it is remembered where they have led, leaps and all.
 _DEPTH = 6
-# K/G from which coarse triangles are of little use; likewise on a piece of more than so many vertices.
+# K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0
-_MANY = 2_000
-_SOFT_OF_MANY = 100.0
+_FEW = 1_200
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
-# Of a correction, the least share that is tried.
+# The least share that is tried, of a correction and of a leap.
 _LEAST_SHARE = 0.05
-# Steps between two looks at all cells.
+_LEAST_OF_LEAP = 0.2
+# Steps between two looks at all cells; fewer where sqrt(K/G) times them would be more than this: the guard of a soft cloth begins so early
+# that in between cells would come far beyond, and raise the energy.
 _WATCH_EVERY = 4
+_WATCH_SOFT = 20.0
 # In units of a step: evaluating the forces, evaluating the energy.
 _FORCE_WORK = 1.0
 _ENERGY_WORK = 0.5
@@ -154,6 +156,8 @@ class Levels:
         self._ladders = ladders
         self._levels = [_Level(finest)]
         self.leading: dict[Surface, Rung] = {}
+        self._watch_every = _watch_every(finest.network)
+        self._marks: list[Mark] = []
         self.stale = False
         ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
         for rungs in zip(*ladders, strict=True):
@@ -166,6 +170,7 @@ class Levels:
             if fine.way is None:
                 fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
             self._levels.append(coarse)
+        self.follow()
 
     def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
         """Those of some of the pieces, which `finest` is of."""
@@ -218,15 +223,16 @@ class Levels:
         finest = self._levels[0].state
         finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
 
-    def smooth(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
-        """Some steps from rest."""
+    def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> None:
+        """Some steps from rest; `evaluated` says that the forces there have just been evaluated."""
         state = self._levels[level].state
         state.velocity.zero_()
-        state.sweep(steps, each_step, watch_every=_WATCH_EVERY)
-        self._count(level, steps)
+        state.sweep(_STEPS, each_step, watch_every=self._watch_every, evaluated=evaluated)
+        self._count(level, _STEPS)
 
-    def _settle(self, share: float) -> None:
-        """Relax the coarsest level until the forces of each piece have come down to a share of what they were."""
+    def _settle(self, share: float, little: float = 0.0) -> FloatArray:
+        """Relax the coarsest level until the forces of each piece have come down to a share of what they were, or steps take no more
+        than a little share of what all have taken of its energy."""
         last = len(self._levels) - 1
         state = self._levels[last].state
         state.evaluate_at_rest()
@@ -236,11 +242,17 @@ class Levels:
             return np.array([np.linalg.norm(force[here]) for here in state.vertices])
 
         aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
+        first = before = now = self._objective(last)
         for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
-            state.sweep(_BOTTOM_STEPS, watch_every=_WATCH_EVERY)
+            state.sweep(_BOTTOM_STEPS, watch_every=self._watch_every)
             self._count(last, _BOTTOM_STEPS)
-            if (forces() <= aim).all():
+            now = self._objective(last)
+            with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
+                slow = before - now < little * (first - now)
+            if ((forces() <= aim) | slow).all():
                 break
+            before = now
+        return now
 
     def _objective(self, level: int) -> FloatArray:
         """Of each piece [J]."""
@@ -248,71 +260,113 @@ class Levels:
         state = self._levels[level].state
         return np.asarray(state.potentials().sum(axis=1) - state.work_of_load())
 
-    def cycle(self, level: int, steps: int, each_step: Callable[[], None] | None = None) -> None:
-        """One cycle from this level down and up again."""
+    def cycle(self, level: int, each_step: Callable[[], None] | None = None) -> FloatArray:
+        """One cycle from this level down and up again; on the finest one its forces must have been evaluated, and their work counted.
+
+        Returns:
+            #P, energy at the end [J].
+        """
         state, way = self._levels[level].state, self._levels[level].way
         if way is None:
-            self._settle(_AT_REST)
-            return
-        self.smooth(level, steps, each_step)
+            return self._settle(_AT_REST, _LITTLE_GAIN)
+        self.smooth(level, each_step, evaluated=level == 0)
+        if level == 0:
+            self._count(level, -_FORCE_WORK)
         state.evaluate_at_rest()
         self._count(level, _FORCE_WORK)
+        if level == 0:
+            self._marks = [_mark(state)]
         way.down.launch()
         way.coarse.load.zero_()
         way.coarse.evaluate_at_rest()
         self._count(level + 1, _FORCE_WORK)
         mirrored = way.coarse.mirrored_pieces()
         self.stale = self.stale or bool(mirrored.any())
-        if not mirrored.all():
-            way.load.launch()
-            self.cycle(level + 1, steps)
-            self._correct(level, way)
-        self.smooth(level, steps, each_step)
-
-    def _correct(self, level: int, way: _Way, which: BoolArray | None = None) -> None:
-        """Add the coarse level's correction to these pieces, or a half, a quarter ... of it, so that the energy does not rise."""
-        state = self._levels[level].state
+        if mirrored.all():
+            self.smooth(level, each_step)
+            return self._objective(level)
+        way.load.launch()
+        self.cycle(level + 1)
         before = self._objective(level)
+        self._correct(level, way)
+        if level == 0:
+            self._marks.append(_mark(state))
+        self.smooth(level, each_step, evaluated=True)
+        energy = self._objective(level)
+        higher = ~(energy <= before)
+        if higher.any():
+            way.correction.assign(state.positions() - way.base.numpy())
+            energy = np.where(higher, self._go(level, way.base, way.correction, before, higher, most=0.5), energy)
+        return energy
+
+    def _correct(self, level: int, way: _Way) -> None:
+        """Add the coarse level's correction, or a half, a quarter ... of it, so that no cell is mirrored; all cells are looked at there."""
+        state = self._levels[level].state
+        self._carry_correction(state, way)
+        turned, share = np.ones(len(state.vertices), dtype=bool), 1.0
+        while turned.any():
+            state.move(way.base, way.correction, share, turned)
+            state.evaluate_at_rest()
+            turned &= state.mirrored_pieces() & (share > 0.0)
+            share = 0.5 * share if share > _LEAST_SHARE else 0.0
+            if turned.any():
+                self._count(level, _FORCE_WORK)
+
+    @staticmethod
+    def _carry_correction(state: Relaxation, way: _Way) -> None:
         wp.copy(way.base, state.position)
         way.differ.launch()
         way.up.launch()
-        higher = np.ones(len(before), dtype=bool) if which is None else which.copy()
-        share = 1.0
-        while share > _LEAST_SHARE:
-            state.move(way.base, way.correction, share, higher)
-            higher &= ~(self._objective(level) <= before)
-            if not higher.any():
-                return
-            share *= 0.5
-        for here in (state.vertices[piece] for piece in np.flatnonzero(higher)):
-            wp.copy(state.position, way.base, here.start, here.start, here.stop - here.start)
 
-    def leap(self, memories: Sequence[CycleMemory | None], begin: FloatArray, force: FloatArray) -> None:
-        """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, if it is lower
-        there.
+    def _go(
+        self,
+        level: int,
+        base: wp.array,
+        by: wp.array,
+        before: FloatArray,
+        which: BoolArray,
+        *,
+        most: float = 1.0,
+        least: float = _LEAST_SHARE,
+    ) -> FloatArray:
+        """Let these pieces (#P) go from `base` by the most of a way (#V vec2d [m]), or by a half, a quarter ... of that down to the least,
+        so that their energy is not above what it was `before` (#P [J]); or else back to `base`, where it is that.
+
+        Returns:
+            #P, their energy where they are [J].
+        """
+        state, share, energy = self._levels[level].state, most, before
+        while which.any():
+            state.move(base, by, share, which)
+            if share == 0.0:
+                break
+            now = self._objective(level)
+            energy = np.where(which & (now <= before), now, energy)
+            which = which & ~(now <= before)
+            share = 0.5 * share if share > least else 0.0
+        return energy
+
+    def leap(self, memories: Sequence[CycleMemory], begin: Mark, energy: FloatArray) -> None:
+        """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, as far as it is
+        lower there.
 
         Args:
-            memories: of each piece that is to leap, of the cycles before; gets this one.
-            begin: #V by 2, where the cycle began [m].
-            force: #V by 2, of the cloth there [N].
+            memories: of each piece, of the cycles before; gets this one.
+            begin: where the cycle began.
+            energy: #P, at its end [J].
         """
         state = self._levels[0].state
-        end = state.positions()
-        energy = self._objective(0)
         self._count(0, _FORCE_WORK)
-        left, further, leapt = state.forces(), end.copy(), np.zeros(len(energy), dtype=bool)
+        state.evaluate_at_rest()
+        end = _mark(state)
+        by, leapt = np.zeros_like(end[0]), np.zeros(len(memories), dtype=bool)
         for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
-            found = None if memory is None else memory.lowest(begin[own], force[own], end[own], left[own])
-            if found is not None:
-                further[own], leapt[piece] = found, True
-        if not leapt.any():
-            return
-        state.position.assign(further)
-        back = leapt & ~(self._objective(0) < energy)
-        if back.any():
-            for own in (state.vertices[piece] for piece in np.flatnonzero(back)):
-                further[own] = end[own]
-            state.position.assign(further)
+            way = memory.lowest([(place[own], force[own]) for place, force in (begin, *self._marks, end)])
+            if way is not None:
+                by[own], leapt[piece] = way, True
+        device = state.network.device
+        base, way_on = wp.clone(state.position), wp.array(by, dtype=wp.vec2d, device=device)
+        self._go(0, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
 
     def follow(self) -> None:
         """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
@@ -320,7 +374,7 @@ class Levels:
             if level.state.matrix is not None:
                 level.state.matrix.follow(level.state.position)
 
-    def rise(self, steps: int) -> None:
+    def rise(self) -> None:
         """Nested iteration: relax the coarsest level, and move each finer one as far as it went; the finest is not cycled yet."""
         last = len(self._levels) - 1
         for level in self._levels[1:]:
@@ -332,7 +386,7 @@ class Levels:
             assert way is not None
             sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
             if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
-                self.cycle(number, steps)
+                self.cycle(number)
 
     def _rise_to(self, level: int) -> None:
         """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
@@ -364,10 +418,11 @@ class Levels:
                 own = state.vertices[piece]
                 layout[own] = before[own]
             state.position.assign(layout)
-            self._correct(level, way, ~lower)
+            self._carry_correction(state, way)
+            self._go(level, way.base, way.correction, energy, ~lower)
 
 
-def _carry_up(state: Relaxation, steps: int) -> Levels | None:
+def _carry_up(state: Relaxation) -> Levels | None:
     """Start pieces that are large grids where a coarser grid of theirs has come to rest; the others where their own levels lead.
 
     Nothing is made or evaluated of the levels in between. The state is looked at in the end.
@@ -388,8 +443,10 @@ def _carry_up(state: Relaxation, steps: int) -> Levels | None:
     start = [layout[own] if way is None else way[1].layout for own, way in zip(state.vertices, below, strict=True)]
     coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
     levels = Levels(coarse, mend=True)
-    levels.rise(steps)
-    levels.cycle(0, steps)
+    levels.rise()
+    coarse.evaluate_at_rest()
+    coarse.work_units += _FORCE_WORK
+    levels.cycle(0)
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
     carried, relaxed = layout.copy(), coarse.positions()
     for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
@@ -410,21 +467,24 @@ def _carry_up(state: Relaxation, steps: int) -> Levels | None:
     return None
 
 
+def _mark(state: Relaxation) -> Mark:
+    """Where it is, and the forces of the cloth there, as they have just been evaluated."""
+    return state.positions(), state.cloth_force()
+
+
+def _watch_every(network: SpringNetwork) -> int:
+    return int(min(max(_WATCH_SOFT / math.sqrt(softness(network.fabric)), 1.0), _WATCH_EVERY))
+
+
 @dataclass(kw_only=True)
 class _Pace:
     """How a piece nears its minimum.
 
     Attributes:
-        steps: before and after, that it wants.
-        gained: by how much the last cycle has changed its energy [J].
-        slow: whether cycles are to be followed by a leap.
-        near: whether they take too little away to go on.
+        near: whether cycles take too little away to go on.
         memory: of cycles.
     """
 
-    steps: int
-    gained: float = math.inf
-    slow: bool = False
     near: bool = False
     memory: CycleMemory = field(default_factory=lambda: CycleMemory(_DEPTH))
 
@@ -443,16 +503,10 @@ class _Cycles:
         """#P, whether a piece has come to rest, or near enough."""
         return self.state.last.at_rest | [pace.near for pace in self.paces]
 
-    def parts(self) -> list[_Cycles]:
-        """The pieces that want the most steps, and the others, to be cycled apart; those that are done in neither. None where that would
-        not pay."""
+    def without_done(self) -> _Cycles | None:
+        """The pieces that are not done, to be cycled on their own; None where that would not pay."""
         done = self.done
-        steps = np.where(done, 0, [pace.steps for pace in self.paces])
-        slowest = steps == steps.max()
-        if not self.state.may_leave(~slowest):
-            return []
-        others = ~slowest & ~done
-        return [self._of(np.flatnonzero(part).tolist()) for part in (slowest, others) if part.any()]
+        return self._of(np.flatnonzero(~done).tolist()) if self.state.may_leave(done) else None
 
     def _of(self, pieces: Sequence[int]) -> _Cycles:
         state = self.state.keep(pieces)
@@ -466,40 +520,28 @@ class _Cycles:
         if self.levels.stale and self.renewals < _RENEWALS:
             self.levels, self.renewals = Levels(state), self.renewals + 1
         work = state.work_units
-        self.levels.follow()
-        begin, force = state.positions(), state.cloth_force()
-        self.levels.cycle(0, max(pace.steps for pace in paces), each_step)
-        if any(pace.slow for pace in paces):
-            self.levels.leap([pace.memory if pace.slow else None for pace in paces], begin, force)
+        begin = _mark(state)
+        energy = self.levels.cycle(0, each_step)
+        self.levels.leap([pace.memory for pace in paces], begin, energy)
         state.hold_upright()
+        self.levels.follow()
         state.evaluate_at_rest()
         state.work_units += _FORCE_WORK + _ENERGY_WORK
         look = state.look(state.work_units - work)
         for piece, pace in enumerate(paces):
-            gain = float(look.gain[piece])
-            pace.near = enough is not None and gain <= enough * look.potential[piece]
-            pace.slow = abs(gain) > _SLOW * pace.gained
-            if abs(gain) > _VERY_SLOW * pace.gained and not look.at_rest[piece]:
-                pace.steps = min(2 * pace.steps, _MOST_STEPS)
-            pace.gained = abs(gain)
+            pace.near = enough is not None and look.gain[piece] <= enough * look.potential[piece]
 
 
 def levels_pay(network: SpringNetwork) -> bool:
-    """Whether cycles take less work than plain steps: on grids always; on triangles, of which coarse ones carry less the softer the shear
-    is, the more vertices there are."""
+    """Whether cycles take less work than plain steps: always but for a soft cloth on a small mesh of triangles."""
     if network.surface.is_quad.all():
         return True
-    return softness(network.fabric) < (_SOFT_OF_MANY if network.vertex_count > _MANY else _SOFT)
+    return network.vertex_count > _FEW or softness(network.fabric) < _SOFT
 
 
 def softness(fabric: Fabric) -> float:
     """K/G: how much stiffer the fabric is along its threads than in shear."""
     return max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
-
-
-def first_steps(network: SpringNetwork) -> int:
-    """Steps before and after, for a fabric: a soft shear leaves errors along threads that only accelerated steps smooth."""
-    return int(min(max(round(1.7 * math.sqrt(softness(network.fabric))), _LEAST_STEPS), 16))
 
 
 def relax_multilevel(
@@ -524,17 +566,17 @@ def relax_multilevel(
     """
     options: RelaxOptions = state.options
     begun = time.perf_counter()
-    whole, first, start, steps = state, state.steps, state.work_units, first_steps(state.network)
+    whole, first, start = state, state.steps, state.work_units
     state.hold_upright()
     if not state.looked:
         state.begin()
-    below = _carry_up(state, steps) if nested and levels is None else None
+    below = _carry_up(state) if nested and levels is None else None
     if below is not None and each_step is not None:
         each_step(state, state.last.total, float(state.last.residual.max()))
     levels = Levels(state, mend=nested, below=below) if levels is None else levels
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
-    cycles = _Cycles(state=state, levels=levels, paces=[_Pace(steps=steps) for _ in state.vertices])
+    cycles = _Cycles(state=state, levels=levels, paces=[_Pace() for _ in state.vertices])
 
     def tell(call: Watch | None) -> None:
         if call is not None:
@@ -542,22 +584,19 @@ def relax_multilevel(
             call(cycles.state, look.total, float(look.residual.max()))
 
     if nested and below is None:
-        levels.rise(steps)
+        levels.rise()
         state.hold_upright()
         state.begin()
         tell(each_step)
+    levels.follow()
     state.evaluate_at_rest()
     state.work_units += _FORCE_WORK
-    waiting = [cycles]
-    while waiting:
-        cycles = waiting.pop()
-        while not cycles.done.all() and cycles.state.work_units - start < options.max_steps:
-            parts = cycles.parts()
-            if parts:
-                cycles.state.give(whole)
-                cycles, *others = parts
-                waiting += others
-            cycles.go(enough, lambda: tell(each_step))
-            tell(watch)
-        cycles.state.give(whole)
+    while not cycles.done.all() and cycles.state.work_units - start < options.max_steps:
+        left = cycles.without_done()
+        if left is not None:
+            cycles.state.give(whole)
+            cycles = left
+        cycles.go(enough, lambda: tell(each_step))
+        tell(watch)
+    cycles.state.give(whole)
     return whole.outcome(first, start, begun=begun)
