@@ -24,7 +24,7 @@ from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
 from warpflat.relax import RelaxOptions
 from warpflat.running import Relaxed, Run, relax_runs
-from warpflat.strain import WornStrain, layout_errors, strain_energy, worn_strain
+from warpflat.strain import LayoutErrors, WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, line_from_indices, read_surface
 from warpflat.tightness import Wear, WornFit, assess_fit
@@ -90,7 +90,11 @@ class Flattening:
     @property
     def flipped_faces(self) -> int:
         """Number of mirrored or collapsed faces."""
-        return int(self.measures["flipped_faces"])
+        return self._errors.flipped_faces
+
+    @cached_property
+    def _errors(self) -> LayoutErrors:
+        return layout_errors(self.network.surface, self.network, self.positions)
 
     @cached_property
     def worn(self) -> WornStrain:
@@ -112,8 +116,7 @@ class Flattening:
         """The piece's entry in `metrics.json`."""
         from warpflat.wear_report import wear_measures
 
-        errors = layout_errors(self.network.surface, self.network, self.positions)
-        last = self.stages[-1]
+        errors, last = self._errors, self.stages[-1]
         return {
             "vertices": len(self.surface.vertices),
             "faces": len(self.surface.faces),
