@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.sums import products, weighted_rows
+
 __all__ = ["CycleMemory", "Mark"]
 
 FloatArray = NDArray[np.float64]
@@ -49,16 +51,17 @@ class CycleMemory:
         ways, falls = (np.stack([part[k].ravel() for part in parts]) for k in (0, 1))
         moved = (ways != 0.0).any(axis=1)
         ways, falls = ways[moved], falls[moved]
-        curvature = ways @ falls.T
+        curvature = products(ways, falls)
         curvature = 0.5 * (curvature + curvature.T)
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not (size > 0.0).all():
             return None
         left = marks[-1][1]
+        gain = products(ways, left.reshape(1, -1))[:, 0]
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
-        share = axes[:, sound] @ ((axes[:, sound].T @ (ways @ left.ravel() / size)) / values[sound]) / size
-        return (share @ ways).reshape(left.shape)
+        share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
+        return weighted_rows(share, ways).reshape(left.shape)
 
 
 def _between(first: Mark, second: Mark) -> Mark:

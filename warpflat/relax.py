@@ -30,6 +30,7 @@ from warpflat.kernels.transfer import correct
 from warpflat.launching import Launch, launch_each, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.network import SpringNetwork
+from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
 
 __all__ = [
@@ -567,9 +568,9 @@ class Relaxation:
             position[here] = centre + turn * (position[here] - centre)
             velocity[here] *= turn
             arm, weighted = _arms(position[here], weight[here])
-            inertia = max(float(np.vdot(arm, weighted).real), 1e-300)
-            velocity[here] -= (float(np.vdot(weighted, velocity[here]).real) / inertia) * arm
-            load[here] = (-float(np.vdot(arm, turn * force[here]).real) / inertia) * weighted
+            inertia = max(_along(arm, weighted), 1e-300)
+            velocity[here] -= (_along(weighted, velocity[here]) / inertia) * arm
+            load[here] = (-_along(arm, turn * force[here]) / inertia) * weighted
         for array, values in ((self.position, position), (self.velocity, velocity), (self.load, load)):
             array.assign(values.view(np.float64).reshape(-1, 2))
 
@@ -601,7 +602,7 @@ class Relaxation:
         for piece in self.upright:
             here = piece.vertices
             arm, weighted = _arms(position[here], weight[here])
-            turning = float(np.vdot(arm, force[here]).real) / max(float(np.vdot(arm, weighted).real), 1e-300)
+            turning = _along(arm, force[here]) / max(_along(arm, weighted), 1e-300)
             force[here] -= turning * weighted
         largest = np.maximum.reduceat(force.real**2 + force.imag**2, self._vertex_begin[:-1])
         return np.sqrt(largest) / np.maximum(mean, floor)
@@ -637,9 +638,14 @@ def _complex(vectors: FloatArray) -> ComplexArray:
     return np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
 
 
+def _along(a: ComplexArray, b: ComplexArray) -> float:
+    """The sum of the scalar products of vectors."""
+    return dot(a.view(np.float64), b.view(np.float64))
+
+
 def _arms(at: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, ComplexArray]:
     """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
-    arm = 1j * (at - (weight @ at) / weight.sum())
+    arm = 1j * (at - (weight * at).sum() / weight.sum())
     return arm, weight * arm
 
 

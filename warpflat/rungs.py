@@ -11,6 +11,7 @@ from scipy.sparse import csr_array, eye
 
 from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
 from warpflat.network import SpringNetwork, cells_of
+from warpflat.sums import products, weighted_rows
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import signed_cell_areas, untangle
 from warpflat.thinning import Transfer
@@ -48,11 +49,13 @@ def _calibrated(
     if network.model != "springs" or network.surface.is_quad.all():
         return network
     energy, fields = _strain_fields(fine, fine_layout)
-    wished = fields @ energy
+    wished = products(fields, energy[None])[:, 0]
     energy, fields = _strain_fields(network, layout)
-    factor = np.linalg.lstsq((fields * energy) @ fields.T, wished, rcond=1e-6)[0]
+    factor = np.linalg.lstsq(products(fields * energy, fields), wished, rcond=1e-6)[0].astype(np.float64)
     s = network.spring_arrays
-    return replace(network, spring_arrays=replace(s, stiffness=np.clip(factor @ fields, 0.1, 10.0) * s.stiffness))
+    return replace(
+        network, spring_arrays=replace(s, stiffness=np.clip(weighted_rows(factor, fields), 0.1, 10.0) * s.stiffness)
+    )
 
 
 def rungs_of(
