@@ -166,6 +166,11 @@ class CellArrays:
     around: ByVertex
 
     @cached_property
+    def of_face(self) -> IntArray:
+        """#F+1, where the cells of each face begin; a face's cells follow each other."""
+        return np.append(np.flatnonzero(np.diff(self.face, prepend=-1)), len(self.face)).astype(np.int32)
+
+    @cached_property
     def vertex_areas(self) -> FloatArray:
         """#V [m2], a third of each cell's share of the cloth at each of its corners."""
         around, total = self.around, np.empty(len(self.around.offset) - 1)

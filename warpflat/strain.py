@@ -72,10 +72,8 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
 
     Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
     """
-    face, device = network.cell_arrays.face, network.device
-    # A face's cells follow each other.
-    offset = np.append(np.flatnonzero(np.diff(face, prepend=-1)), len(face))
-    cells = [wp.array(offset, dtype=wp.int32, device=device), *_worn_cells(network, positions)]
+    offset, device = network.cell_arrays.of_face, network.device
+    cells = [wp.array(offset, dtype=wp.int32, device=device, copy=False), *_worn_cells(network, positions)]
     strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
     launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
     return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
