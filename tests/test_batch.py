@@ -15,7 +15,8 @@ from warpflat.errors import InputError
 from warpflat.fabric import Fabric, find_fabric
 from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.joined import join_networks, join_surfaces
-from warpflat.multilevel import Levels, _Cycles, _Pace, levels_pay, relax_multilevel
+from warpflat.levels import Levels
+from warpflat.multilevel import _Cycles, _Pace, levels_pay, relax_multilevel
 from warpflat.network import SpringNetwork, cells_of, springs_of
 from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.shapes import make_shape

@@ -11,9 +11,11 @@ from scipy.spatial import Delaunay
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
-from warpflat.multilevel import Levels, _carry_up, relax_multilevel
+from warpflat.levels import Levels, carry_up
+from warpflat.looks import Outcome
+from warpflat.multilevel import relax_multilevel
 from warpflat.network import SpringNetwork
-from warpflat.relax import Outcome, Relaxation, RelaxOptions, Upright, relax
+from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
@@ -149,7 +151,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
     for side, between in ((101, 0), (201, 10_201)):
         done = flatten(make_shape("bodice", resolution=side), fabric=cloth(375.0), datum="centre", device="cpu")
         state = start_of(done)
-        below = _carry_up(state)
+        below = carry_up(state)
         assert below is not None
         assert state.last.potential[0] < 1.001 * minimum(done)
         assert state.work_units < 12.0
@@ -166,7 +168,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_coarser_one_is():
 def test_small_grids_and_triangles_rise_level_by_level():
     for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
         state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu"))
-        assert _carry_up(state) is None
+        assert carry_up(state) is None
 
 
 def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
@@ -175,7 +177,7 @@ def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
     state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
     before = state.begin()
-    assert _carry_up(state) is None
+    assert carry_up(state) is None
     np.testing.assert_array_equal(state.positions(), done.positions)
     assert state.last is before
     outcome = relax_multilevel(state)

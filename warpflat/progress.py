@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.looks import Energies
 from warpflat.network import SpringNetwork
-from warpflat.relax import Energies, Relaxation
+from warpflat.relax import Relaxation
 from warpflat.strain import worn_strain
 from warpflat.surface import Surface
 

@@ -29,15 +29,13 @@ from warpflat.kernels.springs import compute_spring_energy
 from warpflat.kernels.transfer import correct
 from warpflat.launching import Launch, launch_each, record
 from warpflat.launching import Sequence as LaunchSequence
+from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
 from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
 
 __all__ = [
     "SOLVERS",
-    "Energies",
-    "Look",
-    "Outcome",
     "RelaxOptions",
     "Relaxation",
     "Solver",
@@ -99,86 +97,6 @@ class RelaxOptions:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
         if self.solver not in SOLVERS:
             raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
-
-
-@dataclass(frozen=True)
-class Energies:
-    """[J]: of the springs (of the membrane, where that is the model), of the guard (see `warpflat.network`), of the motion."""
-
-    spring: float
-    guard: float
-    kinetic: float
-
-    @property
-    def potential(self) -> float:
-        """What is minimised: springs and guard."""
-        return self.spring + self.guard
-
-    @property
-    def total(self) -> float:
-        """Potential and kinetic."""
-        return self.spring + self.guard + self.kinetic
-
-
-@dataclass(frozen=True, kw_only=True)
-class Look:
-    """What a look at a running relaxation says of each of its pieces.
-
-    Attributes:
-        energies: #P by 3, of the springs or the membrane, of the guard, of the motion [J].
-        residual: #P, largest force on a vertex over the mean force of the springs; infinite before it is known.
-        gain: #P, what the springs' and the guard's energy has lost since the look before [J].
-        change: #P, eq. (11), that over the energy and the steps in between.
-        at_rest: #P, whether change and residual are within the tolerances.
-        steps, work_units: #P, what it has taken so far.
-    """
-
-    energies: FloatArray
-    residual: FloatArray
-    gain: FloatArray
-    change: FloatArray
-    at_rest: BoolArray
-    steps: NDArray[np.int64]
-    work_units: FloatArray
-
-    @property
-    def potential(self) -> FloatArray:
-        """#P, what is minimised [J]."""
-        return self.energies[:, 0] + self.energies[:, 1]
-
-    @property
-    def total(self) -> Energies:
-        """Of all pieces."""
-        return Energies(*self.energies.sum(axis=0).tolist())
-
-    def of(self, pieces: Sequence[int]) -> Look:
-        """What it says of some of them."""
-        return Look(**{name: values[list(pieces)] for name, values in vars(self).items()})
-
-
-@dataclass(frozen=True, kw_only=True)
-class Outcome:
-    """How a relaxation ended; of several pieces, the energies of all and the worst of what is left.
-
-    Attributes:
-        converged: false if it ran into its step limit.
-        steps: approximate implicit steps taken on the piece's own mesh.
-        work_units: all work, in such steps.
-        restarts: how often the velocities were set to zero.
-        energy_change: last relative change of the energy per step, eq. (11).
-        residual: largest force on a vertex over the mean spring force.
-        energies: at the end [J].
-        seconds: wall clock.
-    """
-
-    converged: bool
-    steps: int
-    work_units: float
-    restarts: int
-    energy_change: float
-    residual: float
-    energies: Energies
-    seconds: float
 
 
 @dataclass(frozen=True, kw_only=True)

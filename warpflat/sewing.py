@@ -25,8 +25,9 @@ from warpflat.constraints import Constraint, constraint_ties, piece_of
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening
 from warpflat.kernels.seams import compute_seam_misses
+from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
-from warpflat.relax import Outcome, Relaxation, RelaxOptions, relax
+from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.strain import signed_cell_areas
 from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together

@@ -1,0 +1,457 @@
+"""The levels of a relaxation: a piece's coarser meshes as spring networks of their own, and cycles over them.
+
+`warpflat.multilevel` says what a cycle is; here are its parts, and the ways to start: `Levels.rise`, level by level, and `carry_up`, for
+large grids, at once.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+from scipy.sparse import block_diag, csr_array
+
+from warpflat.coarsen import Coarser
+from warpflat.cycle_memory import CycleMemory, Mark
+from warpflat.fabric import Fabric
+from warpflat.joined import begins, join_networks
+from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
+from warpflat.launching import Launch, record
+from warpflat.network import SpringNetwork
+from warpflat.relax import Relaxation
+from warpflat.rungs import Rung, far_below, rungs_of, stay
+from warpflat.surface.mesh import Surface
+from warpflat.surface.untangle import untangle
+
+__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "carry_up", "mark", "softness"]
+
+FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
+
+# The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
+# the very first, or so many times the vertices along its side: a crack that opens is slow there too. In a cycle it is enough, too, once
+# they take no more than this share of what all before have taken of its energy: it is not the fine level's to the last per cent.
+_BOTTOM_STEPS = 8
+_AT_REST = 0.05
+_AT_REST_FIRST = 1e-3
+_MOST_BOTTOM_STEPS = 24.0
+_LITTLE_GAIN = 0.07
+# Grids of more vertices start where a coarser one of at most so many has come to rest: cubics from this size on leave a few hundredths
+# of a per cent.
+_CYCLED = 5_000
+# Steps before and after.
+_STEPS = 4
+# The least share that is tried, of a correction and of a leap.
+_LEAST_SHARE = 0.05
+_LEAST_OF_LEAP = 0.2
+# Steps between two looks at all cells; fewer where sqrt(K/G) times them would be more than this: the guard of a soft cloth begins so early
+# that in between cells would come far beyond, and raise the energy.
+_WATCH_EVERY = 4
+_WATCH_SOFT = 20.0
+# In units of a step: evaluating the forces, evaluating the energy.
+FORCE_WORK = 1.0
+ENERGY_WORK = 0.5
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Way:
+    """The way from a level to the next coarser one and back.
+
+    Attributes:
+        coarse: the coarser level.
+        down: its vertices go where they are on the finer one. load: it gets the finer one's residual forces.
+        differ: how far it has come from `base`, #V of the finer level. up: that, as `correction` of the finer level.
+        carry: its layout, as that of the finer level.
+        steps: of each piece its step down.
+    """
+
+    coarse: Relaxation
+    down: Launch
+    load: Launch
+    differ: Launch
+    up: Launch
+    carry: Launch
+    base: wp.array
+    correction: wp.array
+    steps: Sequence[Coarser]
+
+
+@dataclass
+class _Level:
+    """A level, and its way down, but for the coarsest."""
+
+    state: Relaxation
+    way: _Way | None = None
+
+
+def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
+    """The matrix that has these along its diagonal."""
+    weights, matrix = Weights(), blocks[0] if len(blocks) == 1 else block_diag(blocks, format="csr")
+    # On the CPU the matrix' own arrays.
+    weights.offset = wp.array(matrix.indptr.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+    weights.column = wp.array(matrix.indices.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+    weights.weight = wp.array(matrix.data.astype(np.float64, copy=False), dtype=wp.float64, device=device, copy=False)
+    return weights
+
+
+class Levels:
+    """The levels of a relaxation, finest first; made once, and good for any number of relaxations of the same network.
+
+    Attributes:
+        sizes: vertices of each level.
+        leading: steps of a larger grid to the finest of these, by their surfaces.
+        stale: a coarse level had mirrored cells where the finer one had come to; make the levels anew there.
+    """
+
+    def __init__(self, finest: Relaxation, *, mend: bool = False, below: Levels | None = None) -> None:
+        """Of a relaxation and its present layout, which must mirror no face.
+
+        Args:
+            finest: the pieces themselves.
+            mend: turn back what cells of the coarser levels are mirrored where the piece lies, as at the start of a nested iteration, which
+                leaves that layout; otherwise make levels that have none.
+            below: levels that are there already; what they hold may be used as part of these.
+        """
+        layout, pieces = finest.positions(), finest.network.pieces
+        known = {} if below is None else below.rungs
+        ladders = [
+            rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
+        ]
+        depth = max(len(rungs) for rungs in ladders)
+        for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
+            lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
+            while len(rungs) < depth:
+                rungs.append(Rung(step=stay(lowest.surface), network=lowest, layout=where))
+        self._join(finest, ladders, [] if below is None else below._levels)
+
+    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = ()) -> None:
+        self._ladders = ladders
+        self._levels = [_Level(finest)]
+        self.leading: dict[Surface, Rung] = {}
+        self._watch_every = _watch_every(finest.network)
+        self._marks: list[Mark] = []
+        self.stale = False
+        ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
+        for rungs in zip(*ladders, strict=True):
+            networks = [rung.network for rung in rungs]
+            coarse = ready.get(tuple(map(id, networks)))
+            if coarse is None:
+                start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
+                coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start))
+            fine = self._levels[-1]
+            if fine.way is None:
+                fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
+            self._levels.append(coarse)
+        self.follow()
+
+    def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
+        """Those of some of the pieces, which `finest` is of."""
+        kept = Levels.__new__(Levels)
+        kept._join(finest, [self._ladders[piece] for piece in pieces])
+        kept.stale = self.stale
+        return kept
+
+    @property
+    def rungs(self) -> dict[Surface, Rung]:
+        """The levels of all pieces but the finest, by their surfaces, and those that lead to them."""
+        return self.leading | {rung.step.surface: rung for rungs in self._ladders for rung in rungs}
+
+    @property
+    def sizes(self) -> list[int]:
+        """Vertices of each level, finest first."""
+        return [level.state.network.vertex_count for level in self._levels]
+
+    @staticmethod
+    def _way(fine: Relaxation, steps: Sequence[Coarser], coarse: Relaxation) -> _Way:
+        device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
+        first = begins([net.vertex_count for net in fine.network.pieces])
+        ids = np.concatenate([step.kept + at for step, at in zip(steps, first, strict=False)])
+        kept = wp.array(ids, dtype=wp.int32, device=device)
+        prolongation = _weights([step.prolongation for step in steps], device)
+        restriction = _weights([step.transfer.restriction for step in steps], device)
+        base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
+        difference = wp.zeros(c, dtype=wp.vec2d, device=device)
+        return _Way(
+            coarse=coarse,
+            down=record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device),
+            load=record(
+                coarse_load, dim=c, inputs=[restriction, fine.force, coarse.force], outputs=[coarse.load], device=device
+            ),
+            differ=record(
+                coarse_difference, dim=c, inputs=[kept, base, coarse.position], outputs=[difference], device=device
+            ),
+            up=record(transfer, dim=n, inputs=[prolongation, difference], outputs=[correction], device=device),
+            carry=record(
+                transfer, dim=n, inputs=[prolongation, coarse.position], outputs=[fine.position], device=device
+            ),
+            base=base,
+            correction=correction,
+            steps=steps,
+        )
+
+    # --- the parts of a cycle
+
+    def _count(self, level: int, units: float) -> None:
+        finest = self._levels[0].state
+        finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
+
+    def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> None:
+        """Some steps from rest; `evaluated` says that the forces there have just been evaluated."""
+        state = self._levels[level].state
+        state.velocity.zero_()
+        state.sweep(_STEPS, each_step, watch_every=self._watch_every, evaluated=evaluated)
+        self._count(level, _STEPS)
+
+    def _settle(self, share: float, little: float = 0.0) -> FloatArray:
+        """Relax the coarsest level until the forces of each piece have come down to a share of what they were, or steps take no more
+        than a little share of what all have taken of its energy."""
+        last = len(self._levels) - 1
+        state = self._levels[last].state
+        state.evaluate_at_rest()
+
+        def forces() -> FloatArray:
+            force = state.force.numpy()
+            return np.array([np.linalg.norm(force[here]) for here in state.vertices])
+
+        aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
+        first = before = now = self._objective(last)
+        for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
+            state.sweep(_BOTTOM_STEPS, watch_every=self._watch_every)
+            self._count(last, _BOTTOM_STEPS)
+            now = self._objective(last)
+            with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
+                slow = before - now < little * (first - now)
+            if ((forces() <= aim) | slow).all():
+                break
+            before = now
+        return now
+
+    def _objective(self, level: int) -> FloatArray:
+        """Of each piece [J]."""
+        self._count(level, ENERGY_WORK)
+        state = self._levels[level].state
+        return np.asarray(state.potentials().sum(axis=1) - state.work_of_load())
+
+    def cycle(self, level: int, each_step: Callable[[], None] | None = None) -> FloatArray:
+        """One cycle from this level down and up again; on the finest one its forces must have been evaluated, and their work counted.
+
+        Returns:
+            #P, energy at the end [J].
+        """
+        state, way = self._levels[level].state, self._levels[level].way
+        if way is None:
+            return self._settle(_AT_REST, _LITTLE_GAIN)
+        self.smooth(level, each_step, evaluated=level == 0)
+        if level == 0:
+            self._count(level, -FORCE_WORK)
+        state.evaluate_at_rest()
+        self._count(level, FORCE_WORK)
+        if level == 0:
+            self._marks = [mark(state)]
+        way.down.launch()
+        way.coarse.load.zero_()
+        way.coarse.evaluate_at_rest()
+        self._count(level + 1, FORCE_WORK)
+        mirrored = way.coarse.mirrored_pieces()
+        self.stale = self.stale or bool(mirrored.any())
+        if mirrored.all():
+            self.smooth(level, each_step)
+            return self._objective(level)
+        way.load.launch()
+        self.cycle(level + 1)
+        before = self._objective(level)
+        self._correct(level, way)
+        if level == 0:
+            self._marks.append(mark(state))
+        self.smooth(level, each_step, evaluated=True)
+        energy = self._objective(level)
+        higher = ~(energy <= before)
+        if higher.any():
+            way.correction.assign(state.positions() - way.base.numpy())
+            energy = np.where(higher, self._go(level, way.base, way.correction, before, higher, most=0.5), energy)
+        return energy
+
+    def _correct(self, level: int, way: _Way) -> None:
+        """Add the coarse level's correction, or a half, a quarter ... of it, so that no cell is mirrored; all cells are looked at there."""
+        state = self._levels[level].state
+        self._carry_correction(state, way)
+        turned, share = np.ones(len(state.vertices), dtype=bool), 1.0
+        while turned.any():
+            state.move(way.base, way.correction, share, turned)
+            state.evaluate_at_rest()
+            turned &= state.mirrored_pieces() & (share > 0.0)
+            share = 0.5 * share if share > _LEAST_SHARE else 0.0
+            if turned.any():
+                self._count(level, FORCE_WORK)
+
+    @staticmethod
+    def _carry_correction(state: Relaxation, way: _Way) -> None:
+        wp.copy(way.base, state.position)
+        way.differ.launch()
+        way.up.launch()
+
+    def _go(
+        self,
+        level: int,
+        base: wp.array,
+        by: wp.array,
+        before: FloatArray,
+        which: BoolArray,
+        *,
+        most: float = 1.0,
+        least: float = _LEAST_SHARE,
+    ) -> FloatArray:
+        """Let these pieces (#P) go from `base` by the most of a way (#V vec2d [m]), or by a half, a quarter ... of that down to the least,
+        so that their energy is not above what it was `before` (#P [J]); or else back to `base`, where it is that.
+
+        Returns:
+            #P, their energy where they are [J].
+        """
+        state, share, energy = self._levels[level].state, most, before
+        while which.any():
+            state.move(base, by, share, which)
+            if share == 0.0:
+                break
+            now = self._objective(level)
+            energy = np.where(which & (now <= before), now, energy)
+            which = which & ~(now <= before)
+            share = 0.5 * share if share > least else 0.0
+        return energy
+
+    def leap(self, memories: Sequence[CycleMemory], begin: Mark, energy: FloatArray) -> None:
+        """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, as far as it is
+        lower there.
+
+        Args:
+            memories: of each piece, of the cycles before; gets this one.
+            begin: where the cycle began.
+            energy: #P, at its end [J].
+        """
+        state = self._levels[0].state
+        self._count(0, FORCE_WORK)
+        state.evaluate_at_rest()
+        end = mark(state)
+        by, leapt = np.zeros_like(end[0]), np.zeros(len(memories), dtype=bool)
+        for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
+            way = memory.lowest([(place[own], force[own]) for place, force in (begin, *self._marks, end)])
+            if way is not None:
+                by[own], leapt[piece] = way, True
+        device = state.network.device
+        base, way_on = wp.clone(state.position), wp.array(by, dtype=wp.vec2d, device=device)
+        self._go(0, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
+
+    def follow(self) -> None:
+        """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
+        for level in self._levels:
+            if level.state.matrix is not None:
+                level.state.matrix.follow(level.state.position)
+
+    def rise(self) -> None:
+        """Nested iteration: relax the coarsest level, and move each finer one as far as it went; the finest is not cycled yet."""
+        last = len(self._levels) - 1
+        for level in self._levels[1:]:
+            level.state.load.zero_()
+        self._settle(_AT_REST_FIRST)
+        for number in range(last - 1, -1, -1):
+            self._rise_to(number)
+            way = self._levels[number].way
+            assert way is not None
+            sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
+            if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
+                self.cycle(number)
+
+    def _rise_to(self, level: int) -> None:
+        """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
+        what only the finer mesh has. Where neither lowers the energy, it stays where it is."""
+        state, way = self._levels[level].state, self._levels[level].way
+        assert way is not None
+        before, energy = state.positions(), self._objective(level)
+        smooth = [step.smooth_carry for step in way.steps]
+        if None in smooth:
+            way.carry.launch()
+        layout, coarse = state.positions(), way.coarse.positions()
+        for carry, own, of in zip(smooth, state.vertices, way.coarse.vertices, strict=True):
+            if carry is not None:
+                layout[own] = carry(coarse[of])
+        state.position.assign(layout)
+        carried = self._objective(level)
+        turned = np.flatnonzero(np.isinf(carried))
+        if len(turned):
+            # Turned faces, the odd one at a border, say.
+            left = np.zeros(len(carried), dtype=bool)
+            for piece in turned.tolist():
+                own = state.vertices[piece]
+                layout[own], left[piece] = untangle(state.network.pieces[piece].surface, layout[own])
+            state.position.assign(layout)
+            carried = np.where(left, math.inf, self._objective(level))
+        lower = carried < energy
+        if not lower.all():
+            for piece in np.flatnonzero(~lower).tolist():
+                own = state.vertices[piece]
+                layout[own] = before[own]
+            state.position.assign(layout)
+            self._carry_correction(state, way)
+            self._go(level, way.base, way.correction, energy, ~lower)
+
+
+def carry_up(state: Relaxation) -> Levels | None:
+    """Start pieces that are large grids where a coarser grid of theirs has come to rest; the others where their own levels lead.
+
+    Nothing is made or evaluated of the levels in between. The state is looked at in the end.
+
+    Returns:
+        The levels of what was relaxed; None where no piece is such a grid, or one would not be lower than it lies: then
+        all are where they were.
+    """
+    pieces, layout = state.network.pieces, state.positions()
+    below = [
+        far_below(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
+        for net, own in zip(pieces, state.vertices, strict=True)
+    ]
+    if not any(below):
+        return None
+    before = state.last
+    networks = [net if way is None else way[1].network for net, way in zip(pieces, below, strict=True)]
+    start = [layout[own] if way is None else way[1].layout for own, way in zip(state.vertices, below, strict=True)]
+    coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
+    levels = Levels(coarse, mend=True)
+    levels.rise()
+    coarse.evaluate_at_rest()
+    coarse.work_units += FORCE_WORK
+    levels.cycle(0)
+    state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
+    carried, relaxed = layout.copy(), coarse.positions()
+    for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
+        up = relaxed[of]
+        if way is not None:
+            levels.leading[way[1].step.surface] = way[1]
+            for step in reversed(way[0]):
+                assert step.smooth_carry is not None
+                up = step.smooth_carry(up)
+        carried[own] = up
+    state.position.assign(carried)
+    state.hold_upright()
+    state.work_units += ENERGY_WORK
+    if (state.begin().potential < before.potential).all():
+        return levels
+    state.position.assign(layout)
+    state.last = before
+    return None
+
+
+def mark(state: Relaxation) -> Mark:
+    """Where it is, and the forces of the cloth there, as they have just been evaluated."""
+    return state.positions(), state.cloth_force()
+
+
+def _watch_every(network: SpringNetwork) -> int:
+    return int(min(max(_WATCH_SOFT / math.sqrt(softness(network.fabric)), 1.0), _WATCH_EVERY))
+
+
+def softness(fabric: Fabric) -> float:
+    """K/G: how much stiffer the fabric is along its threads than in shear."""
+    return max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
