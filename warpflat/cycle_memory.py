@@ -40,24 +40,30 @@ class CycleMemory:
         """#V by 2, the way from where the last cycle has ended to where the energy is least [m]; None where that cannot be told.
 
         Args:
-            marks: of the last cycle, its begin, where its parts have met, and its end: each part is a way of its own.
+            marks: of the last cycle, its begin, where its parts have met, and its end: each part is a way of its own. Of those in
+                between nothing is left afterwards.
         """
+        begin = marks[0]
         if self._begin is not None:
             # A cycle before counts to where the next began: its leap is part of it, and holds what cycles before it have told.
-            self._past.append(_between(self._begin, marks[0]))
+            self._past.append(_between(self._begin, begin))
             del self._past[: -self._depth]
-        self._begin = marks[0]
-        parts = [*self._past, *(_between(*ends) for ends in pairwise(marks))]
-        ways, falls = (np.stack([part[k].ravel() for part in parts]) for k in (0, 1))
-        moved = (ways != 0.0).any(axis=1)
-        ways, falls = ways[moved], falls[moved]
+        self._begin = begin
+        parts = [*self._past, _between(begin, marks[1])]
+        for first, second in pairwise(marks[1:]):
+            # In the place of the first, which nobody needs any more.
+            np.subtract(second[0], first[0], out=first[0])
+            np.subtract(first[1], second[1], out=first[1])
+            parts.append(first)
+        parts = [part for part in parts if part[0].any()]
+        ways, falls = ([part[k].ravel() for part in parts] for k in (0, 1))
         curvature = products(ways, falls)
         curvature = 0.5 * (curvature + curvature.T)
         size = np.sqrt(np.abs(np.diag(curvature)))
-        if not (size > 0.0).all():
+        if not len(size) or not (size > 0.0).all():
             return None
         left = marks[-1][1]
-        gain = products(ways, left.reshape(1, -1))[:, 0]
+        gain = products(ways, [left.ravel()])[:, 0]
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size

@@ -40,7 +40,7 @@ __all__ = ["levels_pay", "relax_multilevel"]
 BoolArray = NDArray[np.bool_]
 
 # Of so many cycles it is remembered where they have led, leaps and all.
-_DEPTH = 6
+_DEPTH = 2
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0
 _FEW = 1_200

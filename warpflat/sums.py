@@ -6,6 +6,8 @@ the cores on which the kernels' ranges are to run: a quarter of the time of a re
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,8 +15,9 @@ __all__ = ["dot", "products", "weighted_rows"]
 
 FloatArray = NDArray[np.float64]
 
-# Products of so many columns are small enough to stay on one core.
+# Products of so many columns are small enough to stay on one core; so many are gathered at a time.
 _COLUMNS = 512
+_GATHERED = 16 * _COLUMNS
 
 
 def dot(a: FloatArray, b: FloatArray) -> float:
@@ -22,16 +25,19 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     return float(np.einsum("i,i->", a.ravel(), b.ravel()))
 
 
-def products(a: FloatArray, b: FloatArray) -> FloatArray:
+def products(a: Sequence[FloatArray] | FloatArray, b: Sequence[FloatArray] | FloatArray) -> FloatArray:
     """#A by #B, scalar products of the rows of `a` (#A by #N) with those of `b` (#B by #N)."""
     total = np.zeros((len(a), len(b)))
-    for begin in range(0, a.shape[1], _COLUMNS):
-        some = slice(begin, begin + _COLUMNS)
-        total += a[:, some] @ b[:, some].T
+    count = len(a[0]) if len(a) else 0
+    for begin in range(0, count, _GATHERED):
+        rows, others = (np.stack([row[begin : begin + _GATHERED] for row in of]) for of in (a, b))
+        for first in range(0, rows.shape[1], _COLUMNS):
+            some = slice(first, first + _COLUMNS)
+            total += rows[:, some] @ others[:, some].T
     return total
 
 
-def weighted_rows(weight: FloatArray, rows: FloatArray) -> FloatArray:
+def weighted_rows(weight: FloatArray, rows: Sequence[FloatArray] | FloatArray) -> FloatArray:
     """#N, the sum of rows (#A by #N), each times its weight (#A)."""
     total = weight[0] * rows[0]
     for k in range(1, len(rows)):
