@@ -47,6 +47,8 @@ _FEW = 0.1
 # Up to so many, or this share, turned back do not matter to the directions of the whole.
 _MENDED = 5
 _MENDED_SHARE = 1e-3
+# Layouts with more mirrored cells than this share are turned back only after smoother ones have been tried.
+_SOON_TURNED_BACK = 5e-3
 # Pieces of more vertices than this are smoothed by coarser meshes before they are given up.
 _LARGE = 5000
 
@@ -137,8 +139,7 @@ def develop(surface: Surface, datum: IntArray) -> Development:
         notes.append(f"the {method} development mirrors or crushes {folded:,} of {len(surface.faces):,} faces")
         if folded > _FEW * len(surface.faces):
             continue
-        for start in _smoother(surface, positions):
-            mirrored = _mirrored(cells, start)
+        for start, mirrored in _starts(surface, cells, positions):
             mended, left = untangle(surface, start, least_area=_LEAST_AREA, suspects=mirrored)
             if left == 0 and not _winds_twice(surface, cells, mended):
                 smoothed = "" if start is positions else "smoothed by a coarser mesh and "
@@ -150,6 +151,21 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     positions = _upright(harmonic_layout(surface), datum)
     notes.append("started from a harmonic map onto a disk instead, which cannot fold")
     return Development(positions=positions, method="harmonic", mended=True, notes=tuple(notes))
+
+
+def _starts(
+    surface: Surface, cells: CellArrays, positions: FloatArray
+) -> Iterator[tuple[FloatArray, NDArray[np.int64]]]:
+    """A layout and its smoother ones with the cells that are mirrored in them, those with few first: many take long to turn back, and
+    often cannot be."""
+    many = []
+    for start in _smoother(surface, positions):
+        mirrored = _mirrored(cells, start)
+        if len(mirrored) <= max(_MENDED, _SOON_TURNED_BACK * len(cells.corner)):
+            yield start, mirrored
+        else:
+            many.append((start, mirrored))
+    yield from many
 
 
 def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
