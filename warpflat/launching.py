@@ -29,7 +29,7 @@ from warpflat.packing import Command, commands_of
 __all__ = ["Launch", "Sequence", "launch_each", "record", "split_range", "thread_count"]
 
 # A range shorter than this is not worth waking a thread for (benchmarks/threads.py measures it).
-_LEAST_RANGE = 512
+_LEAST_RANGE = 2048
 # Ranges begin at multiples of this, so that no two threads write to one cache line.
 _ALIGNMENT = 64
 
