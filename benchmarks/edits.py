@@ -65,7 +65,7 @@ def change_with(start: Flattening, fabric: Fabric, look: Look) -> Flattening:
 def move_with(start: Flattening, surface: Surface, look: Look) -> Flattening:
     """A line that has moved."""
     # As if read anew each time.
-    return warpflat.change_surface(start, replace(surface, faces=surface.faces.copy(), of_faces={}), callback=look)
+    return warpflat.change_surface(start, replace(surface, faces=surface.faces.copy()), callback=look)
 
 
 def bulged(surface: Surface) -> Surface:

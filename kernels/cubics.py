@@ -4,6 +4,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False})
 
+# Neighbours count as at least so far apart [m].
+NEAREST = wp.constant(wp.float64(1.0e-9))
+
 
 @wp.struct
 class Nodes:
@@ -29,7 +32,8 @@ def look_along(
         further = following[at]
         if further < 0:
             break
-        away += wp.length(vertices[further] - vertices[at])
+        # Vertices at one place are told apart, however badly: weights stay numbers.
+        away += wp.max(wp.length(vertices[further] - vertices[at]), NEAREST)
         at = further
         if kept[at] != 0:
             nodes.vertex[nodes.count] = at

@@ -30,9 +30,7 @@ def moved(surface: Surface) -> Surface:
     x, y, z = surface.vertices.T
     bump = np.exp(-(((y - 0.28) / 0.05) ** 2))
     vertices = np.column_stack([x * (1.0 + 0.03 * bump), y + 0.005 * bump, z * (1.0 + 0.05 * bump)])
-    return replace(
-        surface, vertices=vertices, input_vertices=vertices, name="fuller", faces=surface.faces.copy(), of_faces={}
-    )
+    return replace(surface, vertices=vertices, input_vertices=vertices, name="fuller", faces=surface.faces.copy())
 
 
 @pytest.mark.parametrize("triangles", [False, True])

@@ -176,9 +176,13 @@ def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device="cpu")
     ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
     state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
-    before = state.begin()
+    before, load = state.begin(), np.random.default_rng(0).normal(size=done.positions.shape)
+    state.load.assign(load)
     assert carry_up(state) is None
     np.testing.assert_array_equal(state.positions(), done.positions)
+    np.testing.assert_array_equal(state.load.numpy(), load)
+    np.testing.assert_array_equal(state.velocity.numpy(), 0.0)
+    state.load.zero_()
     assert state.last is before
     outcome = relax_multilevel(state)
     assert outcome.converged

@@ -116,16 +116,14 @@ def _next(surface: Surface) -> Coarser | None:
 def inherit_levels(surface: Surface, other: Surface) -> None:
     """Let a surface have the coarser levels of another one of the same faces, whose vertices do not lie far from its own."""
     for step in coarser_surfaces(other):
-        mine = replace(step, surface=_part(surface, step.kept, step.surface.faces, step.surface.of_faces))
         if step.smooth_carry is None:
-            _inherited[surface] = mine
-        else:
-            # Lattices share what their faces tell anyway.
-            following = _next(surface)
-            if following is None:
-                return
-            mine = following
-        surface = mine.surface
+            part = _part(surface, step.kept, step.surface.faces, step.surface.of_faces)
+            _inherited[surface] = replace(step, surface=part)
+        # Lattices share what their faces tell anyway.
+        following = _next(surface)
+        if following is None:
+            return
+        surface = following.surface
 
 
 @once_per_surface

@@ -433,12 +433,15 @@ def carry_up(state: Relaxation) -> Levels | None:
                 assert step.smooth_carry is not None
                 up = step.smooth_carry(up)
         carried[own] = up
+    load = wp.clone(state.load)
     state.position.assign(carried)
     state.hold_upright()
     state.work_units += ENERGY_WORK
     if (state.begin().potential < before.potential).all():
         return levels
     state.position.assign(layout)
+    state.velocity.zero_()
+    wp.copy(state.load, load)
     state.last = before
     return None
 

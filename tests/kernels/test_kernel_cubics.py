@@ -42,6 +42,13 @@ def test_weights_are_those_of_the_polynomial_through_the_nearest(nodes: list[int
         np.testing.assert_array_equal(weight[v][len(near) :], 0.0)
 
 
+def test_weights_of_vertices_at_one_place_are_numbers() -> None:
+    place = np.array([0.0, 1.0, 1.0, 1.0, 1.0, 2.0, 3.0, 4.0])
+    _, weight = weights_of(place, np.isin(np.arange(8), [0, 2, 4, 7]))
+    assert np.isfinite(weight).all()
+    np.testing.assert_allclose(weight.sum(axis=1), 1.0, atol=1e-6)
+
+
 def test_values_are_summed_by_weight() -> None:
     rng = np.random.default_rng(0)
     column, weight, values = (

@@ -286,7 +286,7 @@ def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) ->
 @once_per_faces
 def components_of(surface: Surface) -> NDArray[np.int32]:
     """`components` of the surface's faces, worked out once."""
-    return _components(half_edges_of(surface), len(surface.faces), None)
+    return _fixed(_components(half_edges_of(surface), len(surface.faces), None))
 
 
 def _components(he: HalfEdges, size: int, barrier: NDArray[np.int32] | None) -> NDArray[np.int32]:
