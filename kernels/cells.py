@@ -2,6 +2,8 @@
 
 The deformation of a cell is F = dX/dx, from the plane (the cloth, unknown) to the tangent plane of the surface (the
 body, given): |F e| - 1 is how much a thread along e is stretched when the piece is worn.
+
+Kernels run face by face, over the one or four cells of each, and what cells do to their corners is added up by face.
 """
 
 import warp as wp
@@ -14,20 +16,21 @@ SLENDER = wp.constant(wp.float64(0.1))
 
 @wp.struct
 class Cells:
-    """The cells and where their corners' shares are gathered.
+    """The cells, face by face, and where the shares of the faces' corners are gathered.
 
-    corner: #C, vertices, anticlockwise in the plane.
-    edges: #C, the cell laid flat as on the surface: columns are the edges from corner 0 to corners 1 and 2 [m].
-    weight: #C, 1 for a triangle, 1/2 for each of a quad's four corner triangles.
+    face: #F, vertices, anticlockwise in the plane; -1 for the fourth of a triangle.
+    first: #F, the first of each face's cells.
+    laid: #C, the cell laid flat as on the surface, with corner 0 at the origin and corner 1 along x: x of corner 1, x and y of
+        corner 2 [m].
     offset: #V+1, where each vertex's entries in `slot` begin.
-    slot: 3 times the cell plus the corner, for every cell around a vertex.
-    slack: #C, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
-    onset: #C, worn stretch along warp and weft at which the guard begins to act.
+    slot: 4 times the face plus the corner, for every face around a vertex.
+    slack: #F, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
+    onset: #F, worn stretch along warp and weft at which the guard begins to act.
     """
 
-    corner: wp.array(dtype=wp.vec3i)
-    edges: wp.array(dtype=wp.mat22d)
-    weight: wp.array(dtype=wp.float64)
+    face: wp.array(dtype=wp.vec4i)
+    first: wp.array(dtype=wp.int32)
+    laid: wp.array(dtype=wp.vec3d)
     offset: wp.array(dtype=wp.int32)
     slot: wp.array(dtype=wp.int32)
     slack: wp.array(dtype=wp.vec2d)
@@ -49,19 +52,111 @@ class ThreadGuard:
 
 
 @wp.func
-def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
-    """The cell's edges from corner 0 to corners 1 and 2 in the plane, as columns [m]."""
-    here = position[corner[0]]
-    a = position[corner[1]] - here
-    b = position[corner[2]] - here
+def count_cells(face: wp.vec4i):
+    """How many cells a face has: a triangle one, a quad four."""
+    if face[3] < 0:
+        return 1
+    return 4
+
+
+@wp.func
+def cell_weight(face: wp.vec4i):
+    """Share of a cell's area that counts: a quad's four corner triangles cover it twice."""
+    if face[3] < 0:
+        return wp.float64(1.0)
+    return wp.float64(0.5)
+
+
+@wp.func
+def cell_places(face: wp.vec4i, k: int):
+    """Which of the face's corners its cell k has: a triangle's are its own; of a quad, the one before corner k, k, and the one after."""
+    if face[3] < 0:
+        return wp.vec3i(0, 1, 2)
+    return wp.vec3i((k + 3) & 3, k, (k + 1) & 3)
+
+
+@wp.func
+def cell_corner(face: wp.vec4i, k: int):
+    """The vertices of the face's cell k."""
+    at = cell_places(face, k)
+    return wp.vec3i(face[at[0]], face[at[1]], face[at[2]])
+
+
+@wp.func
+def laid_edges(laid: wp.vec3d):
+    """The edges of a laid cell from corner 0 to corners 1 and 2, as columns [m]."""
+    return wp.mat22d(laid[0], laid[1], wp.float64(0.0), laid[2])
+
+
+@wp.func
+def on_body(laid: wp.vec3d, share: wp.vec2d):
+    """`laid_edges` times a vector."""
+    return wp.vec2d(laid[0] * share[0] + laid[1] * share[1], laid[2] * share[1])
+
+
+@wp.func
+def across(D: wp.mat22d, v: wp.vec2d):
+    """The adjugate of D times a vector: det(D) D^-1 v."""
+    return wp.vec2d(D[1, 1] * v[0] - D[0, 1] * v[1], D[0, 0] * v[1] - D[1, 0] * v[0])
+
+
+@wp.func
+def longest_square(D: wp.mat22d):
+    """Square of the longest side of a cell with these edges [m2]."""
+    a = wp.vec2d(D[0, 0], D[1, 0])
+    b = wp.vec2d(D[0, 1], D[1, 1])
+    return wp.max(wp.dot(a, a), wp.max(wp.dot(b, b), wp.dot(b - a, b - a)))
+
+
+@wp.func
+def edge_matrix(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d):
+    """The edges of a cell with these corners from the first one, as columns [m]."""
+    a = p1 - p0
+    b = p2 - p0
     return wp.mat22d(a[0], b[0], a[1], b[1])
 
 
 @wp.func
-def is_beyond(worn: wp.vec2d, stretch: wp.float64):
-    """Whether the stretch of a worn thread, a unit vector mapped to `worn`, is more than this."""
-    length = wp.float64(1.0) + stretch
+def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
+    """The cell's edges from corner 0 to corners 1 and 2 in the plane, as columns [m]."""
+    return edge_matrix(position[corner[0]], position[corner[1]], position[corner[2]])
+
+
+@wp.func
+def is_beyond(worn: wp.vec2d, unit: wp.float64, stretch: wp.float64):
+    """Whether the stretch of a worn thread, a vector of length `unit` mapped to `worn`, is more than this."""
+    length = (wp.float64(1.0) + stretch) * unit
     return length < wp.float64(0.0) or wp.dot(worn, worn) > length * length
+
+
+@wp.func
+def early_share(det: wp.float64, longest2: wp.float64):
+    """The share of the onset from which on a cell's stiffness counts.
+
+    A half, and always in slender cells: a step can take these from far below the onset to far beyond it, and with the springs'
+    stiffness alone they would swing to and fro for ever.
+    """
+    if det < SLENDER * longest2:
+        return -wp.float64(wp.inf)
+    return wp.float64(0.5)
+
+
+@wp.func
+def look_at(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, onset: wp.vec2d):
+    """The square of a cell's least height [m2], 0 once it is mirrored, and 1 where the guard acts in it or is about to."""
+    D = edge_matrix(p0, p1, p2)
+    det = wp.determinant(D)
+    height2 = wp.float64(0.0)
+    near = int(0)
+    if det > wp.float64(0.0):
+        longest2 = longest_square(D)
+        height2 = det * det / longest2
+        early = early_share(det, longest2)
+        if is_beyond(on_body(laid, across(D, warp)), det, early * onset[0]) or is_beyond(
+            on_body(laid, across(D, weft)), det, early * onset[1]
+        ):
+            near = int(1)
+    return height2, near
 
 
 @wp.func
@@ -111,75 +206,97 @@ def evaluate_guard(
     guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
     that moves as a whole is not held back.
 
-    position: #V [m]. velocity: #V [m/s]. watch: 1 to look at all cells; with 0 those in which the guard did not act are passed over.
-    acting: #C, 1 where the guard acts or is about to; elsewhere the last three are not written.
-    clearance: #C, the cell's least height in the plane [m], 0 once it is mirrored. force, viscosity: 3 #C [N].
-    stiffness k: 3 #C, bound on the energy's second derivative by the corner's place [N/m].
+    position: #V [m]. velocity: #V [m/s]. watch: 1 to look at all faces; with 0 those in which the guard did not act are passed over.
+    acting: #F, 1 where the guard acts in a cell or is about to; elsewhere the last three are not written.
+    clearance: #F, the least height of its cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the faces'
+    corners [N]; a triangle's fourth is not used.
+    stiffness k: 4 #F, bound on the energy's second derivative by the corner's place [N/m].
     """
-    c = wp.tid() + first
-    if watch == 0 and acting[c] == 0:
+    f = wp.tid() + first
+    if watch == 0 and acting[f] == 0:
         return
-    corner = cells.corner[c]
-    D = flat_edges(position, corner)
-    det = wp.determinant(D)
-    a = wp.vec2d(D[0, 0], D[1, 0])
-    b = wp.vec2d(D[0, 1], D[1, 1])
-    longest = wp.sqrt(wp.max(wp.dot(a, a), wp.max(wp.dot(b, b), wp.dot(b - a, b - a))))
-    acting[c] = 0
-    clearance[c] = wp.float64(0.0)
-    if det > wp.float64(0.0):
-        clearance[c] = det / longest
-        inv = wp.inverse(D)
-        warp = guard.warp * cells.slack[c][0]
-        weft = guard.weft * cells.slack[c][1]
-        worn_warp = cells.edges[c] * (inv * warp)
-        worn_weft = cells.edges[c] * (inv * weft)
-        # The stiffness counts from half of the onset on, and always in slender cells: a step can take these from far
-        # below the onset to far beyond it, and with the springs' stiffness alone they would swing to and fro for ever.
-        early = wp.float64(0.5)
-        if clearance[c] < SLENDER * longest:
-            early = -wp.float64(wp.inf)
-        onset = cells.onset[c]
-        near_warp = early * onset[0]
-        near_weft = early * onset[1]
-        if is_beyond(worn_warp, near_warp) or is_beyond(worn_weft, near_weft):
-            acting[c] = 1
-            F = cells.edges[c] * inv
-            y_warp = excess_stretch(worn_warp, onset[0])
-            y_weft = excess_stretch(worn_weft, onset[1])
-            area = wp.float64(0.5) * det * cells.weight[c]
-            density = wp.float64(0.5) * (
-                guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
-            )
-            P = thread_stress(worn_warp, warp, guard.stiffness_warp, onset[0]) + thread_stress(
-                worn_weft, weft, guard.stiffness_weft, onset[1]
-            )
-            # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
-            inv_t = wp.transpose(inv)
-            G = (inv_t * density - wp.transpose(F) * P * inv_t) * area
-            f1 = wp.vec2d(-G[0, 0], -G[1, 0])
-            f2 = wp.vec2d(-G[0, 1], -G[1, 1])
-            q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, near_warp)
-            q_weft = thread_curvature(worn_weft, F, guard.stiffness_weft, near_weft)
-            # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
-            w1 = wp.vec2d(inv[0, 0], inv[0, 1])
-            w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-            k0 = area * guard_bound(-(w1 + w2), warp, weft, q_warp, q_weft, density)
-            k1 = area * guard_bound(w1, warp, weft, q_warp, q_weft, density)
-            k2 = area * guard_bound(w2, warp, weft, q_warp, q_weft, density)
-            v0 = velocity[corner[0]]
-            v1 = velocity[corner[1]]
-            v2 = velocity[corner[2]]
-            v_cell = (k0 * v0 + k1 * v1 + k2 * v2) / wp.max(k0 + k1 + k2, wp.float64(1.0e-300))
-            force[3 * c] = -(f1 + f2)
-            force[3 * c + 1] = f1
-            force[3 * c + 2] = f2
-            viscosity[3 * c] = (time_step * k0) * (v_cell - v0)
-            viscosity[3 * c + 1] = (time_step * k1) * (v_cell - v1)
-            viscosity[3 * c + 2] = (time_step * k2) * (v_cell - v2)
-            stiffness[3 * c] = k0
-            stiffness[3 * c + 1] = k1
-            stiffness[3 * c + 2] = k2
+    face = cells.face[f]
+    warp = guard.warp * cells.slack[f][0]
+    weft = guard.weft * cells.slack[f][1]
+    onset = cells.onset[f]
+    begin = cells.first[f]
+    p0 = position[face[0]]
+    p1 = position[face[1]]
+    p2 = position[face[2]]
+    acts = int(0)
+    height2 = wp.float64(0.0)
+    if face[3] < 0:
+        height2, acts = look_at(p0, p1, p2, cells.laid[begin], warp, weft, onset)
+    else:
+        p3 = position[face[3]]
+        h0, near0 = look_at(p3, p0, p1, cells.laid[begin], warp, weft, onset)
+        h1, near1 = look_at(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset)
+        h2, near2 = look_at(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset)
+        h3, near3 = look_at(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset)
+        height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
+        acts = near0 | near1 | near2 | near3
+    acting[f] = acts
+    clearance[f] = wp.sqrt(height2)
+    if acts != 0:
+        weight = cell_weight(face)
+        slot = 4 * f
+        for corner_slot in range(4):
+            force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+            viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+            stiffness[slot + corner_slot] = wp.float64(0.0)
+        for k in range(count_cells(face)):
+            at = cell_places(face, k)
+            i0 = face[at[0]]
+            i1 = face[at[1]]
+            i2 = face[at[2]]
+            laid = cells.laid[begin + k]
+            q0 = position[i0]
+            q1 = position[i1]
+            q2 = position[i2]
+            _, near = look_at(q0, q1, q2, laid, warp, weft, onset)
+            if near != 0:
+                D = edge_matrix(q0, q1, q2)
+                det = wp.determinant(D)
+                early = early_share(det, longest_square(D))
+                inv = wp.inverse(D)
+                F = laid_edges(laid) * inv
+                worn_warp = F * warp
+                worn_weft = F * weft
+                y_warp = excess_stretch(worn_warp, onset[0])
+                y_weft = excess_stretch(worn_weft, onset[1])
+                area = wp.float64(0.5) * det * weight
+                density = wp.float64(0.5) * (
+                    guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
+                )
+                P = thread_stress(worn_warp, warp, guard.stiffness_warp, onset[0]) + thread_stress(
+                    worn_weft, weft, guard.stiffness_weft, onset[1]
+                )
+                # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
+                inv_t = wp.transpose(inv)
+                G = (inv_t * density - wp.transpose(F) * P * inv_t) * area
+                f1 = wp.vec2d(-G[0, 0], -G[1, 0])
+                f2 = wp.vec2d(-G[0, 1], -G[1, 1])
+                q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, early * onset[0])
+                q_weft = thread_curvature(worn_weft, F, guard.stiffness_weft, early * onset[1])
+                # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
+                w1 = wp.vec2d(inv[0, 0], inv[0, 1])
+                w2 = wp.vec2d(inv[1, 0], inv[1, 1])
+                k0 = area * guard_bound(-(w1 + w2), warp, weft, q_warp, q_weft, density)
+                k1 = area * guard_bound(w1, warp, weft, q_warp, q_weft, density)
+                k2 = area * guard_bound(w2, warp, weft, q_warp, q_weft, density)
+                v0 = velocity[i0]
+                v1 = velocity[i1]
+                v2 = velocity[i2]
+                v_cell = (k0 * v0 + k1 * v1 + k2 * v2) / wp.max(k0 + k1 + k2, wp.float64(1.0e-300))
+                force[slot + at[0]] -= f1 + f2
+                force[slot + at[1]] += f1
+                force[slot + at[2]] += f2
+                viscosity[slot + at[0]] += (time_step * k0) * (v_cell - v0)
+                viscosity[slot + at[1]] += (time_step * k1) * (v_cell - v1)
+                viscosity[slot + at[2]] += (time_step * k2) * (v_cell - v2)
+                stiffness[slot + at[0]] += k0
+                stiffness[slot + at[1]] += k1
+                stiffness[slot + at[2]] += k2
 
 
 @wp.func
@@ -196,6 +313,32 @@ def guard_bound(
     )
 
 
+@wp.func
+def guard_energy(
+    p0: wp.vec2d,
+    p1: wp.vec2d,
+    p2: wp.vec2d,
+    laid: wp.vec3d,
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    onset: wp.vec2d,
+    guard: ThreadGuard,
+):
+    """Of a cell [J], infinite if it is collapsed or mirrored."""
+    D = edge_matrix(p0, p1, p2)
+    det = wp.determinant(D)
+    if det <= wp.float64(0.0):
+        return wp.float64(wp.inf)
+    worn_warp = on_body(laid, across(D, warp))
+    worn_weft = on_body(laid, across(D, weft))
+    if is_beyond(worn_warp, det, onset[0]) or is_beyond(worn_weft, det, onset[1]):
+        y_warp = excess_stretch(worn_warp / det, onset[0])
+        y_weft = excess_stretch(worn_weft / det, onset[1])
+        density = guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
+        return wp.float64(0.25) * det * density
+    return wp.float64(0.0)
+
+
 @wp.kernel
 def compute_guard_energy(
     position: wp.array(dtype=wp.vec2d),
@@ -205,23 +348,57 @@ def compute_guard_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """Energy of the thread guard per cell. position: #V [m]. energy: #C [J], infinite in a collapsed or mirrored cell."""
-    c = wp.tid() + first
-    D = flat_edges(position, cells.corner[c])
-    det = wp.determinant(D)
-    energy[c] = wp.float64(wp.inf)
-    if det > wp.float64(0.0):
-        inv = wp.inverse(D)
-        energy[c] = wp.float64(0.0)
-        worn_warp = cells.edges[c] * (inv * (guard.warp * cells.slack[c][0]))
-        worn_weft = cells.edges[c] * (inv * (guard.weft * cells.slack[c][1]))
-        onset = cells.onset[c]
-        if is_beyond(worn_warp, onset[0]) or is_beyond(worn_weft, onset[1]):
-            y_warp = excess_stretch(worn_warp, onset[0])
-            y_weft = excess_stretch(worn_weft, onset[1])
-            energy[c] = (
-                wp.float64(0.25)
-                * det
-                * cells.weight[c]
-                * (guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft)
-            )
+    """Energy of the thread guard per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
+    f = wp.tid() + first
+    face = cells.face[f]
+    warp = guard.warp * cells.slack[f][0]
+    weft = guard.weft * cells.slack[f][1]
+    onset = cells.onset[f]
+    begin = cells.first[f]
+    p0 = position[face[0]]
+    p1 = position[face[1]]
+    p2 = position[face[2]]
+    if face[3] < 0:
+        energy[f] = guard_energy(p0, p1, p2, cells.laid[begin], warp, weft, onset, guard)
+    else:
+        p3 = position[face[3]]
+        energy[f] = wp.float64(0.5) * (
+            guard_energy(p3, p0, p1, cells.laid[begin], warp, weft, onset, guard)
+            + guard_energy(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset, guard)
+            + guard_energy(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset, guard)
+            + guard_energy(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset, guard)
+        )
+
+
+@wp.func
+def area_share(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d):
+    """A cell's signed area in the plane over that on the body."""
+    return wp.determinant(edge_matrix(p0, p1, p2)) / wp.max(laid[0] * laid[2], wp.float64(1.0e-300))
+
+
+@wp.kernel
+def find_least_shares(
+    position: wp.array(dtype=wp.vec2d),
+    face: wp.array(dtype=wp.vec4i),
+    cell: wp.array(dtype=wp.int32),
+    laid: wp.array(dtype=wp.vec3d),
+    first: int,
+    # outputs
+    share: wp.array(dtype=wp.float64),
+):
+    """Signed area in the plane over that on the body, the least of the cells of each face. position: #V [m]. face, cell, laid: as
+    `Cells` has them. share: #F, 0 or less where a cell is collapsed or mirrored."""
+    f = wp.tid() + first
+    corners = face[f]
+    begin = cell[f]
+    p0 = position[corners[0]]
+    p1 = position[corners[1]]
+    p2 = position[corners[2]]
+    if corners[3] < 0:
+        share[f] = area_share(p0, p1, p2, laid[begin])
+    else:
+        p3 = position[corners[3]]
+        share[f] = wp.min(
+            wp.min(area_share(p3, p0, p1, laid[begin]), area_share(p0, p1, p2, laid[begin + 1])),
+            wp.min(area_share(p1, p2, p3, laid[begin + 2]), area_share(p2, p3, p0, laid[begin + 3])),
+        )

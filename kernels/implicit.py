@@ -33,11 +33,11 @@ def gather_forces(
     spring_stiffness: wp.array(dtype=wp.float64),
     springs: Springs,
     cells: Cells,
-    cell_acting: wp.array(dtype=wp.int32),
-    cell_clearance: wp.array(dtype=wp.float64),
-    cell_force: wp.array(dtype=wp.vec2d),
-    cell_viscosity: wp.array(dtype=wp.vec2d),
-    cell_stiffness: wp.array(dtype=wp.float64),
+    face_acting: wp.array(dtype=wp.int32),
+    face_clearance: wp.array(dtype=wp.float64),
+    face_force: wp.array(dtype=wp.vec2d),
+    face_viscosity: wp.array(dtype=wp.vec2d),
+    face_stiffness: wp.array(dtype=wp.float64),
     bonds: Bonds,
     bond_force: wp.array(dtype=wp.vec2d),
     bond_viscosity: wp.array(dtype=wp.vec2d),
@@ -58,12 +58,12 @@ def gather_forces(
 ):
     """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), and the neighbours' share, eq. (9).
 
-    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. cell_*: as `cells.evaluate_guard`. bond_*: as
-    `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all cells have been evaluated at these positions, 0 where only
+    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`. bond_*: as
+    `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all faces have been evaluated at these positions, 0 where only
     those that act were; then anchor, reach and guarded stay what they were.
     force F [N], power F.v / K [m2/s], driving_force F~ [N], first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
-    the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all cells are evaluated again [m],
-    guarded: 1 where a cell around it acts. All #V.
+    the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all faces are evaluated again [m],
+    guarded: 1 where a face around it acts. All #V.
     """
     i = wp.tid() + first
     total, driving = spring_forces_on(i, position, velocity, springs, time_step)
@@ -73,19 +73,19 @@ def gather_forces(
         height = wp.float64(wp.inf)
         acting = int(0)
         for e in range(cells.offset[i], cells.offset[i + 1]):
-            cell = cells.slot[e] / 3
-            height = wp.min(height, cell_clearance[cell])
-            acting = wp.max(acting, cell_acting[cell])
+            face = cells.slot[e] / 4
+            height = wp.min(height, face_clearance[face])
+            acting = wp.max(acting, face_acting[face])
         anchor[i] = position[i]
         reach[i] = STEP_SHARE * height
         guarded[i] = acting
     if guarded[i] != 0:
         for e in range(cells.offset[i], cells.offset[i + 1]):
             slot = cells.slot[e]
-            if cell_acting[slot / 3] != 0:
-                total += cell_force[slot]
-                driving += cell_viscosity[slot]
-                k += cell_stiffness[slot]
+            if face_acting[slot / 4] != 0:
+                total += face_force[slot]
+                driving += face_viscosity[slot]
+                k += face_stiffness[slot]
     for b in range(bonds.offset[i], bonds.offset[i + 1]):
         bond = bonds.slot[b]
         total += bond_force[bond]
@@ -142,7 +142,7 @@ def advance(
     i = wp.tid() + first
     coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     for s in range(springs.offset[i], springs.offset[i + 1]):
-        coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
+        coupling += springs.stiffness[springs.index[s]] * first_guess[springs.neighbor[s]]
     h2 = time_step * time_step
     dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] + dv

@@ -14,7 +14,16 @@ energy soft cloth would let threads come to lie side by side, and tiny faces of 
 
 import warp as wp
 
-from .cells import Cells, flat_edges
+from .cells import (
+    Cells,
+    cell_corner,
+    cell_places,
+    cell_weight,
+    count_cells,
+    flat_edges,
+    laid_edges,
+    longest_square,
+)
 
 wp.set_module_options({"enable_backward": False})
 
@@ -188,89 +197,93 @@ def evaluate_membrane(
     negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear. With
     the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and creep.
 
-    position: #V [m]. velocity: #V [m/s]. watch: as in `cells.evaluate_guard`. acting: #C, 0 in a mirrored cell, whose last three
-    are not written.
-    clearance: #C, the cell's least height in the plane [m], 0 once it is mirrored. force, viscosity: 3 #C [N].
-    stiffness: 3 #C [N/m].
+    position: #V [m]. velocity: #V [m/s]. watch: as in `cells.evaluate_guard`. acting: #F, 0 where all cells are mirrored; there the
+    last three are not written, and a mirrored cell adds nothing to them.
+    clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the
+    faces' corners [N]. stiffness: 4 #F [N/m].
     """
-    c = wp.tid() + first
-    if watch == 0 and acting[c] == 0:
+    f = wp.tid() + first
+    if watch == 0 and acting[f] == 0:
         return
-    corner = cells.corner[c]
-    D = flat_edges(position, corner)
-    det = wp.determinant(D)
-    a = wp.vec2d(D[0, 0], D[1, 0])
-    b = wp.vec2d(D[0, 1], D[1, 1])
-    longest = wp.max(wp.length(a), wp.max(wp.length(b), wp.length(b - a)))
-    acting[c] = 0
-    clearance[c] = wp.float64(0.0)
-    if det > wp.float64(0.0):
-        acting[c] = 1
-        clearance[c] = det / longest
-        inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        warp = cloth.warp * cells.slack[c][0]
-        weft = cloth.weft * cells.slack[c][1]
-        worn_warp = F * warp
-        worn_weft = F * weft
-        length_warp = wp.max(wp.length(worn_warp), TINY)
-        length_weft = wp.max(wp.length(worn_weft), TINY)
-        e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
-        gamma = wp.dot(worn_warp, worn_weft)
-        across = sheared_threads(gamma, cloth)
-        tau = across[0]
-        law = stretched_sheet(e, cloth)
-        psi = law[2] + across[1]
-        area = wp.float64(0.5) * det * cells.weight[c]
-        P = wp.outer(worn_warp * (law[0] / length_warp) + tau * worn_weft, warp) + wp.outer(
-            worn_weft * (law[1] / length_weft) + tau * worn_warp, weft
-        )
-        # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
-        inv_t = wp.transpose(inv)
-        G = (inv_t * psi - wp.transpose(F) * P * inv_t) * area
-        f1 = wp.vec2d(-G[0, 0], -G[1, 0])
-        f2 = wp.vec2d(-G[0, 1], -G[1, 1])
-        force[3 * c] = -(f1 + f2)
-        force[3 * c + 1] = f1
-        force[3 * c + 2] = f2
+    face = cells.face[f]
+    begin = cells.first[f]
+    slot = 4 * f
+    acts = int(0)
+    least = wp.float64(wp.inf)
+    for k in range(count_cells(face)):
+        corner = cell_corner(face, k)
+        D = flat_edges(position, corner)
+        det = wp.max(wp.determinant(D), wp.float64(0.0))
+        least = wp.min(least, det / wp.max(wp.sqrt(longest_square(D)), TINY))
+        if det > wp.float64(0.0):
+            if acts == 0:
+                for corner_slot in range(4):
+                    force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+                    viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+                    stiffness[slot + corner_slot] = wp.float64(0.0)
+            acts = 1
+            inv = wp.inverse(D)
+            F = laid_edges(cells.laid[begin + k]) * inv
+            warp = cloth.warp * cells.slack[f][0]
+            weft = cloth.weft * cells.slack[f][1]
+            worn_warp = F * warp
+            worn_weft = F * weft
+            length_warp = wp.max(wp.length(worn_warp), TINY)
+            length_weft = wp.max(wp.length(worn_weft), TINY)
+            e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
+            gamma = wp.dot(worn_warp, worn_weft)
+            across = sheared_threads(gamma, cloth)
+            tau = across[0]
+            law = stretched_sheet(e, cloth)
+            psi = law[2] + across[1]
+            area = wp.float64(0.5) * det * cell_weight(face)
+            P = wp.outer(worn_warp * (law[0] / length_warp) + tau * worn_weft, warp) + wp.outer(
+                worn_weft * (law[1] / length_weft) + tau * worn_warp, weft
+            )
+            # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
+            inv_t = wp.transpose(inv)
+            G = (inv_t * psi - wp.transpose(F) * P * inv_t) * area
+            f1 = wp.vec2d(-G[0, 0], -G[1, 0])
+            f2 = wp.vec2d(-G[0, 1], -G[1, 1])
+            at = cell_places(face, k)
+            force[slot + at[0]] -= f1 + f2
+            force[slot + at[1]] += f1
+            force[slot + at[2]] += f2
 
-        q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
-        w1 = wp.vec2d(inv[0, 0], inv[0, 1])
-        w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-        w0 = -(w1 + w2)
-        none = wp.float64(0.0)
-        two = wp.float64(2.0)
-        k0 = area * pair_bound(w0, w0, warp, weft, q, psi)
-        k1 = area * pair_bound(w1, w1, warp, weft, q, psi)
-        k2 = area * pair_bound(w2, w2, warp, weft, q, psi)
-        k0 = two * wp.max(k0 - cloth.held[3 * c], none)
-        k1 = two * wp.max(k1 - cloth.held[3 * c + 1], none)
-        k2 = two * wp.max(k2 - cloth.held[3 * c + 2], none)
-        v0 = velocity[corner[0]]
-        v1 = velocity[corner[1]]
-        v2 = velocity[corner[2]]
-        # v changes F by -F A, with A the gradient of v in the plane.
-        a1 = v1 - v0
-        a2 = v2 - v0
-        A = wp.mat22d(a1[0], a2[0], a1[1], a2[1]) * inv
-        back_warp = wp.transpose(F) * worn_warp
-        back_weft = wp.transpose(F) * worn_weft
-        unit_warp = back_warp / length_warp
-        unit_weft = back_weft / length_weft
-        rate = stress_rates(-wp.dot(unit_warp, A * warp), -wp.dot(unit_weft, A * weft), e, cloth)
-        tau_rate = -across[2] * (wp.dot(back_weft, A * warp) + wp.dot(back_warp, A * weft))
-        R = wp.outer(unit_warp * rate[0] + back_weft * tau_rate, warp) + wp.outer(
-            unit_weft * rate[1] + back_warp * tau_rate, weft
-        )
-        V = (R * inv_t) * (area * time_step)
-        d1 = wp.vec2d(V[0, 0], V[1, 0])
-        d2 = wp.vec2d(V[0, 1], V[1, 1])
-        viscosity[3 * c] = -(d1 + d2)
-        viscosity[3 * c + 1] = d1
-        viscosity[3 * c + 2] = d2
-        stiffness[3 * c] = k0
-        stiffness[3 * c + 1] = k1
-        stiffness[3 * c + 2] = k2
+            q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
+            w1 = wp.vec2d(inv[0, 0], inv[0, 1])
+            w2 = wp.vec2d(inv[1, 0], inv[1, 1])
+            w0 = -(w1 + w2)
+            none = wp.float64(0.0)
+            two = wp.float64(2.0)
+            held = 3 * (begin + k)
+            k0 = area * pair_bound(w0, w0, warp, weft, q, psi)
+            k1 = area * pair_bound(w1, w1, warp, weft, q, psi)
+            k2 = area * pair_bound(w2, w2, warp, weft, q, psi)
+            stiffness[slot + at[0]] += two * wp.max(k0 - cloth.held[held], none)
+            stiffness[slot + at[1]] += two * wp.max(k1 - cloth.held[held + 1], none)
+            stiffness[slot + at[2]] += two * wp.max(k2 - cloth.held[held + 2], none)
+            # v changes F by -F A, with A the gradient of v in the plane.
+            a1 = velocity[corner[1]] - velocity[corner[0]]
+            a2 = velocity[corner[2]] - velocity[corner[0]]
+            A = wp.mat22d(a1[0], a2[0], a1[1], a2[1]) * inv
+            back_warp = wp.transpose(F) * worn_warp
+            back_weft = wp.transpose(F) * worn_weft
+            unit_warp = back_warp / length_warp
+            unit_weft = back_weft / length_weft
+            rate = stress_rates(-wp.dot(unit_warp, A * warp), -wp.dot(unit_weft, A * weft), e, cloth)
+            tau_rate = -across[2] * (wp.dot(back_weft, A * warp) + wp.dot(back_warp, A * weft))
+            R = wp.outer(unit_warp * rate[0] + back_weft * tau_rate, warp) + wp.outer(
+                unit_weft * rate[1] + back_warp * tau_rate, weft
+            )
+            V = (R * inv_t) * (area * time_step)
+            d1 = wp.vec2d(V[0, 0], V[1, 0])
+            d2 = wp.vec2d(V[0, 1], V[1, 1])
+            viscosity[slot + at[0]] -= d1 + d2
+            viscosity[slot + at[1]] += d1
+            viscosity[slot + at[2]] += d2
+    acting[f] = acts
+    clearance[f] = least
 
 
 @wp.kernel
@@ -289,28 +302,32 @@ def bound_membrane(
 
     position: #V [m]. weight: 3 #C, along the sides 0-1, 1-2, 2-0 [N/m]; a mirrored cell's is left as it was.
     """
-    c = wp.tid() + first
-    D = flat_edges(position, cells.corner[c])
-    det = wp.determinant(D)
-    if det > wp.float64(0.0):
-        inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        warp = cloth.warp * cells.slack[c][0]
-        weft = cloth.weft * cells.slack[c][1]
-        worn_warp = F * warp
-        worn_weft = F * weft
-        e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
-        gamma = wp.dot(worn_warp, worn_weft)
-        psi = stretched_sheet(e, cloth)[2] + sheared_threads(gamma, cloth)[1]
-        q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
-        area = wp.float64(0.5) * det * cells.weight[c]
-        w1 = wp.vec2d(inv[0, 0], inv[0, 1])
-        w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-        w0 = -(w1 + w2)
-        none = wp.float64(0.0)
-        weight[3 * c] = wp.max(-area * pair_bound(w0, w1, warp, weft, q, psi), none)
-        weight[3 * c + 1] = wp.max(-area * pair_bound(w1, w2, warp, weft, q, psi), none)
-        weight[3 * c + 2] = wp.max(-area * pair_bound(w2, w0, warp, weft, q, psi), none)
+    f = wp.tid() + first
+    face = cells.face[f]
+    begin = cells.first[f]
+    warp = cloth.warp * cells.slack[f][0]
+    weft = cloth.weft * cells.slack[f][1]
+    for k in range(count_cells(face)):
+        c = begin + k
+        D = flat_edges(position, cell_corner(face, k))
+        det = wp.determinant(D)
+        if det > wp.float64(0.0):
+            inv = wp.inverse(D)
+            F = laid_edges(cells.laid[c]) * inv
+            worn_warp = F * warp
+            worn_weft = F * weft
+            e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
+            gamma = wp.dot(worn_warp, worn_weft)
+            psi = stretched_sheet(e, cloth)[2] + sheared_threads(gamma, cloth)[1]
+            q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
+            area = wp.float64(0.5) * det * cell_weight(face)
+            w1 = wp.vec2d(inv[0, 0], inv[0, 1])
+            w2 = wp.vec2d(inv[1, 0], inv[1, 1])
+            w0 = -(w1 + w2)
+            none = wp.float64(0.0)
+            weight[3 * c] = wp.max(-area * pair_bound(w0, w1, warp, weft, q, psi), none)
+            weight[3 * c + 1] = wp.max(-area * pair_bound(w1, w2, warp, weft, q, psi), none)
+            weight[3 * c + 2] = wp.max(-area * pair_bound(w2, w0, warp, weft, q, psi), none)
 
 
 @wp.kernel
@@ -322,21 +339,28 @@ def compute_membrane_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """(Flat area) psi per cell. position: #V [m]. energy: #C [J], infinite in a collapsed or mirrored cell."""
-    c = wp.tid() + first
-    D = flat_edges(position, cells.corner[c])
-    det = wp.determinant(D)
-    energy[c] = wp.float64(wp.inf)
-    if det > wp.float64(0.0):
-        inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        worn_warp = F * (cloth.warp * cells.slack[c][0])
-        worn_weft = F * (cloth.weft * cells.slack[c][1])
-        e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
-        gamma = wp.dot(worn_warp, worn_weft)
-        law = stretched_sheet(e, cloth)
-        psi = law[2] + sheared_threads(gamma, cloth)[1]
-        energy[c] = wp.float64(0.5) * det * cells.weight[c] * psi
+    """(Flat area) psi per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
+    f = wp.tid() + first
+    face = cells.face[f]
+    begin = cells.first[f]
+    warp = cloth.warp * cells.slack[f][0]
+    weft = cloth.weft * cells.slack[f][1]
+    total = wp.float64(0.0)
+    for k in range(count_cells(face)):
+        D = flat_edges(position, cell_corner(face, k))
+        det = wp.determinant(D)
+        if det > wp.float64(0.0):
+            F = laid_edges(cells.laid[begin + k]) * wp.inverse(D)
+            worn_warp = F * warp
+            worn_weft = F * weft
+            e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
+            gamma = wp.dot(worn_warp, worn_weft)
+            law = stretched_sheet(e, cloth)
+            psi = law[2] + sheared_threads(gamma, cloth)[1]
+            total += wp.float64(0.5) * det * cell_weight(face) * psi
+        else:
+            total = wp.float64(wp.inf)
+    energy[f] = total
 
 
 @wp.kernel
@@ -353,26 +377,28 @@ def compute_membrane_strain(
 ):
     """Worn strain against the unstretched cloth, with the membrane's stresses and energy; as `strain.compute_worn_strain`.
 
-    position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m]. energy: #C [J].
-    area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
+    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
-    c = wp.tid() + first
-    D = flat_edges(position, cells.corner[c])
-    det = wp.determinant(D)
-    area[c] = wp.float64(0.5) * det * cells.weight[c]
-    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
-    if det > wp.float64(0.0):
-        inv = wp.inverse(D)
-        F = cells.edges[c] * inv
-        worn_warp = F * cloth.warp
-        worn_weft = F * cloth.weft
-        e = wp.vec3d(
-            wp.length(worn_warp) - wp.float64(1.0),
-            wp.length(worn_weft) - wp.float64(1.0),
-            wp.dot(worn_warp, worn_weft),
-        )
-    law = stretched_sheet(wp.vec2d(e[0], e[1]), cloth)
-    across = sheared_threads(e[2], cloth)
-    strain[c] = e
-    stress[c] = wp.vec3d(law[0], law[1], across[0])
-    energy[c] = (law[2] + across[1]) * area[c]
+    f = wp.tid() + first
+    face = cells.face[f]
+    for k in range(count_cells(face)):
+        c = cells.first[f] + k
+        D = flat_edges(position, cell_corner(face, k))
+        det = wp.determinant(D)
+        area[c] = wp.float64(0.5) * det * cell_weight(face)
+        e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+        if det > wp.float64(0.0):
+            F = laid_edges(cells.laid[c]) * wp.inverse(D)
+            worn_warp = F * cloth.warp
+            worn_weft = F * cloth.weft
+            e = wp.vec3d(
+                wp.length(worn_warp) - wp.float64(1.0),
+                wp.length(worn_weft) - wp.float64(1.0),
+                wp.dot(worn_warp, worn_weft),
+            )
+        law = stretched_sheet(wp.vec2d(e[0], e[1]), cloth)
+        across = sheared_threads(e[2], cloth)
+        strain[c] = e
+        stress[c] = wp.vec3d(law[0], law[1], across[0])
+        energy[c] = (law[2] + across[1]) * area[c]

@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .cells import Cells, flat_edges
+from .cells import Cells, cell_corner, cell_weight, count_cells, flat_edges, laid_edges
 
 wp.set_module_options({"enable_backward": False})
 
@@ -36,13 +36,15 @@ def measure_flat_cells(
 
 
 @wp.func
-def worn_strain(position: wp.array(dtype=wp.vec2d), cells: Cells, membrane: Membrane, c: int):
-    """The cell's weighted flat area [m2], 0 or less if it is mirrored, and its strains along warp and weft and in shear, then 0."""
-    D = flat_edges(position, cells.corner[c])
+def worn_strain(position: wp.array(dtype=wp.vec2d), cells: Cells, membrane: Membrane, f: int, k: int):
+    """Of a face's k-th cell the weighted flat area [m2], 0 or less if it is mirrored, and its strains along warp and weft and in
+    shear, then 0."""
+    face = cells.face[f]
+    D = flat_edges(position, cell_corner(face, k))
     det = wp.determinant(D)
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if det > wp.float64(0.0):
-        F = cells.edges[c] * wp.inverse(D)
+        F = laid_edges(cells.laid[cells.first[f] + k]) * wp.inverse(D)
         worn_warp = F * membrane.warp
         worn_weft = F * membrane.weft
         e = wp.vec3d(
@@ -50,7 +52,7 @@ def worn_strain(position: wp.array(dtype=wp.vec2d), cells: Cells, membrane: Memb
             wp.length(worn_weft) - wp.float64(1.0),
             wp.dot(worn_warp, worn_weft),
         )
-    return wp.float64(0.5) * det * cells.weight[c], e
+    return wp.float64(0.5) * det * cell_weight(face), e
 
 
 @wp.func
@@ -79,16 +81,18 @@ def compute_worn_strain(
 
     U = 1/2 (sigma_warp e_warp + sigma_weft e_weft + tau gamma) a, eq. (3), with a the signed flat area of the cell.
 
-    position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m]. energy: #C [J].
-    area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
+    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
-    c = wp.tid() + first
-    flat, e = worn_strain(position, cells, membrane, c)
-    s = stress_of(e, membrane)
-    strain[c] = e
-    stress[c] = s
-    energy[c] = wp.float64(0.5) * wp.dot(s, e) * flat
-    area[c] = flat
+    f = wp.tid() + first
+    for k in range(count_cells(cells.face[f])):
+        c = cells.first[f] + k
+        flat, e = worn_strain(position, cells, membrane, f, k)
+        s = stress_of(e, membrane)
+        strain[c] = e
+        stress[c] = s
+        energy[c] = wp.float64(0.5) * wp.dot(s, e) * flat
+        area[c] = flat
 
 
 @wp.kernel
@@ -100,10 +104,13 @@ def compute_strain_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """The energy of `compute_worn_strain` alone. position: #V [m]. energy: #C [J]."""
-    c = wp.tid() + first
-    flat, e = worn_strain(position, cells, membrane, c)
-    energy[c] = wp.float64(0.5) * wp.dot(stress_of(e, membrane), e) * flat
+    """The energy of `compute_worn_strain` alone, per face. position: #V [m]. energy: #F [J]."""
+    f = wp.tid() + first
+    total = wp.float64(0.0)
+    for k in range(count_cells(cells.face[f])):
+        flat, e = worn_strain(position, cells, membrane, f, k)
+        total += wp.float64(0.5) * wp.dot(stress_of(e, membrane), e) * flat
+    energy[f] = total
 
 
 @wp.kernel

@@ -165,15 +165,14 @@ def beside(out: wp.vec3d, hinge: wp.vec3d, length: wp.float64, side: wp.float64)
 
 @wp.func
 def lay_cell(p: wp.vec3d, q: wp.vec3d, r: wp.vec3d):
-    """Edges from p to q and to r as columns, the first along x [m]; and twice the area [m2]."""
+    """A triangle laid flat with p at the origin and q along x: x of q, x and y of r [m]."""
     a = q - p
     b = r - p
     length = wp.length(a)
-    twice = wp.length(wp.cross(a, b))
     safe = length
     if length == wp.float64(0.0):
         safe = wp.float64(1.0)
-    return wp.mat22d(length, wp.dot(a, b) / safe, wp.float64(0.0), twice / safe), twice
+    return wp.vec3d(length, wp.dot(a, b) / safe, wp.length(wp.cross(a, b)) / safe)
 
 
 @wp.kernel
@@ -184,14 +183,12 @@ def lay_cells(
     cell: wp.array(dtype=wp.int32),
     first: int,
     # outputs
-    edges: wp.array(dtype=wp.mat22d),
-    area: wp.array(dtype=wp.float64),
+    laid: wp.array(dtype=wp.vec3d),
 ):
     """Cells laid flat: a triangle is one, a quad four, at its corners; those of a creased quad come from the one quad that it
     unfolds into.
 
-    crease: #F, as `find_creases` has it. cell: #F, the first of each face. edges: #C, as `cells.Cells` has them [m].
-    area: #C [m2], of a quad's by half.
+    crease: #F, as `find_creases` has it. cell: #F, the first of each face. laid: #C, as `cells.Cells` has them [m].
     """
     f = wp.tid() + first
     face = faces[f]
@@ -200,9 +197,7 @@ def lay_cells(
     p1 = vertices[face[1]]
     p2 = vertices[face[2]]
     if face[3] < 0:
-        laid, twice = lay_cell(p0, p1, p2)
-        edges[c] = laid
-        area[c] = wp.float64(0.5) * twice
+        laid[c] = lay_cell(p0, p1, p2)
     else:
         p3 = vertices[face[3]]
         if crease[f] == wp.int8(0):
@@ -225,9 +220,7 @@ def lay_cells(
         after = p1
         last = p2
         for k in range(4):
-            laid, twice = lay_cell(before, here, after)
-            edges[c + k] = laid
-            area[c + k] = wp.float64(0.25) * twice
+            laid[c + k] = lay_cell(before, here, after)
             keep = before
             before = here
             here = after
@@ -237,16 +230,29 @@ def lay_cells(
 
 @wp.kernel
 def add_areas(
+    faces: wp.array(dtype=wp.vec4i),
+    cell: wp.array(dtype=wp.int32),
+    laid: wp.array(dtype=wp.vec3d),
     offset: wp.array(dtype=wp.int32),
     slot: wp.array(dtype=wp.int32),
-    area: wp.array(dtype=wp.float64),
     first: int,
     # outputs
     total: wp.array(dtype=wp.float64),
 ):
-    """A third of the areas of the cells around each vertex [m2]. offset: #V+1, into `slot`: 3 times the cell plus the corner."""
+    """A third of the weighted areas of the cells around each vertex [m2]. cell: #F, the first of each face. laid: #C, as `lay_cells`
+    has them. offset: #V+1, into `slot`: 4 times the face plus the corner."""
     i = wp.tid() + first
-    there = wp.float64(0.0)
+    twice = wp.float64(0.0)
     for e in range(offset[i], offset[i + 1]):
-        there += area[slot[e] / 3]
-    total[i] = there / wp.float64(3.0)
+        f = slot[e] / 4
+        if faces[f][3] < 0:
+            laid_flat = laid[cell[f]]
+            twice += laid_flat[0] * laid_flat[2]
+        else:
+            # A quad's corner is in three of its four cells, not in that of the corner across.
+            beyond = (slot[e] + 2) & 3
+            for k in range(4):
+                if k != beyond:
+                    laid_flat = laid[cell[f] + k]
+                    twice += wp.float64(0.5) * laid_flat[0] * laid_flat[2]
+    total[i] = twice / wp.float64(6.0)

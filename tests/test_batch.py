@@ -226,7 +226,8 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), cells_of(surface)
     np.testing.assert_array_equal(joined.springs.offset.numpy(), springs.around.offset)
     np.testing.assert_array_equal(joined.springs.neighbor.numpy(), springs.around.neighbor)
-    np.testing.assert_array_equal(joined.springs.rest_length.numpy(), springs.listed_length)
+    listed = joined.springs.rest_length.numpy()[joined.springs.index.numpy()]
+    np.testing.assert_array_equal(listed, springs.rest_length[springs.around.entry])
     assert joined.spring_arrays.edge_count == springs.edge_count
     for ends in (joined.spring_arrays.ends, springs.ends):
         assert len(np.unique(np.sort(ends, axis=1), axis=0)) == joined.spring_count
@@ -237,7 +238,7 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     np.testing.assert_array_equal(joined.cell_arrays.area[order], cells.area[wished])
     around = joined.cell_arrays.around
     vertex = np.repeat(np.arange(joined.vertex_count), np.diff(around.offset))
-    np.testing.assert_array_equal(joined.cell_arrays.corner.ravel()[around.entry], vertex)
+    np.testing.assert_array_equal(joined.cell_arrays.faces.ravel()[around.entry], vertex)
 
 
 @pytest.mark.parametrize("stretched", [False, True])

@@ -54,8 +54,10 @@ def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
         "position": state.position.numpy().copy(),
         "velocity": state.velocity.numpy().copy(),
         "force": state.force.numpy().copy(),
-        # Of cells that act; nobody reads those of the others.
-        "cell force": np.where(np.repeat(state._cell_acting.numpy(), 3)[:, None] != 0, state._cell_force.numpy(), 0.0),
+        # Of corners of faces that act; nobody reads those of the others.
+        "face force": np.where(np.repeat(state._face_acting.numpy(), 4)[:, None] != 0, state._face_force.numpy(), 0.0)[
+            (surface.faces >= 0).ravel()
+        ],
         "energies": state.potentials(),
     }
 
@@ -66,7 +68,7 @@ def test_results_are_those_of_one_thread_bit_for_bit(triangles: bool, monkeypatc
     monkeypatch.setattr("warpflat.launching._LEAST_RANGE", 64)
     expected = steps_of(1, triangles=triangles)
     assert np.ptp(expected["position"]) > 0.1
-    assert np.abs(expected["cell force"]).max() > 0
+    assert np.abs(expected["face force"]).max() > 0
     for threads in (2, 3, 5):
         for name, values in steps_of(threads, triangles=triangles).items():
             np.testing.assert_array_equal(values, expected[name], err_msg=f"{name}, {threads} threads")
@@ -76,7 +78,7 @@ def test_recorded_launches_are_those_of_warp() -> None:
     surface = bodice(resolution=8)
     start = develop(surface, surface.lines["centre"]).positions
     network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
-    at, count = wp.array(start, dtype=wp.vec2d, device="cpu"), network.cell_count
+    at, count = wp.array(start, dtype=wp.vec2d, device="cpu"), network.face_count
     energy, recorded = (wp.zeros(count, dtype=wp.float64, device="cpu") for _ in range(2))
     inputs = [at, network.cells, network.guard]
     wp.launch(compute_guard_energy, dim=count, inputs=[*inputs, 0], outputs=[energy], device="cpu")

@@ -53,7 +53,7 @@ def springs_and_guard(network: SpringNetwork, positions: FloatArray) -> tuple[fl
     for thread, stiffness, onset in zip(
         grain_axes(network.grain_angle),
         (fabric.stiffness_warp, fabric.stiffness_weft),
-        network.cells.onset.numpy().T,
+        network.cells.onset.numpy()[c.face].T,
         strict=True,
     ):
         worn = deformation @ thread

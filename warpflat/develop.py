@@ -161,7 +161,7 @@ def _starts(
     many = []
     for start in _smoother(surface, positions):
         mirrored = _mirrored(cells, start)
-        if len(mirrored) <= max(_MENDED, _SOON_TURNED_BACK * len(cells.corner)):
+        if len(mirrored) <= max(_MENDED, _SOON_TURNED_BACK * len(cells.laid)):
             yield start, mirrored
         else:
             many.append((start, mirrored))
@@ -223,6 +223,8 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
 
 def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
     """The cells that are mirrored or as good as that."""
+    if (cells.least_shares(positions) > _LEAST_AREA).all():
+        return np.empty(0, dtype=np.int64)
     return np.flatnonzero(signed_cell_areas(cells.corner, positions) * cells.weight <= _LEAST_AREA * cells.area)
 
 

@@ -151,7 +151,7 @@ def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) ->
     if network.model == "springs":
         return replace(network, spring_arrays=springs, cell_arrays=cells)
     stretch = network.stretch
-    meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
+    meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
     weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, positions, meant)
     return replace(network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held=held)
 
@@ -180,5 +180,8 @@ def _wider_cells(
     widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
     p = positions[cells.corner]
     flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-    edges = cells.edges @ np.linalg.solve(flat, widen @ flat)
-    return replace(cells, edges=edges, area=cells.area * here[:, 0] * here[:, 1])
+    a, b = np.moveaxis(cells.edges @ np.linalg.solve(flat, widen @ flat), -1, 0)
+    # Laid with the first side along x again: F only matters up to a turn of the body.
+    length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
+    across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
+    return replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))

@@ -49,7 +49,7 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     vertex = begins([net.vertex_count for net in networks])
     stretches = [net.stretch for net in networks if net.stretch is not None]
     held = [net.held for net in networks if net.held is not None]
-    hold = np.concatenate([np.broadcast_to(net.shear_hold, net.cell_count) for net in networks])
+    hold = np.concatenate([np.broadcast_to(net.shear_hold, net.face_count) for net in networks])
     return SpringNetwork(
         surface=join_surfaces([net.surface for net in networks]),
         fabric=first.fabric,
@@ -95,17 +95,17 @@ def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray) -> SpringAr
 
 def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArrays:
     cells = [net.cell_arrays for net in networks]
-    face, cell = begins([len(net.surface.faces) for net in networks]), begins([len(c.corner) for c in cells])
+    face, cell = begins([len(c.faces) for c in cells]), begins([len(c.laid) for c in cells])
     around = [c.around for c in cells]
     return CellArrays(
-        corner=np.concatenate([c.corner + at for c, at in zip(cells, vertex, strict=False)]),
-        face=np.concatenate([c.face + at for c, at in zip(cells, face, strict=False)]),
-        weight=np.concatenate([c.weight for c in cells]),
-        edges=np.concatenate([c.edges for c in cells]),
-        area=np.concatenate([c.area for c in cells]),
+        faces=np.concatenate(
+            [np.where(c.faces >= 0, c.faces + at, np.int32(-1)) for c, at in zip(cells, vertex, strict=False)]
+        ),
+        first=np.concatenate([c.first + at for c, at in zip(cells, cell, strict=False)]),
+        laid=np.concatenate([c.laid for c in cells]),
         around=ByVertex(
             offset=_join_offsets(around),
-            entry=np.concatenate([a.entry + 3 * at for a, at in zip(around, cell, strict=False)]),
+            entry=np.concatenate([a.entry + 4 * at for a, at in zip(around, face, strict=False)]),
         ),
     )
 

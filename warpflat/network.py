@@ -31,19 +31,19 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric
-from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
+from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard, find_least_shares
 from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import (
     Lattice,
+    add_stiffness,
     find_directions,
     find_sides,
     list_springs,
     measure_edges,
     measure_hold,
-    spread_stiffness,
     weigh_quads,
     weigh_triangles,
 )
@@ -58,7 +58,7 @@ from warpflat.surface.topology import (
     rows_of,
     unfold_quad_diagonals,
 )
-from warpflat.surface.unfold import lay_cells, quad_creases
+from warpflat.surface.unfold import corners_around, lay_cells, quad_creases
 
 __all__ = ["SpringNetwork", "cells_of", "grain_axes", "springs_of"]
 
@@ -123,19 +123,18 @@ class SpringsAround(ByVertex):
 
 @dataclass(frozen=True, kw_only=True)
 class _Unweighed:
-    """Of a surface's springs what no fabric changes: as in SpringArrays, and the rest lengths as they are listed around the vertices."""
+    """Of a surface's springs what no fabric changes: as in SpringArrays."""
 
     ends: IntArray
     rest_length: FloatArray
     edge_count: int
     around: SpringsAround
-    listed_length: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringArrays:
     """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
-    are `around` each vertex. Of a surface's own springs, what they share with those of other fabrics."""
+    are `around` each vertex."""
 
     ends: IntArray
     rest_length: FloatArray
@@ -143,61 +142,99 @@ class SpringArrays:
     edge_count: int
     around: SpringsAround
     clamped_cells: int = 0
-    own: _Unweighed | None = None
-
-    @property
-    def listed_length(self) -> FloatArray:
-        """2 #S, the rest lengths as they are listed around the vertices [m]."""
-        if self.own is not None and self.own.rest_length is self.rest_length:
-            return self.own.listed_length
-        return np.take(self.rest_length, self.around.entry)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CellArrays:
-    """The cells: `corner` #C by 3, `face` #C, `edges` #C by 2 by 2 [m] (see `kernels.cells`), `area` #C weighted [m2]; the corners,
-    counted through, `around` each vertex."""
+    """The cells, face by face (see `kernels.cells`).
 
-    corner: IntArray
-    face: IntArray
-    weight: FloatArray
-    edges: FloatArray
-    area: FloatArray
+    Attributes:
+        faces: #F by 4, -1 in the last column of a triangle.
+        first: #F, the first of each face's cells.
+        laid: #C by 3, the cells laid flat [m].
+        around: the faces' corners around each vertex, 4 times the face plus the corner.
+    """
+
+    faces: IntArray
+    first: IntArray
+    laid: FloatArray
     around: ByVertex
 
     @cached_property
     def of_face(self) -> IntArray:
-        """#F+1, where the cells of each face begin; a face's cells follow each other."""
-        return np.append(np.flatnonzero(np.diff(self.face, prepend=-1)), len(self.face)).astype(np.int32)
+        """#F+1, where the cells of each face begin."""
+        return np.append(self.first, np.int32(len(self.laid)))
+
+    @cached_property
+    def _corners(self) -> tuple[IntArray, IntArray, FloatArray]:
+        return corner_triangles(self.faces)
+
+    @property
+    def corner(self) -> IntArray:
+        """#C by 3, the cells' vertices."""
+        return self._corners[0]
+
+    @property
+    def face(self) -> IntArray:
+        """#C, the face of each."""
+        return self._corners[1]
+
+    @property
+    def weight(self) -> FloatArray:
+        """#C, 1 for a triangle, 1/2 for each of a quad's four corner triangles."""
+        return self._corners[2]
+
+    @cached_property
+    def edges(self) -> FloatArray:
+        """#C by 2 by 2, the edges of the laid cells from corner 0 to corners 1 and 2, as columns [m]."""
+        edges = np.zeros((len(self.laid), 2, 2))
+        edges[:, 0, 0], edges[:, 0, 1], edges[:, 1, 1] = self.laid.T
+        return edges
+
+    @cached_property
+    def area(self) -> FloatArray:
+        """#C, weighted areas on the body [m2]."""
+        return np.asarray(0.5 * self.weight * self.laid[:, 0] * self.laid[:, 2])
 
     @cached_property
     def vertex_areas(self) -> FloatArray:
         """#V [m2], a third of each cell's share of the cloth at each of its corners."""
         around, total = self.around, np.empty(len(self.around.offset) - 1)
-        launch_each(add_areas, len(total), [around.offset, around.entry, self.area], [total])
+        given = [self.faces, self.first, self.laid, around.offset, around.entry]
+        launch_each(add_areas, len(total), given, [total])
         return total
+
+    def least_shares(self, positions: FloatArray) -> FloatArray:
+        """#F, signed area in a layout (#V by 2 [m]) over that on the body, the least of each face's cells."""
+        share = np.empty(len(self.faces))
+        given = [np.ascontiguousarray(positions, dtype=np.float64), self.faces, self.first, self.laid]
+        launch_each(find_least_shares, len(share), given, [share])
+        return share
 
 
 @once_per_surface
 def _creases_of(surface: Surface) -> NDArray[np.int8]:
-    return quad_creases(surface.vertices, surface.faces, sides=half_edges_of(surface))
+    if not surface.is_quad.any():
+        return quad_creases(surface.vertices, surface.faces)
+    around = _corners_of(surface)
+    return quad_creases(
+        surface.vertices, surface.faces, sides=half_edges_of(surface), around=(around.offset, around.entry)
+    )
 
 
 @once_per_surface
 def cells_of(surface: Surface) -> CellArrays:
     """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
-    edges, area = lay_cells(surface.vertices, surface.faces, _creases_of(surface), _first_of(surface, 4, 1))
-    corner, face, weight, around = _corners_of(surface)
-    return read_only(CellArrays(corner=corner, face=face, weight=weight, edges=edges, area=area, around=around))
+    faces, first = surface.faces, _first_of(surface, 4, 1)
+    laid = lay_cells(surface.vertices, faces, _creases_of(surface), first)
+    return read_only(CellArrays(faces=faces, first=first, laid=laid, around=_corners_of(surface)))
 
 
 @once_per_faces
-def _corners_of(surface: Surface) -> tuple[IntArray, IntArray, FloatArray, ByVertex]:
-    """Corners, faces and weights of the cells, and the corners around each vertex."""
-    corner, face, weight = corner_triangles(surface.faces)
-    if len(weight) and (weight == weight[0]).all():
-        weight = np.broadcast_to(weight[0], weight.shape)
-    return corner, face, weight, _corners_at(corner, len(surface.vertices))
+def _corners_of(surface: Surface) -> ByVertex:
+    """The faces' corners around each vertex, 4 times the face plus the corner."""
+    offset, entry = corners_around(surface.faces, len(surface.vertices))
+    return read_only(ByVertex(offset=offset, entry=entry))
 
 
 def _first_of(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
@@ -226,7 +263,6 @@ def _unweighed(surface: Surface) -> _Unweighed:
             rest_length=rest_length,
             edge_count=edge_count,
             around=around,
-            listed_length=np.take(rest_length, around.entry),
         )
     )
 
@@ -281,7 +317,6 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         edge_count=own.edge_count,
         around=own.around,
         clamped_cells=clamped,
-        own=own,
     )
 
 
@@ -385,7 +420,7 @@ class SpringNetwork:
         model: "springs", with their guard, or "membrane".
         stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
         held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
-        shear_hold: shear stiffness of the springs that keeps threads straight [N/m], one for all or #C; the fabric's where that is less.
+        shear_hold: shear stiffness of the springs that keeps threads straight [N/m], one for all or #F; the fabric's where that is less.
         parts: the networks of which this one was joined, to be relaxed side by side (see `warpflat.joined`); none of any other.
         springs, cells, guard, cloth: what the kernels take.
         mass: #V [kg]. spring_stiffness: #V, sum of k_ij around each vertex, and a half of the stiffest [N/m].
@@ -411,7 +446,6 @@ class SpringNetwork:
     bonds: Bonds = field(init=False)
     mass: wp.array = field(init=False)
     spring_stiffness: wp.array = field(init=False)
-    _listed: wp.array = field(init=False, repr=False)
 
     @classmethod
     def build(
@@ -447,7 +481,7 @@ class SpringNetwork:
             springs = _shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
         held = None
         if model == "membrane":
-            meant = np.ones((len(cells.corner), 2)) if stretch is None else stretch[cells.face]
+            meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
             weights, held = step_matrix(
                 fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, meant
             )
@@ -469,31 +503,32 @@ class SpringNetwork:
 
     def __post_init__(self) -> None:
         s, c, device, count = self.spring_arrays, self.cell_arrays, self.device, self.vertex_count
-        at, corners, listed = s.around, c.around, s.listed_length
+        at, corners = s.around, c.around
         springs = Springs()
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
-        springs.rest_length = _on(device, listed, wp.float64)
-        springs.stiffness = wp.empty(len(listed), dtype=wp.float64, device=device)
+        springs.index = _on(device, at.entry, wp.int32)
+        springs.rest_length = _on(device, s.rest_length, wp.float64)
+        # Those of a membrane follow its layout (`weigh`); the arrays keep those that it was made with.
+        springs.stiffness = _on(device, s.stiffness.copy() if self.model == "membrane" else s.stiffness, wp.float64)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
         self.spring_stiffness = wp.empty(count, dtype=wp.float64, device=device)
-        self._listed = _on(device, at.entry, wp.int32)
-        self.weigh(s.stiffness)
+        self._add_stiffness()
 
         self.mass = _on(device, self.fabric.areal_density * c.vertex_areas, wp.float64)
         cells = Cells()
-        cells.corner = _on(device, c.corner, wp.vec3i)
-        cells.edges = _on(device, c.edges, wp.mat22d)
-        cells.weight = _on(device, c.weight, wp.float64)
+        cells.face = _on(device, c.faces, wp.vec4i)
+        cells.first = _on(device, c.first, wp.int32)
+        cells.laid = _on(device, c.laid, wp.vec3d)
         cells.offset = _on(device, corners.offset, wp.int32)
         cells.slot = _on(device, corners.entry, wp.int32)
-        slack = np.broadcast_to(np.ones(2), (len(c.corner), 2)) if self.stretch is None else 1.0 / self.stretch[c.face]
+        slack = np.broadcast_to(np.ones(2), (self.face_count, 2)) if self.stretch is None else 1.0 / self.stretch
         cells.slack = _on(device, slack, wp.vec2d)
         fabric = self.fabric
         hold = np.minimum(fabric.shear_stiffness, self.shear_hold)
         onset = np.stack([hold / fabric.stiffness_warp, hold / fabric.stiffness_weft], axis=-1)
-        cells.onset = _on(device, np.broadcast_to(onset, (len(c.corner), 2)), wp.vec2d)
+        cells.onset = _on(device, np.broadcast_to(onset, (self.face_count, 2)), wp.vec2d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
@@ -510,10 +545,14 @@ class SpringNetwork:
             self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
 
     def weigh(self, stiffness: FloatArray) -> None:
-        """Give the springs (#S) these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
-        given = [self.springs.offset, self._listed, _on(self.device, stiffness, wp.float64), _PAIR_SHARE]
-        made = [self.springs.stiffness, self.spring_stiffness]
-        launch_each(spread_stiffness, self.vertex_count, given, made, device=self.device)
+        """Give the springs (#S) of a membrane these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
+        assert self.cloth is not None
+        self.springs.stiffness.assign(stiffness)
+        self._add_stiffness()
+
+    def _add_stiffness(self) -> None:
+        given = [self.springs.offset, self.springs.index, self.springs.stiffness, _PAIR_SHARE]
+        launch_each(add_stiffness, self.vertex_count, given, [self.spring_stiffness], device=self.device)
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
@@ -535,7 +574,12 @@ class SpringNetwork:
     @property
     def cell_count(self) -> int:
         """#C."""
-        return len(self.cell_arrays.corner)
+        return len(self.cell_arrays.laid)
+
+    @property
+    def face_count(self) -> int:
+        """#F."""
+        return len(self.cell_arrays.faces)
 
     @property
     def seam_count(self) -> int:

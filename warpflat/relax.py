@@ -138,7 +138,7 @@ class Relaxation:
     upright: Sequence[Upright] = ()
 
     def __post_init__(self, start: FloatArray) -> None:
-        n, c, device = self.network.vertex_count, self.network.cell_count, self.network.device
+        n, f, device = self.network.vertex_count, self.network.face_count, self.network.device
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
         net_seams = self.network.seam_count
@@ -153,21 +153,21 @@ class Relaxation:
         self._anchor = wp.zeros(n, dtype=wp.vec2d, device=device)
         self._reach = wp.zeros(n, dtype=wp.float64, device=device)
         self._guarded = wp.zeros(n, dtype=wp.int32, device=device)
-        self._cell_acting = wp.zeros(c, dtype=wp.int32, device=device)
+        self._face_acting = wp.zeros(f, dtype=wp.int32, device=device)
         # Written and read only where cells act: elsewhere no memory stands behind them.
-        self._cell_force = wp.empty(3 * c, dtype=wp.vec2d, device=device)
-        self._cell_viscosity = wp.empty(3 * c, dtype=wp.vec2d, device=device)
-        self._cell_stiffness = wp.empty(3 * c, dtype=wp.float64, device=device)
-        self._cell_clearance = wp.zeros(c, dtype=wp.float64, device=device)
+        self._face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
+        self._face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
+        self._face_stiffness = wp.empty(4 * f, dtype=wp.float64, device=device)
+        self._face_clearance = wp.zeros(f, dtype=wp.float64, device=device)
         self._seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self._seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self._seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
         self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
         self._vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
-        self._cell_energy = wp.zeros(c, dtype=wp.float64, device=device)
+        self._face_energy = wp.zeros(f, dtype=wp.float64, device=device)
         pieces = self.network.pieces
         self._vertex_begin = begins([net.vertex_count for net in pieces])
-        self._cell_begin = begins([net.cell_count for net in pieces])
+        self._face_begin = begins([net.face_count for net in pieces])
         self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
         self.numbers: Sequence[int] = range(len(pieces))
         springs = [net.spring_arrays for net in pieces]
@@ -186,7 +186,7 @@ class Relaxation:
     def _record(self) -> None:
         """Record the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one."""
         net, h = self.network, self.options.time_step
-        n, c, device = net.vertex_count, net.cell_count, net.device
+        n, f, device = net.vertex_count, net.face_count, net.device
         evaluate_cells, compute_cell_energy, parameters = net.cell_model
         seams = []
         if net.seams is not None:
@@ -203,14 +203,14 @@ class Relaxation:
         def cells(watch: int) -> Launch:
             return record(
                 evaluate_cells,
-                dim=c,
+                dim=f,
                 inputs=[self.position, self.velocity, net.cells, parameters, h, watch],
                 outputs=[
-                    self._cell_acting,
-                    self._cell_clearance,
-                    self._cell_force,
-                    self._cell_viscosity,
-                    self._cell_stiffness,
+                    self._face_acting,
+                    self._face_clearance,
+                    self._face_force,
+                    self._face_viscosity,
+                    self._face_stiffness,
                 ],
                 device=device,
             )
@@ -226,11 +226,11 @@ class Relaxation:
                     net.spring_stiffness,
                     net.springs,
                     net.cells,
-                    self._cell_acting,
-                    self._cell_clearance,
-                    self._cell_force,
-                    self._cell_viscosity,
-                    self._cell_stiffness,
+                    self._face_acting,
+                    self._face_clearance,
+                    self._face_force,
+                    self._face_viscosity,
+                    self._face_stiffness,
                     net.bonds,
                     self._seam_force,
                     self._seam_viscosity,
@@ -267,9 +267,9 @@ class Relaxation:
                 ),
                 record(
                     compute_cell_energy,
-                    dim=c,
+                    dim=f,
                     inputs=[self.position, net.cells, parameters],
-                    outputs=[self._cell_energy],
+                    outputs=[self._face_energy],
                     device=device,
                 ),
             ]
@@ -355,7 +355,7 @@ class Relaxation:
 
     def mirrored_pieces(self) -> BoolArray:
         """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
-        return np.logical_or.reduceat(self._cell_clearance.numpy() <= 0.0, self._cell_begin[:-1])
+        return np.logical_or.reduceat(self._face_clearance.numpy() <= 0.0, self._face_begin[:-1])
 
     def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:
         """Let these pieces (#P) go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
@@ -376,7 +376,7 @@ class Relaxation:
         """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
         self._measure.launch()
         springs = _sums(self._vertex_energy.numpy(), self._vertex_begin)
-        return np.stack([springs, _sums(self._cell_energy.numpy(), self._cell_begin)], axis=1)
+        return np.stack([springs, _sums(self._face_energy.numpy(), self._face_begin)], axis=1)
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""

@@ -13,7 +13,7 @@ from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
 from warpflat.network import SpringNetwork, cells_of
 from warpflat.sums import products, weighted_rows
 from warpflat.surface.mesh import Surface
-from warpflat.surface.untangle import signed_cell_areas, untangle
+from warpflat.surface.untangle import untangle
 from warpflat.thinning import Transfer
 
 __all__ = ["Rung", "far_below", "rungs_of", "stay"]
@@ -110,7 +110,7 @@ def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *,
     if step is None:
         return None
     layout = np.ascontiguousarray(fine_layout[step.kept])
-    if (signed_cell_areas(cells_of(step.surface).corner, layout) <= 0.0).any():
+    if (cells_of(step.surface).least_shares(layout) <= 0.0).any():
         layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
         if left:
             return None

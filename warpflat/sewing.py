@@ -28,7 +28,6 @@ from warpflat.kernels.seams import compute_seam_misses
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, relax
-from warpflat.strain import signed_cell_areas
 from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together
 
@@ -283,7 +282,7 @@ def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     for layout in (piece.positions, piece.development.positions):
         start = layout.copy()
         start[vertices, 0] = start[vertices, 0].mean()
-        if (signed_cell_areas(cells.corner, start) > 0.01 * cells.area / cells.weight).all():
+        if (cells.least_shares(start) > 0.01).all():
             return start
     raise InputError(
         f"piece {piece.surface.name!r} cannot be laid with a straight fold: its fold line bends too much on the body; "

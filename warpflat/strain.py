@@ -85,9 +85,9 @@ def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
         return float(_worn_cells(network, positions)[2].numpy().sum())
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    energy = wp.empty(network.cell_count, dtype=wp.float64, device=device)
+    energy = wp.empty(network.face_count, dtype=wp.float64, device=device)
     given = [at, network.cells, membrane_of(network.fabric, network.grain_angle)]
-    launch_each(compute_strain_energy, network.cell_count, given, [energy], device=device)
+    launch_each(compute_strain_energy, network.face_count, given, [energy], device=device)
     return float(energy.numpy().sum())
 
 
@@ -100,7 +100,7 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> list[wp.array]
     if network.model == "membrane":
         kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
     inputs = [at, network.cells, cloth]
-    launch_each(kernel, network.cell_count, inputs, cells, device=device)
+    launch_each(kernel, network.face_count, inputs, cells, device=device)
     return cells
 
 

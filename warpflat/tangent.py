@@ -32,7 +32,7 @@ class TangentMatrix:
         assert network.cloth is not None
         wp.launch(
             bound_membrane,
-            dim=network.cell_count,
+            dim=network.face_count,
             inputs=[position, network.cells, network.cloth, 0],
             outputs=[self._weight],
             device=network.device,

@@ -227,7 +227,7 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArr
     energy, area = (wp.empty(count, dtype=wp.float64, device=device) for _ in range(2))
     wp.launch(
         compute_membrane_strain,
-        dim=count,
+        dim=network.face_count,
         inputs=[at, network.cells, cloth_of(network.fabric, grain_axes(network.grain_angle), device), 0],
         outputs=[strain, stress, energy, area],
         device=device,

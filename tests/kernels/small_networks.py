@@ -43,6 +43,13 @@ def shaken(network: SpringNetwork, *, scale: float, noise: float = 0.004, seed: 
     return scale * network.surface.vertices[:, :2] + rng.normal(scale=noise, size=(network.vertex_count, 2))
 
 
+def corner_vertices(network: SpringNetwork) -> tuple[NDArray[np.int64], NDArray[np.int32]]:
+    """Of all faces' corners the places in what kernels give per corner, and their vertices."""
+    corners = network.surface.faces.ravel()
+    slots = np.flatnonzero(corners >= 0)
+    return slots, corners[slots]
+
+
 def vec2(values: NDArray[np.float64]) -> wp.array:
     return wp.array(np.ascontiguousarray(values), dtype=wp.vec2d, device=DEVICE)
 
@@ -67,17 +74,17 @@ class Launched:
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        n, c = self.network.vertex_count, self.network.cell_count
+        n, f = self.network.vertex_count, self.network.face_count
         still = np.zeros((n, 2))
         self.arrays = {
             "position": vec2(self.positions),
             "velocity": vec2(still if self.velocities is None else self.velocities),
-            "cell_acting": zeros(c, wp.int32),
-            "cell_clearance": zeros(c),
-            "cell_force": zeros(3 * c, wp.vec2d),
-            "cell_viscosity": zeros(3 * c, wp.vec2d),
-            "cell_stiffness": zeros(3 * c),
-            "cell_energy": zeros(c),
+            "face_acting": zeros(f, wp.int32),
+            "face_clearance": zeros(f),
+            "face_force": zeros(4 * f, wp.vec2d),
+            "face_viscosity": zeros(4 * f, wp.vec2d),
+            "face_stiffness": zeros(4 * f),
+            "face_energy": zeros(f),
             "force": zeros(n, wp.vec2d),
             "power": zeros(n),
             "driving_force": zeros(n, wp.vec2d),
@@ -93,7 +100,7 @@ class Launched:
     def __getitem__(self, name: str) -> NDArray[np.float64]:
         return np.array(self.arrays[name].numpy(), copy=True)
 
-    def _launch(self, kernel: wp.Kernel, count: int, *, per_cell: bool = False) -> None:
+    def _launch(self, kernel: wp.Kernel, count: int, *, per_face: bool = False) -> None:
         given = {
             name: getattr(self.network, name) for name in ("springs", "cells", "guard", "mass", "spring_stiffness")
         }
@@ -102,8 +109,8 @@ class Launched:
         given |= {"bond_force": zeros(0, wp.vec2d), "bond_viscosity": zeros(0, wp.vec2d), "bond_stiffness": zeros(0)}
         given |= {"load": zeros(self.network.vertex_count, wp.vec2d)}
         given |= self.arrays
-        if per_cell:
-            given |= {name[5:]: array for name, array in self.arrays.items() if name.startswith("cell_")}
+        if per_face:
+            given |= {name[5:]: array for name, array in self.arrays.items() if name.startswith("face_")}
         names = [argument.label for argument in kernel.adj.args]
         for first, last in pairwise(np.linspace(0, count, self.pieces + 1).astype(int).tolist()):
             wp.launch(
@@ -111,7 +118,7 @@ class Launched:
             )
 
     def evaluate_guard(self) -> Launched:
-        self._launch(evaluate_guard, self.network.cell_count, per_cell=True)
+        self._launch(evaluate_guard, self.network.face_count, per_face=True)
         return self
 
     def gather_forces(self) -> Launched:
@@ -135,5 +142,5 @@ class Launched:
         return self["energy"]
 
     def guard_energy(self) -> NDArray[np.float64]:
-        self._launch(compute_guard_energy, self.network.cell_count, per_cell=True)
-        return self["cell_energy"]
+        self._launch(compute_guard_energy, self.network.face_count, per_face=True)
+        return self["face_energy"]

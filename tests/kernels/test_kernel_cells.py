@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from small_networks import CLOTH, DEVICE, Launched, shaken, small_network
+from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, small_network
 
 from warpflat.network import SpringNetwork, grain_axes
 from warpflat.surface import make_surface
@@ -15,10 +15,10 @@ SQUEEZES = {"none": (1.15, 1.2), "warp": (1.15, 0.8), "weft": (0.8, 1.2), "both"
 
 
 def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64]) -> NDArray[np.float64]:
-    """#C, a [1/2 K_warp <|F e_warp| - 1 - onset_warp>^2 + the same for weft]."""
+    """#F, the sum over the cells of a [1/2 K_warp <|F e_warp| - 1 - onset_warp>^2 + the same for weft]."""
     fabric, cells, energies = network.fabric, network.cell_arrays, []
     for corner, edges, weight, onsets in zip(
-        cells.corner, cells.edges, cells.weight, network.cells.onset.numpy(), strict=True
+        cells.corner, cells.edges, cells.weight, network.cells.onset.numpy()[cells.face], strict=True
     ):
         flat = np.stack(
             [positions[corner[1]] - positions[corner[0]], positions[corner[2]] - positions[corner[0]]], axis=1
@@ -35,7 +35,7 @@ def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64])
             excess = np.linalg.norm(deformation @ thread) - 1.0 - onset
             density += 0.5 * stiffness * max(excess, 0.0) ** 2
         energies.append(weight * area * density)
-    return np.array(energies)
+    return np.bincount(cells.face, energies)
 
 
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
@@ -70,9 +70,10 @@ def test_forces_are_minus_the_gradient_of_the_energy(active: str, grain_angle: f
     network = small_network(grain_angle=grain_angle)
     positions = shaken(network, scale=1.0, noise=0.001) * SQUEEZES[active]
     at = Launched(network, positions).evaluate_guard()
-    corner_force = at["cell_force"].reshape(-1, 3, 2) * at["cell_acting"][:, None, None]
+    corner_force = at["face_force"].reshape(-1, 4, 2) * at["face_acting"][:, None, None]
+    slots, vertices = corner_vertices(network)
     force = np.zeros_like(positions)
-    np.add.at(force, network.cell_arrays.corner, corner_force)
+    np.add.at(force, vertices, corner_force.reshape(-1, 2)[slots])
     step, size = 1e-7, max(np.abs(force).max(), 1e-3)
     for vertex in range(network.vertex_count):
         for axis in (0, 1):
@@ -93,7 +94,7 @@ def test_each_direction_acts_alone():
     network = one_cell(shape)
     for squeeze, axis in (((1.0, 0.8), 1), ((0.8, 1.0), 0)):
         at = Launched(network, shape * squeeze).evaluate_guard()
-        force = at["cell_force"]
+        force = at["face_force"]
         assert force[1 + axis, axis] > 0.1
         # the other threads feel the area only: 1/2 K y^2 a / l, small against K y a / l
         assert 0 <= -force[2 - axis, 1 - axis] < 0.2 * force[1 + axis, axis]
@@ -102,8 +103,8 @@ def test_each_direction_acts_alone():
 def test_the_share_of_the_force_that_no_one_else_balances_is_zero():
     network = small_network()
     at = Launched(network, shaken(network, scale=0.8)).evaluate_guard()
-    force = at["cell_force"].reshape(-1, 3, 2)
-    assert at["cell_acting"].all()
+    force = at["face_force"].reshape(-1, 4, 2)
+    assert at["face_acting"].all()
     np.testing.assert_allclose(force.sum(axis=1), 0.0, atol=1e-12 * np.abs(force).max())
 
 
@@ -115,7 +116,7 @@ def corner_hessian(network: SpringNetwork, positions: NDArray[np.float64]) -> ND
         for sign in (1.0, -1.0):
             moved = positions.copy()
             moved.ravel()[index] += sign * step
-            sides.append(Launched(network, moved).evaluate_guard()["cell_force"].ravel())
+            sides.append(Launched(network, moved).evaluate_guard()["face_force"][:3].ravel())
         columns.append((sides[1] - sides[0]) / (2 * step))
     return np.array(columns)
 
@@ -126,7 +127,7 @@ def test_stiffness_bounds_the_second_derivative(seed: int):
     update by force over stiffness would diverge."""
     network, positions = random_cell(seed)
     at = Launched(network, positions).evaluate_guard()
-    hessian, bound = corner_hessian(network, positions), at["cell_stiffness"]
+    hessian, bound = corner_hessian(network, positions), at["face_stiffness"][:3]
     hessian = 0.5 * (hessian + hessian.T)
     assert at.guard_energy()[0] > 0
     for corner in range(3):
@@ -142,9 +143,9 @@ def test_stiffness_counts_from_half_of_the_onset():
     onset = network.cells.onset.numpy()[0, 0]
     for share, acts in ((0.4, 0), (0.6, 1)):
         at = Launched(network, shape * [1.1, 1.0 / (1.0 + share * onset)]).evaluate_guard()
-        assert at["cell_acting"][0] == acts
-        assert not at["cell_force"].any()
-        assert at["cell_stiffness"].any() == bool(acts)
+        assert at["face_acting"][0] == acts
+        assert not at["face_force"].any()
+        assert at["face_stiffness"].any() == bool(acts)
         assert at.guard_energy()[0] == 0.0
 
 
@@ -152,25 +153,57 @@ def test_slender_cells_always_count():
     """Far from squeezed along both threads, a needle is one step away from it."""
     shape = np.array([[0.0, 0.0], [0.1, 0.0], [0.05, 0.004]])
     at = Launched(one_cell(shape), 1.5 * shape).evaluate_guard()
-    assert at["cell_acting"][0] == 1
-    assert (at["cell_stiffness"] > 0).any()
-    assert not at["cell_force"].any()
+    assert at["face_acting"][0] == 1
+    assert (at["face_stiffness"] > 0).any()
+    assert not at["face_force"].any()
 
 
 @pytest.mark.parametrize("time_step", [1e-3, 10.0])
 def test_viscosity_pulls_towards_the_cells_mean_velocity(time_step: float):
+    network, positions = random_cell(5)
+    velocities = np.random.default_rng(8).normal(size=(3, 2))
+    at = Launched(network, 0.8 * positions, velocities, time_step).evaluate_guard()
+    stiffness = at["face_stiffness"][:3]
+    by_hand = time_step * stiffness[:, None] * (stiffness @ velocities / stiffness.sum() - velocities)
+    assert np.abs(by_hand).max() > 0
+    np.testing.assert_allclose(at["face_viscosity"][:3], by_hand, rtol=1e-10, atol=1e-12)
+    assert (by_hand * velocities).sum() <= 0
+
+
+def test_viscosity_leaves_what_moves_as_a_whole_alone():
     network = small_network()
-    velocities = np.random.default_rng(8).normal(size=(network.vertex_count, 2))
-    positions = shaken(network, scale=0.8)
-    at = Launched(network, positions, velocities, time_step).evaluate_guard()
-    stiffness = at["cell_stiffness"].reshape(-1, 3)
-    v = velocities[network.cell_arrays.corner]
-    mean = np.einsum("ck,ckx->cx", stiffness, v) / stiffness.sum(axis=1)[:, None]
-    by_hand = time_step * stiffness[:, :, None] * (mean[:, None] - v)
-    np.testing.assert_allclose(at["cell_viscosity"].reshape(-1, 3, 2), by_hand, rtol=1e-10, atol=1e-12)
-    assert (np.einsum("ckx,ckx->c", by_hand, v) <= 0).all()
-    as_one = Launched(network, positions, np.tile([[0.3, -0.2]], (len(velocities), 1)), time_step).evaluate_guard()
-    np.testing.assert_allclose(as_one["cell_viscosity"], 0.0, atol=1e-9 * time_step * stiffness.max())
+    moving = np.tile([[0.3, -0.2]], (network.vertex_count, 1))
+    at = Launched(network, shaken(network, scale=0.8), moving).evaluate_guard()
+    assert at["face_stiffness"].max() > 0
+    np.testing.assert_allclose(at["face_viscosity"], 0.0, atol=1e-11 * at["face_stiffness"].max())
+
+
+@pytest.mark.parametrize("squeeze", [1.0, 0.93, 0.8])
+def test_a_quad_does_half_of_what_its_four_corner_triangles_do(squeeze: float):
+    """Whether all, some or none of them are squeezed."""
+    shape = np.array([[0.0, 0.0], [0.1, 0.01], [0.11, 0.12], [0.0, 0.1]])
+    surface = make_surface(np.column_stack([shape, np.zeros(4)]), [[0, 1, 2, 3]])
+    network = SpringNetwork.build(surface, CLOTH, shape, device=DEVICE, hold=np.inf)
+    rng = np.random.default_rng(4)
+    positions, velocities = squeeze * shape, rng.normal(size=(4, 2))
+    positions[2] *= 0.93
+    at = Launched(network, positions, velocities, 0.02).evaluate_guard()
+    names = ("face_force", "face_viscosity", "face_stiffness")
+    sums = {name: np.zeros_like(at[name]) for name in names}
+    energy, heights, acting = 0.0, [], []
+    for k in range(4):
+        corners = [(k - 1) % 4, k, (k + 1) % 4]
+        cell = Launched(one_cell(shape[corners]), positions[corners], velocities[corners], 0.02).evaluate_guard()
+        for name in names:
+            sums[name][corners] += 0.5 * cell[name][:3]
+        energy += 0.5 * cell.guard_energy()[0]
+        heights.append(cell["face_clearance"][0])
+        acting.append(cell["face_acting"][0])
+    assert sum(acting) == {1.0: 3, 0.93: 4, 0.8: 4}[squeeze]
+    for name in names:
+        np.testing.assert_allclose(at[name], sums[name], rtol=1e-11, atol=1e-13, err_msg=name)
+    assert at.guard_energy()[0] == pytest.approx(energy, rel=1e-12)
+    assert at["face_clearance"][0] == pytest.approx(min(heights), rel=1e-13)
 
 
 def test_clearance_is_the_least_height():
@@ -180,7 +213,21 @@ def test_clearance_is_the_least_height():
     p = positions[network.cell_arrays.corner]
     area = 0.5 * np.linalg.det(np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2))
     longest = np.linalg.norm(p - np.roll(p, 1, axis=1), axis=2).max(axis=1)
-    np.testing.assert_allclose(at["cell_clearance"], 2 * area / longest, rtol=1e-12)
+    least = np.minimum.reduceat(2 * area / longest, network.cell_arrays.first)
+    np.testing.assert_allclose(at["face_clearance"], least, rtol=1e-12)
+
+
+def test_the_least_share_of_area_says_which_faces_have_lost_a_cell():
+    network = small_network()
+    cells, body = network.cell_arrays, network.surface.vertices[:, :2]
+    positions = shaken(network, scale=0.9)
+    positions[0] = [0.15, 0.3]
+    p = positions[cells.corner]
+    flat = 0.5 * np.linalg.det(np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=2))
+    least = np.minimum.reduceat(cells.weight * flat / cells.area, cells.first)
+    np.testing.assert_allclose(cells.least_shares(positions), least, rtol=1e-10)
+    assert least[0] < 0 < least[1]
+    assert (cells.least_shares(body) > 0.9).all()
 
 
 @pytest.mark.parametrize(
@@ -196,9 +243,9 @@ def test_clearance_is_the_least_height():
 def test_a_lost_cell_is_infinite_in_energy_and_has_no_force(layout: list[list[float]]):
     network = one_cell(np.array([[0.0, 0.0], [0.02, 0.0], [0.0, 0.02]]))
     at = Launched(network, np.array(layout)).evaluate_guard()
-    assert at["cell_acting"][0] == 0
-    assert at["cell_clearance"][0] == 0.0
-    assert not at["cell_force"].any()
+    assert at["face_acting"][0] == 0
+    assert at["face_clearance"][0] == 0.0
+    assert not at["face_force"].any()
     assert at.guard_energy()[0] == np.inf
 
 
@@ -207,9 +254,9 @@ def test_nearly_collapsed_cells_stay_finite_and_push_apart():
     network = one_cell(shape)
     for squeeze in (1e-3, 1e-6, 1e-9):
         at = Launched(network, shape * [1.0, squeeze]).evaluate_guard()
-        assert np.isfinite(at["cell_force"]).all()
-        assert np.isfinite(at["cell_stiffness"]).all()
-        assert at["cell_force"][2, 1] > 0
+        assert np.isfinite(at["face_force"]).all()
+        assert np.isfinite(at["face_stiffness"]).all()
+        assert at["face_force"][2, 1] > 0
         # 1/2 K <1/s - 1 - onset>^2 s A
         onset = network.cells.onset.numpy()[0, 0]
         energy = 0.5 * CLOTH.stiffness_warp * (1 / squeeze - 1 - onset) ** 2 * squeeze * 0.0002
@@ -221,6 +268,6 @@ def test_pieces_of_a_launch_equal_the_whole():
     velocities = np.random.default_rng(2).normal(size=(network.vertex_count, 2))
     arguments = (network, shaken(network, scale=0.8), velocities)
     whole, parts = Launched(*arguments).evaluate_guard(), Launched(*arguments, pieces=2).evaluate_guard()
-    for name in ("cell_acting", "cell_clearance", "cell_force", "cell_viscosity", "cell_stiffness"):
+    for name in ("face_acting", "face_clearance", "face_force", "face_viscosity", "face_stiffness"):
         assert np.array_equal(whole[name], parts[name]), name
     assert np.array_equal(whole.guard_energy(), parts.guard_energy())

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from small_networks import Launched, shaken, small_network
+from small_networks import Launched, corner_vertices, shaken, small_network
 
 SHARE = 0.4
 
@@ -36,15 +36,16 @@ def test_a_step_is_equations_4_to_10(scale: float, time_step: float):
     positions = shaken(network, scale=scale)
     velocities = rng.normal(scale=1e-3 / time_step, size=positions.shape)
     at = Launched(network, positions, velocities, time_step).evaluate_guard().gather_forces()
-    acting = np.repeat(at["cell_acting"], 3).astype(bool)
+    acting = np.repeat(at["face_acting"], 4).astype(bool)
     assert acting.all() == (scale < 1)
 
-    h, m, corner = time_step, network.mass.numpy()[:, None], network.cell_arrays.corner.ravel()[acting]
+    h, m = time_step, network.mass.numpy()[:, None]
+    slots, corner = (values[acting[corner_vertices(network)[0]]] for values in corner_vertices(network))
     ends, k_ij = network.spring_arrays.ends, network.spring_arrays.stiffness
     force, viscosity, stiffness = spring_forces(network, positions), np.zeros_like(positions), np.zeros((len(m), 1))
-    np.add.at(force, corner, at["cell_force"][acting])
-    np.add.at(viscosity, corner, at["cell_viscosity"][acting])
-    np.add.at(stiffness, corner, at["cell_stiffness"][acting, None])
+    np.add.at(force, corner, at["face_force"][slots])
+    np.add.at(viscosity, corner, at["face_viscosity"][slots])
+    np.add.at(stiffness, corner, at["face_stiffness"][slots, None])
     np.add.at(stiffness, ends.ravel(), np.repeat(k_ij, 2)[:, None])
     viscosity += h * (spring_sums(network, velocities) - velocities * spring_sums(network, np.ones_like(positions)))
     # a half of the stiffest spring is added to the sum around a vertex (warpflat.network)
@@ -75,8 +76,8 @@ def test_reach_is_a_share_of_the_least_height_around():
     positions = shaken(network, scale=1.0)
     at = Launched(network, positions).evaluate_guard().gather_forces()
     for vertex in range(network.vertex_count):
-        around = (network.cell_arrays.corner == vertex).any(axis=1)
-        assert at["reach"][vertex] == pytest.approx(SHARE * at["cell_clearance"][around].min(), rel=1e-12)
+        around = (network.surface.faces == vertex).any(axis=1)
+        assert at["reach"][vertex] == pytest.approx(SHARE * at["face_clearance"][around].min(), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(10))
@@ -90,7 +91,7 @@ def test_no_velocity_can_mirror_a_cell(seed: int):
         moved = np.linalg.norm(at["position"] - before, axis=1)
         assert (moved <= at["reach"] * (1 + 1e-9) + 1e-15).all()
         at.evaluate_guard()
-        assert (at["cell_clearance"] > 0).all()
+        assert (at["face_clearance"] > 0).all()
         assert np.isfinite(at.guard_energy()).all()
         at.arrays["velocity"].assign(velocities)
     assert moved.max() > 0
@@ -99,10 +100,11 @@ def test_no_velocity_can_mirror_a_cell(seed: int):
 def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_its_reach():
     network = small_network()
     velocities = np.random.default_rng(3).normal(scale=1e3, size=(network.vertex_count, 2))
-    at = Launched(network, shaken(network, scale=0.99), velocities, 0.1).evaluate_guard().gather_forces()
-    idle = at["cell_acting"] == 0
+    at = Launched(network, shaken(network, scale=1.02), velocities, 0.1).evaluate_guard().gather_forces()
+    idle = at["face_acting"] == 0
     assert idle.any()
-    reach, anchor, clearance = at["reach"], at["anchor"], at["cell_clearance"]
+    assert not idle.all()
+    reach, anchor, clearance = at["reach"], at["anchor"], at["face_clearance"]
     assert np.array_equal(anchor, at["position"])
     at.watch = 0
     for _ in range(5):
@@ -111,12 +113,12 @@ def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_it
         assert (away <= reach * (1 + 1e-9)).all()
         at.arrays["velocity"].assign(velocities)
         at.evaluate_guard().gather_forces()
-        assert np.array_equal(at["cell_clearance"][idle], clearance[idle])
+        assert np.array_equal(at["face_clearance"][idle], clearance[idle])
         assert np.array_equal(at["anchor"], anchor)
         assert np.array_equal(at["reach"], reach)
     assert away.max() > 0.5 * reach.max()
     at.watch = 1
-    assert (at.evaluate_guard()["cell_clearance"] > 0).all()
+    assert (at.evaluate_guard()["face_clearance"] > 0).all()
 
 
 def test_two_looks_at_one_layout_give_the_same_forces():
@@ -145,7 +147,8 @@ def test_a_vertex_of_a_mirrored_cell_stays():
     positions = shaken(network, scale=1.0, noise=0.0)
     positions[0] = [0.15, 0.3]
     at = Launched(network, positions).evaluate_guard().gather_forces().advance()
-    lost = np.unique(network.cell_arrays.corner[at["cell_clearance"] == 0])
+    corners = network.surface.faces[at["face_clearance"] == 0]
+    lost = np.unique(corners[corners >= 0])
     assert 0 in lost
     assert np.array_equal(at["position"][lost], positions[lost])
     assert np.isfinite(at["position"]).all()

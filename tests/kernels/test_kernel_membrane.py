@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import warp as wp
 from numpy.typing import NDArray
+from small_networks import corner_vertices
 from warpflat.kernels.membrane import compute_membrane_energy, compute_membrane_strain, evaluate_membrane
 
 from warpflat.fabric import Fabric
@@ -46,8 +47,8 @@ FloatArray = NDArray[np.float64]
 def evaluated(
     network: SpringNetwork, positions: FloatArray, velocities: FloatArray | None = None
 ) -> dict[str, FloatArray]:
-    """The outputs of the force kernel over all cells, forces summed at the vertices too."""
-    c, n = network.cell_count, network.vertex_count
+    """The outputs of the force kernel over all faces, those at corners without triangles' fourth, forces summed at the vertices too."""
+    f, n = network.face_count, network.vertex_count
     v = np.zeros((n, 2)) if velocities is None else velocities
     names = {
         "acting": wp.int32,
@@ -56,27 +57,28 @@ def evaluated(
         "viscosity": wp.vec2d,
         "stiffness": wp.float64,
     }
-    out = {k: wp.zeros(c if k in ("acting", "clearance") else 3 * c, dtype=t, device=DEVICE) for k, t in names.items()}
+    out = {k: wp.zeros(f if k in ("acting", "clearance") else 4 * f, dtype=t, device=DEVICE) for k, t in names.items()}
     at, moving = (wp.array(np.ascontiguousarray(a), dtype=wp.vec2d, device=DEVICE) for a in (positions, v))
     wp.launch(
         evaluate_membrane,
-        dim=c,
+        dim=f,
         inputs=[at, moving, network.cells, network.cloth, 0.01, 1, 0],
         outputs=list(out.values()),
         device=DEVICE,
     )
     found = {k: np.array(a.numpy()) for k, a in out.items()}
-    corner = network.cell_arrays.corner.ravel()
+    slots, corner = corner_vertices(network)
+    found |= {k: found[k][slots] for k in ("force", "viscosity", "stiffness")}
     found["vertex_force"] = np.stack([np.bincount(corner, found["force"][:, k], minlength=n) for k in range(2)], axis=1)
     return found
 
 
 def energies(network: SpringNetwork, positions: FloatArray) -> FloatArray:
-    energy = wp.zeros(network.cell_count, dtype=wp.float64, device=DEVICE)
+    energy = wp.zeros(network.face_count, dtype=wp.float64, device=DEVICE)
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=DEVICE)
     wp.launch(
         compute_membrane_energy,
-        dim=network.cell_count,
+        dim=network.face_count,
         inputs=[at, network.cells, network.cloth, 0],
         outputs=[energy],
         device=DEVICE,
@@ -384,7 +386,10 @@ def test_the_matrix_that_follows_bounds_the_stiffness_of_the_present_layout_and_
     assert evaluated(network, flat)["stiffness"].max() < 1e-9 * at_rest.max()
     springs, rng = network.springs, np.random.default_rng(7)
     offset, neighbor = springs.offset.numpy(), springs.neighbor.numpy()
-    k, here = springs.stiffness.numpy(), np.repeat(np.arange(len(flat)), np.diff(springs.offset.numpy()))
+    k, here = (
+        springs.stiffness.numpy()[springs.index.numpy()],
+        np.repeat(np.arange(len(flat)), np.diff(springs.offset.numpy())),
+    )
     assert offset[-1] == len(neighbor)
     for trial in range(40):
         v = rng.normal(size=flat.shape) if trial % 2 else np.sin(flat @ rng.normal(size=(2, 2)) * 20.0)

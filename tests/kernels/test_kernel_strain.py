@@ -19,7 +19,7 @@ def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int 
     """Strain, stress, energy and area per cell."""
     count = network.cell_count
     outputs = [wp.zeros(count, dtype=t, device=DEVICE) for t in (wp.vec3d, wp.vec3d, wp.float64, wp.float64)]
-    bounds = np.linspace(0, count, pieces + 1).astype(int)
+    bounds = np.linspace(0, network.face_count, pieces + 1).astype(int)
     membrane = membrane_of(network.fabric, network.grain_angle)
     for first, last in pairwise(bounds):
         wp.launch(

@@ -34,9 +34,9 @@ def distances(
     body: FloatArray, faces: NDArray[np.int32], crease: NDArray[np.int8]
 ) -> dict[tuple[int, int], FloatArray]:
     """Of quads, the distances between their corners as their cells, laid flat, have them."""
-    edges, _ = lay_cells(body, faces, crease, np.arange(0, 4 * len(faces), 4, dtype=np.int32))
-    length = np.linalg.norm(edges, axis=1).reshape(-1, 4, 2)
-    opposite = np.linalg.norm(edges[..., 1] - edges[..., 0], axis=1).reshape(-1, 4)
+    laid = lay_cells(body, faces, crease, np.arange(0, 4 * len(faces), 4, dtype=np.int32)).reshape(-1, 4, 3)
+    length = np.stack([laid[..., 0], np.hypot(laid[..., 1], laid[..., 2])], axis=-1)
+    opposite = np.hypot(laid[..., 1] - laid[..., 0], laid[..., 2])
     between: dict[tuple[int, int], FloatArray] = {}
     for k in range(4):
         # Each side and each diagonal is in two cells, and of one length there.

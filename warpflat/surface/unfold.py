@@ -15,19 +15,27 @@ from warpflat.kernels.surface_cells import lay_cells as lay_each
 from warpflat.launching import launch_each
 from warpflat.surface.topology import HalfEdges, order_by, places_of
 
-__all__ = ["lay_cells", "quad_creases"]
+__all__ = ["corners_around", "lay_cells", "quad_creases"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 
-def quad_creases(vertices: FloatArray, faces: IntArray, *, sides: HalfEdges | None = None) -> NDArray[np.int8]:
+def quad_creases(
+    vertices: FloatArray,
+    faces: IntArray,
+    *,
+    sides: HalfEdges | None = None,
+    around: tuple[IntArray, IntArray] | None = None,
+) -> NDArray[np.int8]:
     """Along which diagonal each quad is creased.
 
     Args:
         vertices: #V by 3, positions [m]. Vertices at the same place count as one, so that a cut changes nothing.
         faces: #F by 4, -1 in the last column of a triangle.
         sides: of the faces, if they are known.
+        around: the faces' corners around each vertex, if they are known: #V+1, where each vertex's begin, and 4 times the face
+            plus the corner.
 
     Returns:
         #F, 0 for the diagonal of corners 0-2, 1 for 1-3, and -1 for a triangle and where a quad is flat, not convex, or
@@ -45,19 +53,25 @@ def quad_creases(vertices: FloatArray, faces: IntArray, *, sides: HalfEdges | No
         return crease
     count, place = len(vertices), places_of(vertices, faces, sides=sides)
     if (place != np.arange(count)).any():
-        faces = np.where(faces >= 0, place[faces], -1).astype(np.int32)
-    # The fourth corner of a triangle is that of one vertex more, of which nobody asks.
-    at = faces if is_quad.all() else np.where(faces >= 0, faces, np.int32(count))
-    corner, offset = order_by(at.ravel(), count + 1)
+        faces, around = np.where(faces >= 0, place[faces], -1).astype(np.int32), None
+    offset, corner = around or corners_around(faces, count)
     at_vertex = np.empty((count, 3))
     launch_each(average_normals, count, [offset, corner, normal], [at_vertex])
     launch_each(find_creases, len(faces), [vertices, faces, bent, at_vertex], [crease])
     return crease
 
 
-def lay_cells(
-    vertices: FloatArray, faces: IntArray, crease: NDArray[np.int8], cell: IntArray
-) -> tuple[FloatArray, FloatArray]:
+def corners_around(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
+    """The faces' corners around each of so many vertices: #V+1, where each vertex's begin, and 4 times the face plus the corner."""
+    if (faces[:, 3] >= 0).all():
+        corner, offset = order_by(faces.ravel(), count)
+        return offset, corner
+    # The fourth corners of triangles are those of one vertex more, come after all others, and are left out.
+    corner, offset = order_by(np.where(faces >= 0, faces, np.int32(count)).ravel(), count + 1)
+    return offset[:-1], corner[: offset[count]]
+
+
+def lay_cells(vertices: FloatArray, faces: IntArray, crease: NDArray[np.int8], cell: IntArray) -> FloatArray:
     """The cells of all faces laid flat; the four of a creased quad come from the one quad that it unfolds into.
 
     Args:
@@ -67,10 +81,9 @@ def lay_cells(
         cell: #F, the first of each face's cells (`corner_triangles`).
 
     Returns:
-        #C by 2 by 2, edges from a cell's corner 0 to corners 1 and 2 as columns, the first along x [m]; and #C, its area,
-        of a quad's by half [m2].
+        #C by 3: with a cell's corner 0 at the origin and corner 1 along x, x of corner 1, x and y of corner 2 [m].
     """
     count = 0 if len(faces) == 0 else int(cell[-1]) + (4 if faces[-1, 3] >= 0 else 1)
-    edges, area = np.empty((count, 2, 2)), np.empty(count)
-    launch_each(lay_each, len(faces), [vertices, faces, crease, cell], [edges, area])
-    return edges, area
+    laid = np.empty((count, 3))
+    launch_each(lay_each, len(faces), [vertices, faces, crease, cell], [laid])
+    return laid
