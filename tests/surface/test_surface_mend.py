@@ -362,6 +362,7 @@ def test_any_order_winding_or_splitting_gives_the_same_surface(seed, columns, ro
     assert len(border_loops(surface.faces)[0]) == 2 * (columns + rows) - 4
 
 
+# In the example a sliver lies on a side of a face that is almost one itself.
 @settings(max_examples=30, deadline=None)
 @example(34192, 10)
 @given(st.integers(0, 2**32 - 1), st.integers(1, 12))
@@ -370,23 +371,15 @@ def test_random_slivers_are_merged_without_losing_area_or_border(seed, count):
     vertices, triangles, _ = scattered(120, cylinder, seed=1)
     faces = triangles.tolist()
     points = vertices.tolist()
-    nested = False
     for _ in range(count):
         face = faces.pop(int(random.integers(len(faces))))
-        nested |= max(face) >= len(vertices)
         share = random.dirichlet(np.full(3, 0.2)) if random.random() < 0.5 else random.permutation([0.5, 0.5, 0.0])
         share = (share + 1e-6) / (1 + 3e-6)
         n = len(points)
         points.append((share @ np.array([points[v] for v in face])).tolist())
         faces += [[face[0], face[1], n], [face[1], face[2], n], [face[2], face[0], n]]
     before = make_surface(vertices, triangles)
-    try:
-        surface = make_surface(points, faces)
-    except InputError as refused:
-        # A sliver on the side of a face that is almost one itself (seed 34192, count 10) is refused by name.
-        if not nested or "cannot be merged without changing the piece" not in str(refused):
-            raise
-        return
+    surface = make_surface(points, faces)
     check_invariants(surface)
     assert len(degenerate_faces(surface.vertices, surface.faces)) == 0
     assert area(surface) == pytest.approx(area(before), rel=2e-3)

@@ -224,7 +224,7 @@ class _Patch:
             self.put(face, turned[:3])
             self.put(None, (turned[0], turned[2], turned[3]), origin=face)
             return True
-        if self.fan(face, long) or self.join_caps(face, long, around):
+        if self.fan(face, long) or self.join_caps(face, long, around) or self.fan_beside(face, long):
             return True
         return bool(length[short] <= _LAST_RESORT * around) and self.collapse(*ends, anywhere=False)
 
@@ -318,6 +318,17 @@ class _Patch:
                 if {line[i - 1], line[i]} == {p, q}:
                     line.insert(i, c)
         return True
+
+    def fan_beside(self, face: int, side: int) -> bool:
+        """Take away the cap across this side of a face, narrow itself or almost, whose own longest edge is another one."""
+        ring = self.corners(face)
+        beside = self._across(face, ring[side], ring[(side + 1) % 3])
+        far = self.corners(beside) if beside is not None else ()
+        if beside is None or len(far) != 3 or not self.is_narrow(far, _SHORT):
+            return False
+        points = self.vertices[list(far)]
+        long = int(np.argmax(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)))
+        return not {far[long], far[(long + 1) % 3]} <= set(ring) and self.fan(beside, long)
 
     def join_caps(self, face: int, side: int, around: float) -> bool:
         """Take away two caps back to back, whose corners lie at almost the same place on their common longest edge."""
