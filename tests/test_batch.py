@@ -10,6 +10,7 @@ from scipy.spatial import cKDTree
 
 import warpflat
 from warpflat.batch import flatten_all
+from warpflat.cells import cells_of
 from warpflat.cutting import CutPlan, cut
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric, find_fabric
@@ -17,9 +18,10 @@ from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.joined import join_networks, join_surfaces
 from warpflat.levels import Levels
 from warpflat.multilevel import _Cycles, _Pace, levels_pay, relax_multilevel
-from warpflat.network import SpringNetwork, cells_of, springs_of
+from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.shapes import make_shape
+from warpflat.springs import springs_of
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import border_loops
 from warpflat.tightness import Wear

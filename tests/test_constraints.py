@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from warpflat.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.errors import InputError
+from warpflat.fabric import grain_axes
 from warpflat.flattening import Flattening, flatten
-from warpflat.network import grain_axes
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.sewing import Sewn, sew
 from warpflat.shapes import make_shape

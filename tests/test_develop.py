@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from warpflat.cells import cells_of
 from warpflat.develop import _winds_twice, choose_datum, develop, geodesic_layout, harmonic_layout, profile_layout
 from warpflat.errors import InputError
-from warpflat.network import cells_of
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, line_from_indices, make_surface, mesh_edges, triangulate

@@ -10,9 +10,11 @@ import warp as wp
 from numpy.typing import NDArray
 from warpflat.kernels.springs import compute_spring_energy
 
-from warpflat.fabric import Fabric
-from warpflat.network import SpringNetwork, cells_of, grain_axes, springs_of
+from warpflat.cells import cells_of
+from warpflat.fabric import Fabric, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.shapes import make_shape
+from warpflat.springs import springs_of
 from warpflat.surface import Surface, make_surface
 
 

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 
 from warpflat.develop import develop
 from warpflat.errors import InputError
-from warpflat.fabric import Fabric
+from warpflat.fabric import Fabric, grain_axes
 from warpflat.looks import Energies
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, mesh_edges

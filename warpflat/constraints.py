@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
-from warpflat.network import grain_axes
+from warpflat.fabric import grain_axes
 from warpflat.surface.mirror import mirror_partners
 from warpflat.ties import Ties, length_ties, level_ties, mirror_ties, one_group, smooth_ties, straight_ties
 

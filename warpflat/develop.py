@@ -13,9 +13,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.cells import CellArrays, cells_of
 from warpflat.coarsen import Coarser, coarser_surfaces
 from warpflat.errors import InputError
-from warpflat.network import CellArrays, cells_of
 from warpflat.strain import signed_cell_areas
 from warpflat.surface.geodesic import signed_distance_and_station
 from warpflat.surface.grid import rows_and_columns

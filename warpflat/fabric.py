@@ -13,7 +13,17 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError, nearest
 
-__all__ = ["DEFAULT_FABRIC", "GRADES", "Curve", "Fabric", "Provenance", "find_fabric", "load_library", "value_names"]
+__all__ = [
+    "DEFAULT_FABRIC",
+    "GRADES",
+    "Curve",
+    "Fabric",
+    "Provenance",
+    "find_fabric",
+    "grain_axes",
+    "load_library",
+    "value_names",
+]
 
 DEFAULT_FABRIC = "isotropic"
 
@@ -204,6 +214,12 @@ def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabri
             return fabric
     names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
     raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
+
+
+def grain_axes(grain_angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
+    angle = np.deg2rad(grain_angle)
+    return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
 
 
 def value_names() -> tuple[str, ...]:

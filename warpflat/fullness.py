@@ -15,11 +15,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.cells import CellArrays
+from warpflat.fabric import grain_axes
 from warpflat.flattening import Flattening
 from warpflat.membrane import step_matrix
-from warpflat.network import CellArrays, SpringArrays, SpringNetwork, grain_axes, with_stiffness
+from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
 from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.springs import SpringArrays, with_stiffness
 from warpflat.strain import strain_energy
 from warpflat.surface.topology import border_loops, mesh_edges
 

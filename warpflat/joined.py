@@ -8,7 +8,9 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.network import ByVertex, CellArrays, SpringArrays, SpringNetwork, SpringsAround
+from warpflat.cells import ByVertex, CellArrays
+from warpflat.network import SpringNetwork
+from warpflat.springs import SpringArrays, SpringsAround
 from warpflat.surface.mesh import Surface
 
 __all__ = ["begins", "join_networks", "join_surfaces"]

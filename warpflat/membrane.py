@@ -94,7 +94,7 @@ def step_matrix(
     Args:
         fabric: stiffnesses [N/m].
         axes: unit vectors of warp and weft in the plane.
-        corner, edges, area: the cells, as `warpflat.network.CellArrays` has them.
+        corner, edges, area: the cells, as `warpflat.cells.CellArrays` has them.
         positions: #V by 2, a layout that says how each cell lies in the plane [m].
         stretch: #C by 2, length worn over length flat that is meant along warp and weft.
 

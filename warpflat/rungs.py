@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye
 
+from warpflat.cells import cells_of
 from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
-from warpflat.network import SpringNetwork, cells_of
+from warpflat.network import SpringNetwork
 from warpflat.sums import products, weighted_rows
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle

@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from warpflat.coarsen import coarser_surfaces
 from warpflat.develop import Development
-from warpflat.fabric import Fabric
+from warpflat.fabric import Fabric, grain_axes
 from warpflat.joined import begins, join_networks
 from warpflat.looks import Energies, Outcome
 from warpflat.membrane import Model
 from warpflat.multilevel import levels_pay, relax_multilevel
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
 from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
 from warpflat.strain import strain_energy

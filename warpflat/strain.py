@@ -12,12 +12,12 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.fabric import Fabric
+from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.membrane import compute_membrane_strain
 from warpflat.kernels.strain import Membrane, average_over_faces, compute_strain_energy, compute_worn_strain
 from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import half_edges_of
 from warpflat.surface.untangle import signed_cell_areas

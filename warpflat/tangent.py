@@ -7,7 +7,8 @@ import warp as wp
 
 from warpflat.kernels.membrane import bound_membrane
 from warpflat.membrane import corner_sums
-from warpflat.network import SpringNetwork, springs_of_sides
+from warpflat.network import SpringNetwork
+from warpflat.springs import springs_of_sides
 
 __all__ = ["TangentMatrix"]
 

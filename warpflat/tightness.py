@@ -15,10 +15,10 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.fabric import Fabric
+from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.membrane import compute_membrane_strain
 from warpflat.membrane import cloth_of, plane_stress
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.strain_map import smooth_to_vertices
 from warpflat.surface import Surface
 from warpflat.surface.curvature import curvature_tensors

@@ -7,7 +7,8 @@ import pytest
 from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, small_network
 
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.fabric import grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.surface import make_surface
 
 # How the patch, seen from the front, is made larger or smaller along weft and warp.

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from small_networks import corner_vertices
 from warpflat.kernels.membrane import compute_membrane_energy, compute_membrane_strain, evaluate_membrane
 
-from warpflat.fabric import Fabric
+from warpflat.fabric import Fabric, grain_axes
 from warpflat.membrane import cloth_of
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import border_edges
 from warpflat.tangent import TangentMatrix

@@ -10,16 +10,10 @@ from numpy.typing import NDArray
 from small_networks import CLOTH
 from test_kernel_surface_cells import SURFACES, norm
 
-from warpflat.fabric import Fabric
-from warpflat.network import (
-    SpringNetwork,
-    cells_of,
-    grain_axes,
-    quad_stiffness,
-    shear_hold,
-    springs_of,
-    springs_of_sides,
-)
+from warpflat.cells import cells_of
+from warpflat.fabric import Fabric, grain_axes
+from warpflat.network import SpringNetwork
+from warpflat.springs import quad_stiffness, shear_hold, springs_of, springs_of_sides
 from warpflat.surface import Surface, half_edges
 
 FloatArray = NDArray[np.float64]

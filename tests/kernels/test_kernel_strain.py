@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, shaken, small_network, vec2
 from warpflat.kernels.strain import compute_worn_strain
 
-from warpflat.network import SpringNetwork, grain_axes
+from warpflat.fabric import grain_axes
+from warpflat.network import SpringNetwork
 from warpflat.strain import membrane_of
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpflat.network import cells_of
+from warpflat.cells import cells_of
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, corner_triangles, make_surface, unfold_quad_diagonals
 from warpflat.surface.topology import places_of

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from warpflat.cells import cells_of
 from warpflat.fabric import find_fabric
-from warpflat.network import cells_of, springs_of
 from warpflat.shapes import make_shape
+from warpflat.springs import springs_of
 from warpflat.surface import make_surface
 from warpflat.surface.cut import cut_along
 from warpflat.surface.topology import unfold_quad_diagonals

@@ -242,7 +242,7 @@ def pattern_of_garment(
 
 def grain_of(outline: Vector, flat: Flattening, datum: Vector | None = None) -> Vector:
     """2 by 2 [m], along the warp: on the datum (#P by 2 [m]) where that is straight, else through the widest place."""
-    from warpflat.network import grain_axes
+    from warpflat.fabric import grain_axes
 
     x, y = grain_axes(flat.grain_angle)[0]
     turn = np.array([[y, -x], [x, y]])

@@ -1,0 +1,262 @@
+"""The springs of a surface: rest lengths measured on it in space, stiffnesses in N/m from the fabric.
+
+Each quad has four structural edges and two diagonals; a triangle has its edges (Van Gelder 1998).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.cells import ByVertex, CellArrays, cells_of, creases_of, first_of_faces
+from warpflat.fabric import Fabric, grain_axes
+from warpflat.kernels.stiffness import (
+    Lattice,
+    find_directions,
+    find_sides,
+    list_springs,
+    measure_edges,
+    measure_hold,
+    weigh_quads,
+    weigh_triangles,
+)
+from warpflat.launching import launch_each
+from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
+from warpflat.surface.topology import half_edges_of, order_by, rows_of, unfold_quad_diagonals
+
+__all__ = [
+    "SpringArrays",
+    "SpringsAround",
+    "shear_hold",
+    "shortened",
+    "springs_of",
+    "springs_of_sides",
+    "with_stiffness",
+]
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
+
+# A shear spring stiffens tension too; where a cell is so long that nothing is left for the structural spring, it keeps this share.
+_LEAST_STRUCTURAL_SHARE = 0.05
+# Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
+# guard begins at this share of it.
+_HOLD_SHARE = 0.75
+# Quad cells that lie within this angle of the grain carry the threads along their edges.
+_ALIGNED = np.deg2rad(15.0)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringsAround(ByVertex):
+    """The springs around each vertex, and for each entry the vertex at the far end, by which they are sorted."""
+
+    neighbor: IntArray
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Unweighed:
+    """Of a surface's springs what no fabric changes: as in SpringArrays."""
+
+    ends: IntArray
+    rest_length: FloatArray
+    edge_count: int
+    around: SpringsAround
+
+
+@dataclass(frozen=True, kw_only=True)
+class SpringArrays:
+    """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
+    are `around` each vertex."""
+
+    ends: IntArray
+    rest_length: FloatArray
+    stiffness: FloatArray
+    edge_count: int
+    around: SpringsAround
+    clamped_cells: int = 0
+
+
+def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
+    """Springs with rest lengths from space and stiffnesses from the fabric.
+
+    Args:
+        surface: of quads and/or triangles.
+        fabric: stiffnesses [N/m].
+        positions: #V by 2, a layout [m]: directions are measured in the plane against the grain, since threads are
+            straight in the cloth and not on the body.
+        grain_angle: of the warp against +y, degrees.
+    """
+    own, faces, is_quad = _unweighed(surface), surface.faces, surface.is_quad
+    warp, _ = grain_axes(grain_angle)
+    first = first_of_faces(surface, 4, 3)
+    sides = half_edges_of(surface).edge
+    of_side, stiffness = np.empty(len(sides)), np.empty(len(own.ends))
+    position, clamped = np.ascontiguousarray(positions, dtype=np.float64), 0
+    if not is_quad.all():
+        triangles = rows_of(faces, ~is_quad)
+        given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
+        launch_each(weigh_triangles, len(triangles), given, [of_side])
+    if is_quad.any():
+        quads = rows_of(faces, is_quad)
+        diagonal, over = np.empty(len(quads)), np.empty(len(quads), dtype=np.int8)
+        given = [surface.vertices, position, quads, rows_of(first, is_quad), _lattice(fabric, quads, position, warp)]
+        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, over])
+        stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
+        clamped = int(np.count_nonzero(over))
+    stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
+    return SpringArrays(
+        ends=own.ends,
+        rest_length=own.rest_length,
+        stiffness=stiffness,
+        edge_count=own.edge_count,
+        around=own.around,
+        clamped_cells=clamped,
+    )
+
+
+def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
+    """K along a quad's first edges, along its second ones, and G [N/m], for first edges at `angle` [rad] from the warp.
+
+    Within 15 degrees of warp or weft the edges are the threads. Further off, the crossed lattice gets the rotated
+    elasticity; a crossed lattice has C12 = C66 = G, and no coupling of shear with tension, so there it is an
+    approximation.
+    """
+    quarter = np.pi / 2
+    nearest = np.round(angle / quarter)
+    if abs(angle - nearest * quarter) <= _ALIGNED:
+        if int(nearest) % 2:
+            return fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness
+        return fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
+    c, s = np.cos(angle), np.sin(angle)
+    warp, weft, shear = fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
+    both = 6.0 * shear * s**2 * c**2
+    along = warp * c**4 + weft * s**4 + both
+    across = warp * s**4 + weft * c**4 + both
+    turned = (warp + weft - 2.0 * shear) * s**2 * c**2 + shear * (c**2 - s**2) ** 2
+    return float(along), float(across), float(turned)
+
+
+def _compliance(fabric: Fabric) -> wp.vec3d:
+    """1/K [m/N] of a strip of the cloth cut at an angle from the warp and pulled along itself, as coefficients of cos^4, sin^4 and
+    sin^2 cos^2: 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp."""
+    cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
+    return wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
+
+
+def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> Lattice:
+    """The fabric along the quads' edges.
+
+    The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
+    symmetry of a grid).
+    """
+    fourfold = np.empty((len(quads), 2))
+    launch_each(find_directions, len(quads), [positions, quads, wp.vec2d(*warp)], [fourfold])
+    cosine, sine = fourfold.sum(axis=0)
+    lattice = Lattice()
+    lattice.warp = wp.vec2d(*warp)
+    lattice.angle = float(np.arctan2(sine, cosine)) / 4.0
+    lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, lattice.angle)
+    lattice.least = _LEAST_STRUCTURAL_SHARE
+    return lattice
+
+
+@once_per_surface
+def _unweighed(surface: Surface) -> _Unweighed:
+    vertices, edge_count = surface.vertices, len(half_edges_of(surface).edges)
+    diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
+    ends, around = _ends_of(surface)
+    rest_length = np.empty(len(ends))
+    rest_length[edge_count:] = diagonal.T.ravel()
+    launch_each(measure_edges, edge_count, [vertices, ends], [rest_length])
+    return read_only(
+        _Unweighed(
+            ends=ends,
+            rest_length=rest_length,
+            edge_count=edge_count,
+            around=around,
+        )
+    )
+
+
+@once_per_faces
+def _ends_of(surface: Surface) -> tuple[IntArray, SpringsAround]:
+    """#S by 2, the ends of the springs, edges first, then diagonals; and the springs around each vertex."""
+    corner = rows_of(surface.faces, surface.is_quad)
+    ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
+    return ends, _springs_at(ends, len(surface.vertices))
+
+
+def _springs_at(ends: IntArray, count: int) -> SpringsAround:
+    end, offset = order_by(ends[:, ::-1].T.ravel(), count)
+    neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
+    launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
+    return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
+
+
+def shortened(
+    springs: SpringArrays,
+    surface: Surface,
+    positions: FloatArray,
+    axes: tuple[FloatArray, FloatArray],
+    stretch: FloatArray,
+) -> SpringArrays:
+    """The springs of a cloth that is worn stretched: a thread of unit direction u is |(s_warp u_warp, s_weft u_weft)| long."""
+    used = surface.faces >= 0
+    at = surface.faces[used]
+    faces = np.bincount(at, minlength=len(surface.vertices))
+    at_vertex = np.stack(
+        [
+            np.bincount(at, np.broadcast_to(stretch[:, k, None], used.shape)[used], minlength=len(faces)) / faces
+            for k in range(2)
+        ],
+        axis=1,
+    )
+    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
+    length = np.linalg.norm(d, axis=1)
+    u = np.stack([d @ axes[0], d @ axes[1]], axis=1) / np.where(length > 0.0, length, 1.0)[:, None]
+    worn = np.linalg.norm(u * 0.5 * (at_vertex[springs.ends[:, 0]] + at_vertex[springs.ends[:, 1]]), axis=1)
+    return replace(springs, rest_length=springs.rest_length / np.where(worn > 0.0, worn, 1.0))
+
+
+def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
+    """3 #C, the spring along each cell's edges 0-1, 1-2, 2-0."""
+    around = springs.around
+    side = np.empty_like(cells.corner)
+    given = [cells.corner, around.offset, around.neighbor, around.entry]
+    launch_each(find_sides, len(side), given, [side])
+    return side.ravel()
+
+
+def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
+    """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
+    side = springs_of_sides(springs, cells)
+    stiffness = np.bincount(side, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
+    return replace(springs, stiffness=stiffness, clamped_cells=0)
+
+
+def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:
+    """Shear stiffness [N/m] that the springs between triangles really have against warp and weft.
+
+    They shear as their directions happen to lie: split squares have K(45 degrees)/4, and threads between them kink at
+    that over K, not at G/K. Taken per vertex, sum of 1/2 k L^2 cos^2 sin^2 over its share of the area, infinite beside a quad,
+    and of these three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
+
+    Args:
+        surface, springs: of the piece.
+        positions: #V by 2, a layout [m].
+        warp: unit vector in the plane.
+    """
+    is_quad = surface.is_quad
+    if is_quad.all():
+        return np.inf
+    around, count = springs.around, len(surface.vertices)
+    hold = np.empty(count)
+    layout = np.ascontiguousarray(positions, dtype=np.float64)
+    lists = [around.offset, around.neighbor, around.entry]
+    given = [layout, *lists, springs.rest_length, springs.stiffness, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
+    launch_each(measure_hold, count, given, [hold])
+    hold[surface.faces[is_quad].ravel()] = np.inf
+    return _HOLD_SHARE * float(np.partition(hold, count // 4)[count // 4])
