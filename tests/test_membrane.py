@@ -14,11 +14,12 @@ import warpflat
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric, find_fabric
 from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.scene import load_scene, scene_surface
 from warpflat.shapes import make_shape
 from warpflat.strain import worn_strain
 from warpflat.surface import make_surface
+from warpflat.upright import Upright
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")

@@ -15,10 +15,11 @@ from warpflat.levels import Levels, carry_up
 from warpflat.looks import Outcome
 from warpflat.multilevel import relax_multilevel
 from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
+from warpflat.upright import Upright
 
 PLAIN, LEVELS = RelaxOptions(solver="plain"), RelaxOptions(solver="multilevel")
 

@@ -21,10 +21,11 @@ from warpflat.flattening import Flattening
 from warpflat.membrane import step_matrix
 from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
-from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.springs import SpringArrays, with_stiffness
 from warpflat.strain import strain_energy
 from warpflat.surface.topology import border_loops, mesh_edges
+from warpflat.upright import Upright
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -31,15 +31,14 @@ from warpflat.launching import Launch, launch_each, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
-from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
+from warpflat.upright import Upright, held_upright, without_turning
 
 __all__ = [
     "SOLVERS",
     "RelaxOptions",
     "Relaxation",
     "Solver",
-    "Upright",
     "Watch",
     "relax",
 ]
@@ -55,7 +54,6 @@ _LEAVE = 0.2
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -97,20 +95,6 @@ class RelaxOptions:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
         if self.solver not in SOLVERS:
             raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Upright:
-    """A piece and the two of its vertices that lie one above the other.
-
-    Attributes:
-        lower, upper: vertex indices.
-        vertices: those of the piece; all, if not given.
-    """
-
-    lower: int
-    upper: int
-    vertices: slice = field(default_factory=lambda: slice(None))
 
 
 @dataclass
@@ -474,23 +458,10 @@ class Relaxation:
         """
         if not self.upright:
             return
-        position, velocity = _complex(self.position.numpy()).copy(), _complex(self.velocity.numpy()).copy()
-        force, weight = _complex(self.cloth_force()), self.network.spring_stiffness.numpy()
-        load = np.zeros_like(position)
-        for piece in self.upright:
-            here = piece.vertices
-            chord = position[piece.upper] - position[piece.lower]
-            length = float(np.abs(chord))
-            turn = 1j * length / chord if length > 0.0 else 1.0 + 0.0j
-            centre = position[here].mean()
-            position[here] = centre + turn * (position[here] - centre)
-            velocity[here] *= turn
-            arm, weighted = _arms(position[here], weight[here])
-            inertia = max(_along(arm, weighted), 1e-300)
-            velocity[here] -= (_along(weighted, velocity[here]) / inertia) * arm
-            load[here] = (-_along(arm, turn * force[here]) / inertia) * weighted
-        for array, values in ((self.position, position), (self.velocity, velocity), (self.load, load)):
-            array.assign(values.view(np.float64).reshape(-1, 2))
+        force, weight = self.cloth_force(), self.network.spring_stiffness.numpy()
+        held = held_upright(self.upright, self.position.numpy(), self.velocity.numpy(), force, weight)
+        for array, values in zip((self.position, self.velocity, self.load), held, strict=True):
+            array.assign(values)
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -512,17 +483,12 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        position, weight = _complex(self.position.numpy()), self.network.spring_stiffness.numpy()
         self._measure.launches[0].launch()
         mean = _sums(self._vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
-        force = _complex(self.cloth_force())
-        for piece in self.upright:
-            here = piece.vertices
-            arm, weighted = _arms(position[here], weight[here])
-            turning = _along(arm, force[here]) / max(_along(arm, weighted), 1e-300)
-            force[here] -= turning * weighted
-        largest = np.maximum.reduceat(force.real**2 + force.imag**2, self._vertex_begin[:-1])
+        weight = self.network.spring_stiffness.numpy()
+        force = without_turning(self.upright, self.position.numpy(), self.cloth_force(), weight)
+        largest = np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1])
         return np.sqrt(largest) / np.maximum(mean, floor)
 
     def outcome(self, steps: int, work_units: float, *, begun: float) -> Outcome:
@@ -549,22 +515,6 @@ def _sums(values: FloatArray, begin: NDArray[np.int32]) -> FloatArray:
     """The sum of each range of the values; `begin` has its begins and the last end."""
     # Of a whole array NumPy adds in pairs, which loses less.
     return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])
-
-
-def _complex(vectors: FloatArray) -> ComplexArray:
-    """#V by 2 as #V, x + iy; the same memory."""
-    return np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
-
-
-def _along(a: ComplexArray, b: ComplexArray) -> float:
-    """The sum of the scalar products of vectors."""
-    return dot(a.view(np.float64), b.view(np.float64))
-
-
-def _arms(at: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
-    arm = 1j * (at - (weight * at).sum() / weight.sum())
-    return arm, weight * arm
 
 
 Watch = Callable[[Relaxation, Energies, float], None]

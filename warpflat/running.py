@@ -20,10 +20,11 @@ from warpflat.membrane import Model
 from warpflat.multilevel import levels_pay, relax_multilevel
 from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
-from warpflat.relax import Relaxation, RelaxOptions, Upright, relax
+from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.strain import strain_energy
 from warpflat.surface import Surface
 from warpflat.tightness import Wear, meant_stretch
+from warpflat.upright import Upright
 
 __all__ = ["Relaxed", "Run", "relax_runs"]
 

@@ -12,9 +12,10 @@ from warpflat.flattening import Flattening
 from warpflat.joined import begins, join_networks, join_surfaces
 from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
-from warpflat.relax import Relaxation, Upright
+from warpflat.relax import Relaxation
 from warpflat.strain import strain_energy
 from warpflat.surface.topology import components
+from warpflat.upright import Upright
 
 __all__ = ["Together"]
 
