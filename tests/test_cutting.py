@@ -22,7 +22,7 @@ from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.scene_cuts import CutTable, plan_cuts
 from warpflat.shapes import make_shape
-from warpflat.surface import Surface, line_on_plane, make_surface, read_surface, with_lines
+from warpflat.surface import Surface, line_on_plane, make_surface, read_surface, topology, with_lines
 from warpflat.surface.cut import cut_along
 from warpflat.surface.pieces import apply_cut
 from warpflat.surface.trace import geodesic_path
@@ -205,6 +205,22 @@ def test_cutting_conserves_area_faces_and_rest_lengths_and_glues_back(bodice: Fl
     ):
         assert rest == length[int(min(ends)), int(max(ends))]
     assert float(after.mass.numpy().sum()) == pytest.approx(float(before.mass.numpy().sum()), rel=1e-12)
+
+
+def test_what_a_cut_knows_of_its_faces_is_not_worked_out_again(
+    bodice: Flattening, bust_cut: Flattening, monkeypatch: pytest.MonkeyPatch
+):
+    made: list[NDArray[np.int32]] = []
+
+    def noted(faces: NDArray[np.int32]) -> topology.HalfEdges:
+        made.append(faces)
+        return half_edges(faces)
+
+    half_edges = topology.half_edges
+    monkeypatch.setattr(topology, "half_edges", noted)
+    again = cut(bodice, CutPlan(name="again", paths=bust_cut.cuts[0].paths), relax=RelaxOptions(max_steps=1))
+    assert np.array_equal(again.faces, bust_cut.faces)
+    assert sum(faces is again.faces for faces in made) == 1
 
 
 def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):

@@ -116,6 +116,21 @@ def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     assert min(work for work, energy in seen if energy < 1.001 * minimum(done)) <= 60.0
 
 
+@pytest.mark.parametrize(("height", "most"), [(0.5, 24.0), (0.8, 48.0)])
+def test_a_cut_opens_within_a_few_cycles(height: float, most: float):
+    """It opens as a whole, which only the coarsest level finds out soon, and only if it goes to its end."""
+    done = flatten(make_shape("dome", resolution=51), fabric=cloth(375.0), datum="centre", device="cpu")
+    path = np.arange(51**2, dtype=np.int32).reshape(51, 51)[: int(51 * height), 17]
+    seen: list[tuple[float, float]] = []
+    after = cut(
+        done,
+        CutPlan(name="dart", paths=(path,)),
+        callback=lambda at: seen.append((at.work_units, at.spring_energy + at.guard_energy)),
+    )
+    assert after.flipped_faces == 0
+    assert min(work for work, energy in seen if energy < 1.001 * minimum(after)) <= most
+
+
 @pytest.mark.parametrize("kind", ["irregular", "split bodice", "crack near a border"])
 def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousandth(kind: str):
     """The coarse corrections are of use once they have been smoothed, however much they strain the piece before."""

@@ -173,7 +173,9 @@ def _make(surface: Surface, plans: Sequence[CutPlan]) -> _Made:
         )
         for plan, own in zip(plans, seams, strict=True)
     ]
-    return _Made(surface=apply_cut(surface, topology), cuts=tuple(applied), cut=topology)
+    # What the cut has had to know of the new faces, the relaxation asks for again.
+    cut_surface = replace(apply_cut(surface, topology), of_faces=topology.of_faces)
+    return _Made(surface=cut_surface, cuts=tuple(applied), cut=topology)
 
 
 def _edges(path: ArrayLike) -> list[tuple[int, int]]:

@@ -14,6 +14,8 @@ __all__ = ["CycleMemory", "Mark"]
 
 FloatArray = NDArray[np.float64]
 
+# Of so many cycles it is remembered where they have led, leaps and all.
+_DEPTH = 2
 # Least curvature, over what its parts would have apart, of a direction that cycles leave to be followed.
 _SOUND = 1e-3
 
@@ -30,7 +32,7 @@ class CycleMemory:
     share with each cycle.
     """
 
-    def __init__(self, depth: int) -> None:
+    def __init__(self, depth: int = _DEPTH) -> None:
         """Of so many cycles, besides the one that has just ended."""
         self._depth = depth
         self._begin: Mark | None = None

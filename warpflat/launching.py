@@ -18,6 +18,7 @@ import contextlib
 import os
 import threading
 from collections.abc import Sequence as SequenceOf
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -40,7 +41,11 @@ def thread_count() -> int:
     Raises:
         InputError: the variable is not a whole number of at least 1.
     """
-    wished = os.environ.get("WARPFLAT_THREADS", "").strip()
+    return _thread_count(os.environ.get("WARPFLAT_THREADS", "").strip())
+
+
+@lru_cache
+def _thread_count(wished: str) -> int:
     if not wished:
         return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     if not wished.isdecimal() or int(wished) < 1:

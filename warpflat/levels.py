@@ -35,7 +35,10 @@ BoolArray = NDArray[np.bool_]
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
 # the very first, or so many times the vertices along its side: a crack that opens is slow there too. In a cycle it is enough, too, once
 # they take no more than this share of what all before have taken of its energy: it is not the fine level's to the last per cent.
+# After every second time it leaps to where the ways so far say that its energy is least: a crack opens in a third of the steps. In cycles
+# that is for lattices only: a coarse level of triangles stores roughly what the fine one does, and is not worth following to its end.
 _BOTTOM_STEPS = 8
+_LEAP_EVERY = 2
 _AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
@@ -43,8 +46,10 @@ _LITTLE_GAIN = 0.07
 # Grids of more vertices start where a coarser one of at most so many has come to rest: cubics from this size on leave a few hundredths
 # of a per cent.
 _CYCLED = 5_000
-# Steps before and after.
+# Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
+# straight lines, whose kinks they have to smooth first.
 _STEPS = 4
+_STEPS_SMOOTH = 2
 # The least share that is tried, of a correction and of a leap.
 _LEAST_SHARE = 0.05
 _LEAST_OF_LEAP = 0.2
@@ -126,10 +131,14 @@ class Levels:
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
             while len(rungs) < depth:
                 rungs.append(Rung(step=stay(lowest.surface), network=lowest, layout=where))
-        self._join(finest, ladders, [] if below is None else below._levels)
+        self._join(finest, ladders, [] if below is None else below._levels, mend=mend)
 
-    def _join(self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = ()) -> None:
-        self._ladders = ladders
+    def _join(
+        self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = (), *, mend: bool
+    ) -> None:
+        self._ladders, self._mend = ladders, mend
+        self._lattice = all(rungs[0].step.smooth_carry is not None for rungs in ladders if rungs)
+        self._steps = _STEPS_SMOOTH if self._lattice or not mend else _STEPS
         self._levels = [_Level(finest)]
         self.leading: dict[Surface, Rung] = {}
         self._watch_every = _watch_every(finest.network)
@@ -151,7 +160,7 @@ class Levels:
     def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
         """Those of some of the pieces, which `finest` is of."""
         kept = Levels.__new__(Levels)
-        kept._join(finest, [self._ladders[piece] for piece in pieces])
+        kept._join(finest, [self._ladders[piece] for piece in pieces], mend=self._mend)
         kept.stale = self.stale
         return kept
 
@@ -201,16 +210,16 @@ class Levels:
 
     def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> None:
         """Some steps from rest; `evaluated` says that the forces there have just been evaluated."""
-        state = self._levels[level].state
+        state, steps = self._levels[level].state, _STEPS if level else self._steps
         state.velocity.zero_()
-        state.sweep(_STEPS, each_step, watch_every=self._watch_every, evaluated=evaluated)
-        self._count(level, _STEPS)
+        state.sweep(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
+        self._count(level, steps)
 
     def _settle(self, share: float, little: float = 0.0) -> FloatArray:
         """Relax the coarsest level until the forces of each piece have come down to a share of what they were, or steps take no more
         than a little share of what all have taken of its energy."""
         last = len(self._levels) - 1
-        state = self._levels[last].state
+        state, memories = self._levels[last].state, [CycleMemory() for _ in self._ladders]
         state.evaluate_at_rest()
 
         def forces() -> FloatArray:
@@ -219,10 +228,16 @@ class Levels:
 
         aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
         first = before = now = self._objective(last)
-        for _ in range(math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
+        begin, leaping = _all_forces(state), self._lattice or not little
+        for number in range(1, 1 + math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
             state.sweep(_BOTTOM_STEPS, watch_every=self._watch_every)
             self._count(last, _BOTTOM_STEPS)
             now = self._objective(last)
+            if leaping and number % _LEAP_EVERY == 0 and np.isfinite(now).all():
+                state.evaluate_at_rest()
+                now = self._leap(last, memories, [begin, _all_forces(state)], now)
+                state.evaluate_at_rest()
+                begin = _all_forces(state)
             with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
                 slow = before - now < little * (first - now)
             if ((forces() <= aim) | slow).all():
@@ -334,15 +349,21 @@ class Levels:
         state = self._levels[0].state
         self._count(0, FORCE_WORK)
         state.evaluate_at_rest()
-        end = mark(state)
-        by, leapt = np.zeros_like(end[0]), np.zeros(len(memories), dtype=bool)
+        self._leap(0, memories, [begin, *self._marks, mark(state)], energy)
+
+    def _leap(
+        self, level: int, memories: Sequence[CycleMemory], marks: Sequence[Mark], energy: FloatArray
+    ) -> FloatArray:
+        """The same on any level, with all marks from the begin to the end; returns #P, the energy where that leads to [J]."""
+        state = self._levels[level].state
+        by, leapt = np.zeros_like(marks[-1][0]), np.zeros(len(memories), dtype=bool)
         for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
-            way = memory.lowest([(place[own], force[own]) for place, force in (begin, *self._marks, end)])
+            way = memory.lowest([(place[own], force[own]) for place, force in marks])
             if way is not None:
                 by[own], leapt[piece] = way, True
         device = state.network.device
         base, way_on = wp.clone(state.position), wp.array(by, dtype=wp.vec2d, device=device)
-        self._go(0, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
+        return self._go(level, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
 
     def follow(self) -> None:
         """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""
@@ -449,6 +470,11 @@ def carry_up(state: Relaxation) -> Levels | None:
 def mark(state: Relaxation) -> Mark:
     """Where it is, and the forces of the cloth there, as they have just been evaluated."""
     return state.positions(), state.cloth_force()
+
+
+def _all_forces(state: Relaxation) -> Mark:
+    """The same with the load."""
+    return state.positions(), np.array(state.force.numpy())
 
 
 def _watch_every(network: SpringNetwork) -> int:

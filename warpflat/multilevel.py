@@ -39,8 +39,6 @@ __all__ = ["levels_pay", "relax_multilevel"]
 
 BoolArray = NDArray[np.bool_]
 
-# Of so many cycles it is remembered where they have led, leaps and all.
-_DEPTH = 2
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0
 _FEW = 1_200
@@ -58,7 +56,7 @@ class _Pace:
     """
 
     near: bool = False
-    memory: CycleMemory = field(default_factory=lambda: CycleMemory(_DEPTH))
+    memory: CycleMemory = field(default_factory=CycleMemory)
 
 
 @dataclass(kw_only=True)

@@ -15,7 +15,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
 from itertools import pairwise
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 import warp as wp
@@ -165,6 +165,7 @@ class Relaxation:
         self.restarts = 0
         self.last: Look
         self.looked = False
+        self._views: dict[int, NDArray[Any]] = {}
         self._record()
 
     def _record(self) -> None:
@@ -319,18 +320,27 @@ class Relaxation:
             if number % watch_every == 0:
                 if number or not evaluated:
                     self._evaluate.launch()
-                evaluate_on = self._evaluate_on if self._guarded.numpy().any() else self._evaluate_unguarded
+                evaluate_on = self._evaluate_on if self._on_host(self._guarded).any() else self._evaluate_unguarded
             else:
                 evaluate_on.launch()
             if self.options.kinetic_damping:
-                braking = np.flatnonzero(_sums(self._power.numpy(), self._vertex_begin) < 0.0)
-                for piece in braking:
+                power = _sums(self._on_host(self._power), self._vertex_begin)
+                for piece in np.flatnonzero(power < 0.0) if power.min() < 0.0 else ():
                     self._stop[piece].launch()
-                self.restarts += len(braking)
+                    self.restarts += 1
             self._advance.launch()
             self.steps += 1
             if each_step is not None:
                 each_step()
+
+    def _on_host(self, array: wp.array) -> NDArray[Any]:
+        """The values of one of the buffers that each step asks for; on the CPU the buffer itself, without the way through Warp."""
+        view = self._views.get(id(array))
+        if view is None:
+            view = array.numpy()
+            if self.network.device.is_cpu:
+                self._views[id(array)] = view
+        return view
 
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""

@@ -164,7 +164,7 @@ def _every_other(lattice: Lattice) -> Thinned | None:
     blocks = np.flatnonzero(at_corner[0] >= 0)
     at_corner = at_corner[:, blocks]
     corners = np.stack([lattice.corner[at_corner[k], k] for k in range(4)], axis=1)
-    kept = np.unique(corners)
+    kept = np.flatnonzero(np.bincount(corners.ravel(), minlength=len(lattice.row))).astype(np.int32)
     count = len(lattice.row)
     if len(kept) > _MOST_LEFT * count:
         return None

@@ -11,14 +11,15 @@ Everything here is a pure function: arrays in, new arrays and maps to the uncut 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal
+from dataclasses import dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.topology import HalfEdges, components, half_edges, join_labels
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import HalfEdges, components_of, half_edges, join_labels
 
 __all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "glue"]
 
@@ -55,6 +56,7 @@ class Cut:
         face_component: #F, which connected piece of the cut mesh a face belongs to, numbered by their first faces.
         component_count: pieces after the cut.
         components_before: pieces before it.
+        of_faces: what has been worked out of the faces, for a surface that has them (see `warpflat.surface.mesh.once_per_faces`).
     """
 
     faces: NDArray[np.int32]
@@ -65,6 +67,7 @@ class Cut:
     face_component: NDArray[np.int32]
     component_count: int
     components_before: int
+    of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
     @property
     def seam(self) -> Seam:
@@ -159,7 +162,8 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
             )
         seams.extend(_seams(chain, left_ends, right_ends))
 
-    labels = components(new_faces)
+    cut_mesh = _mesh_of(new_faces)
+    labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
     # Sewn up again along the cut, what it parted is one.
     beside = (labels[near[he.face[np.concatenate(half)]]] for half in zip(*sides, strict=True))
@@ -173,6 +177,15 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
         face_component=labels,
         component_count=after,
         components_before=before,
+        of_faces=cut_mesh.of_faces,
+    )
+
+
+def _mesh_of(faces: NDArray[np.int32]) -> Surface:
+    """A surface of which nothing but the faces is known."""
+    nowhere = np.empty((0, 3))
+    return Surface(
+        vertices=nowhere, faces=faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
     )
 
 
@@ -287,7 +300,7 @@ def _double(
         for corner in (half, int(he.next[half])):
             keep.setdefault(int(he.tail[corner]), int(fan[corner]))
     at_path = np.flatnonzero(np.isin(he.tail, on_path))
-    origin = list(range(vertex_count))
+    copies: list[int] = []
     given: dict[int, int] = {}
     fans = dict.fromkeys(on_path.tolist(), 0)
     for corner in at_path.tolist():
@@ -297,10 +310,10 @@ def _double(
             if keep.setdefault(old, group) == group:
                 given[group] = old
             else:
-                given[group] = len(origin)
-                origin.append(old)
+                given[group] = vertex_count + len(copies)
+                copies.append(old)
         vertex[corner] = given[group]
-    return vertex, np.array(origin, dtype=np.int32), fans
+    return vertex, np.append(np.arange(vertex_count), copies).astype(np.int32), fans
 
 
 def _seams(chain: NDArray[np.int32], left_ends: NDArray[np.int32], right_ends: NDArray[np.int32]) -> list[Seam]:

@@ -68,7 +68,10 @@ def carry_lines(
         cut: made from `faces`.
     """
     doubled = np.unique(np.concatenate([seam.path for seam in cut.seams]))
-    near = np.isin(faces, doubled).any(axis=1)
+    # With room for the -1 of triangles at its end.
+    cut_at = np.zeros(int(faces.max(initial=0)) + 2, dtype=bool)
+    cut_at[doubled] = True
+    near = cut_at[faces].any(axis=1)
     # Slots of the faces are the same before and after the cut, so the half-edges correspond one to one.
     old, new = half_edges(faces[near]), half_edges(cut.faces[near])
     ends = dict(
