@@ -36,13 +36,15 @@ __all__ = ["Held", "SeamPair", "Sewn", "sew"]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# Of a tie's spring over the median spring of the cloth; the same of those that only keep lines smooth; the rounds that
-# the ties are given.
+# Of a tie's spring over the median spring of the cloth; the same of those that only keep lines smooth.
 _STIFFNESS = 4.0
 _SOFT = 0.3
-_ROUNDS = 60
-# While the ties do not agree yet, the pieces need not come to rest as well as at the end.
-_COARSE = 10.0
+# Steps of a round at most: what is amiss over a whole seam takes a dozen rounds, whether the cloth has come to rest before the offsets
+# grow or only begun to. Every so many rounds they become a quarter longer: offsets that follow a cloth that still swings keep it swinging.
+_ROUND = 40
+_LONGER = 5
+# Ties that contradict each other: in so many rounds what is amiss has come down by less than a tenth.
+_PATIENCE = 20
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -209,27 +211,27 @@ def _ties(
 
 
 def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tuple[Outcome, FloatArray, bool]:
-    """Relax, let the offsets grow, and again until the ties agree; the outcome, the misses (#P [m]), and whether they do."""
-    coarse = bool(len(ties))
-    misses, agreed = np.zeros(0), True
-    for _ in range(_ROUNDS):
-        looser = _COARSE if coarse else 1.0
-        state.options = replace(
-            options,
-            energy_tolerance=min(1.0, looser * options.energy_tolerance),
-            residual_tolerance=looser * options.residual_tolerance,
-        )
-        outcome = relax(state)
-        if state.network.seams is None:
-            break
-        misses = _misses(state)
-        agreed = ties.agree(misses)
-        if (outcome.converged and agreed and not coarse) or state.steps >= options.max_steps:
-            break
-        coarse = coarse and not agreed
-        offset = state.network.seams.offset
-        offset.assign(offset.numpy() + np.where(ties.soft, 0.0, misses))
-    return outcome, misses, agreed and not coarse
+    """Relax, let the offsets grow, and again until all is at rest and the ties agree, twice in a row, since within the tolerances the
+    energy still changes; the outcome of the last round, the misses (#P [m]), and whether they agree."""
+    seams = state.network.seams
+    if seams is None:
+        return relax(state), np.zeros(0), True
+    amiss: list[float] = []
+    while True:
+        steps = _ROUND + len(amiss) // _LONGER * _ROUND // 4
+        state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
+        outcome, misses = relax(state), _misses(state)
+        amiss.append(ties.amiss(misses))
+        done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
+        if done or _contradict(amiss) or state.steps >= options.max_steps:
+            return outcome, misses, amiss[-1] <= 1.0
+        seams.offset.assign(seams.offset.numpy() + np.where(ties.soft, 0.0, misses))
+
+
+def _contradict(amiss: Sequence[float]) -> bool:
+    """Whether ties no longer come nearer to agreeing, by what was amiss after each round."""
+    before, lately = amiss[:-_PATIENCE], amiss[-_PATIENCE:]
+    return bool(before) and min(lately) > max(0.9 * min(before), 1.0)
 
 
 def _held(

@@ -64,10 +64,10 @@ class Ties:
         counted = np.where(self.soft, 0.0, misses)
         return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
 
-    def agree(self, misses: FloatArray) -> bool:
-        """Whether no tie and no sum is amiss by more than its tolerance."""
-        sums = np.abs(self.sums(misses))
-        return bool((np.abs(misses) <= self.tolerance).all() and (sums <= self.sum_tolerance).all())
+    def amiss(self, misses: FloatArray) -> float:
+        """The largest of what ties and sums are amiss by, each over its tolerance: they agree up to 1."""
+        own, sums = np.abs(misses) / self.tolerance, np.abs(self.sums(misses)) / self.sum_tolerance
+        return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
 
 
 def one_group(*ties: Ties) -> Ties:
