@@ -61,9 +61,9 @@ def step_bytes(network: SpringNetwork) -> float:
     v, f, c, s = network.vertex_count, network.face_count, network.cell_count, network.spring_count
     look = c * 24 + f * (16 + 4 + 4 + 8) + v * 32  # laid; corners, first, acting, clearance; places, velocities
     look += len(network.cell_arrays.around.entry) * 4 + f * (4 + 8) + v * (16 + 8 + 4)  # slots, what faces say; reach
-    gather = v * (16 + 16 + 8 + 8 + 4 + 4 + 16 + 16) + 2 * s * (4 + 4) + s * (8 + 8)
+    gather = v * (16 + 16 + 8 + 8 + 4 + 4 + 16 + 16) + 2 * s * (4 + 8 + 8)
     gather += v * (16 + 8 + 16 + 16 + 8)
-    advance = v * (8 + 4 + 16 + 16 + 16 + 8 + 16 + 8) + 2 * s * (4 + 4) + s * 8 + v * 2 * 32
+    advance = v * (8 + 4 + 16 + 16 + 16 + 8 + 16 + 8) + 2 * s * (4 + 8) + v * 2 * 32
     return float(0.25 * look + gather + advance)
 
 

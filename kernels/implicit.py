@@ -142,7 +142,7 @@ def advance(
     i = wp.tid() + first
     coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     for s in range(springs.offset[i], springs.offset[i + 1]):
-        coupling += springs.stiffness[springs.index[s]] * first_guess[springs.neighbor[s]]
+        coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
     h2 = time_step * time_step
     dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] + dv

@@ -7,19 +7,17 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.struct
 class Springs:
-    """The springs, and which of them are around each vertex: every one is listed at both of its ends.
+    """The springs around each vertex, every spring listed at both of its ends.
 
-    offset: #V+1, where each vertex's entries in the next two begin.
+    offset: #V+1, where the springs of each vertex begin.
     neighbor: the vertex at the far end.
-    index: which spring it is.
-    rest_length: #S, length on the surface in space [m].
-    stiffness: #S, k_ij [N/m].
+    rest_length: length on the surface in space [m].
+    stiffness: k_ij [N/m].
     pull: 1 where the springs are the cloth, 0 where a membrane is and their k_ij only are the matrix of the step.
     """
 
     offset: wp.array(dtype=wp.int32)
     neighbor: wp.array(dtype=wp.int32)
-    index: wp.array(dtype=wp.int32)
     rest_length: wp.array(dtype=wp.float64)
     stiffness: wp.array(dtype=wp.float64)
     pull: wp.float64
@@ -49,9 +47,8 @@ def spring_forces_on(
     if springs.pull != wp.float64(0.0):
         here = position[i]
         moving = velocity[i]
-        for e in range(springs.offset[i], springs.offset[i + 1]):
-            there = springs.neighbor[e]
-            s = springs.index[e]
+        for s in range(springs.offset[i], springs.offset[i + 1]):
+            there = springs.neighbor[s]
             stiffness = springs.stiffness[s]
             force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
             viscosity += stiffness * (velocity[there] - moving)
@@ -76,9 +73,8 @@ def compute_spring_energy(
     here = position[i]
     total = wp.float64(0.0)
     pulled = wp.float64(0.0)
-    for e in range(springs.offset[i], springs.offset[i + 1]):
-        s = springs.index[e]
-        stretch = wp.length(position[springs.neighbor[e]] - here) - springs.rest_length[s]
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
         half = wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
         pulled += half
         total += wp.float64(0.5) * half * wp.abs(stretch)

@@ -81,21 +81,23 @@ def find_sides(
 
 
 @wp.kernel
-def add_stiffness(
+def spread_stiffness(
     offset: wp.array(dtype=wp.int32),
     spring: wp.array(dtype=wp.int32),
     stiffness: wp.array(dtype=wp.float64),
     pair_share: wp.float64,
     first: int,
     # outputs
+    at_entry: wp.array(dtype=wp.float64),
     around: wp.array(dtype=wp.float64),
 ):
-    """#V, the sum of the k_ij [N/m] around each vertex and a share of the stiffest. stiffness: #S."""
+    """k_ij [N/m] of each entry around each vertex, and #V, their sum and a share of the stiffest. stiffness: #S."""
     i = wp.tid() + first
     total = wp.float64(0.0)
     stiffest = wp.float64(0.0)
     for e in range(offset[i], offset[i + 1]):
         k = stiffness[spring[e]]
+        at_entry[e] = k
         total += k
         stiffest = wp.max(stiffest, k)
     around[i] = total + pair_share * stiffest

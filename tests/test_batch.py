@@ -228,8 +228,7 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), cells_of(surface)
     np.testing.assert_array_equal(joined.springs.offset.numpy(), springs.around.offset)
     np.testing.assert_array_equal(joined.springs.neighbor.numpy(), springs.around.neighbor)
-    listed = joined.springs.rest_length.numpy()[joined.springs.index.numpy()]
-    np.testing.assert_array_equal(listed, springs.rest_length[springs.around.entry])
+    np.testing.assert_array_equal(joined.springs.rest_length.numpy(), springs.listed_length)
     assert joined.spring_arrays.edge_count == springs.edge_count
     for ends in (joined.spring_arrays.ends, springs.ends):
         assert len(np.unique(np.sort(ends, axis=1), axis=0)) == joined.spring_count

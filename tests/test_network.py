@@ -206,7 +206,7 @@ def test_networks_of_one_surface_share_what_no_fabric_changes(split: int):
     one = SpringNetwork.build(surface, cloth(), flat, device="cpu")
     other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device="cpu")
     for struct, names in (
-        ("springs", ("offset", "neighbor", "index", "rest_length")),
+        ("springs", ("offset", "neighbor", "rest_length")),
         ("cells", ("face", "first", "laid", "offset", "slot")),
     ):
         for name in names:
@@ -224,7 +224,7 @@ def test_a_network_of_other_arrays_lists_them_as_the_surfaces_own(split: int):
     other = replace(network, spring_arrays=copied(network.spring_arrays), cell_arrays=copied(network.cell_arrays))
     assert other.springs.neighbor.ptr != network.springs.neighbor.ptr
     for struct, names in (
-        ("springs", ("offset", "neighbor", "index", "rest_length", "stiffness")),
+        ("springs", ("offset", "neighbor", "rest_length", "stiffness")),
         ("cells", ("face", "first", "laid", "offset", "slot", "slack", "onset")),
     ):
         for name in names:
@@ -251,7 +251,7 @@ def test_a_network_of_longer_springs_and_larger_cells_has_these():
 
 def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
     surface = sheet(4, 3, 0.01, 0.01, split=5)
-    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu", model="membrane")
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
     before, lists = network.spring_arrays.stiffness.copy(), network.springs.stiffness.ptr
     wished = np.random.default_rng(2).uniform(1.0, 9.0, network.spring_count)
     network.weigh(wished)
@@ -260,8 +260,7 @@ def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
     offset, neighbor = network.springs.offset.numpy(), network.springs.neighbor.numpy()
     between = {(int(i), int(j)): k for (i, j), k in zip(network.spring_arrays.ends, wished, strict=True)}
     for i in range(network.vertex_count):
-        k_of_entry = network.springs.stiffness.numpy()[network.springs.index.numpy()]
-        there, k_ij = (a[offset[i] : offset[i + 1]] for a in (neighbor, k_of_entry))
+        there, k_ij = (a[offset[i] : offset[i + 1]] for a in (neighbor, network.springs.stiffness.numpy()))
         assert (np.diff(there) > 0).all()
         assert k_ij.tolist() == [between.get((i, int(j)), between.get((int(j), i))) for j in there]
         assert network.spring_stiffness.numpy()[i] == pytest.approx(k_ij.sum() + 0.5 * k_ij.max(), rel=1e-14)

@@ -36,7 +36,7 @@ from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
-from warpflat.kernels.stiffness import add_stiffness
+from warpflat.kernels.stiffness import spread_stiffness
 from warpflat.launching import launch_each
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.springs import SpringArrays, shear_hold, shortened, springs_of, with_stiffness
@@ -90,6 +90,7 @@ class SpringNetwork:
     bonds: Bonds = field(init=False)
     mass: wp.array = field(init=False)
     spring_stiffness: wp.array = field(init=False)
+    _listed: wp.array = field(init=False, repr=False)
 
     @classmethod
     def build(
@@ -151,14 +152,13 @@ class SpringNetwork:
         springs = Springs()
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
-        springs.index = _on(device, at.entry, wp.int32)
-        springs.rest_length = _on(device, s.rest_length, wp.float64)
-        # Those of a membrane follow its layout (`weigh`); the arrays keep those that it was made with.
-        springs.stiffness = _on(device, s.stiffness.copy() if self.model == "membrane" else s.stiffness, wp.float64)
+        springs.rest_length = _on(device, s.listed_length, wp.float64)
+        springs.stiffness = wp.empty(len(at.entry), dtype=wp.float64, device=device)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
         self.spring_stiffness = wp.empty(count, dtype=wp.float64, device=device)
-        self._add_stiffness()
+        self._listed = _on(device, at.entry, wp.int32)
+        self.weigh(s.stiffness)
 
         self.mass = _on(device, self.fabric.areal_density * c.vertex_areas, wp.float64)
         cells = Cells()
@@ -189,14 +189,10 @@ class SpringNetwork:
             self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
 
     def weigh(self, stiffness: FloatArray) -> None:
-        """Give the springs (#S) of a membrane these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
-        assert self.cloth is not None
-        self.springs.stiffness.assign(stiffness)
-        self._add_stiffness()
-
-    def _add_stiffness(self) -> None:
-        given = [self.springs.offset, self.springs.index, self.springs.stiffness, _PAIR_SHARE]
-        launch_each(add_stiffness, self.vertex_count, given, [self.spring_stiffness], device=self.device)
+        """Give the springs (#S) these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
+        given = [self.springs.offset, self._listed, _on(self.device, stiffness, wp.float64), _PAIR_SHARE]
+        made = [self.springs.stiffness, self.spring_stiffness]
+        launch_each(spread_stiffness, self.vertex_count, given, made, device=self.device)
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:

@@ -58,18 +58,19 @@ class SpringsAround(ByVertex):
 
 @dataclass(frozen=True, kw_only=True)
 class _Unweighed:
-    """Of a surface's springs what no fabric changes: as in SpringArrays."""
+    """Of a surface's springs what no fabric changes: as in SpringArrays, and the rest lengths as they are listed around the vertices."""
 
     ends: IntArray
     rest_length: FloatArray
     edge_count: int
     around: SpringsAround
+    listed_length: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringArrays:
     """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
-    are `around` each vertex."""
+    are `around` each vertex. Of a surface's own springs, what they share with those of other fabrics."""
 
     ends: IntArray
     rest_length: FloatArray
@@ -77,6 +78,14 @@ class SpringArrays:
     edge_count: int
     around: SpringsAround
     clamped_cells: int = 0
+    own: _Unweighed | None = None
+
+    @property
+    def listed_length(self) -> FloatArray:
+        """2 #S, the rest lengths as they are listed around the vertices [m]."""
+        if self.own is not None and self.own.rest_length is self.rest_length:
+            return self.own.listed_length
+        return np.take(self.rest_length, self.around.entry)
 
 
 def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
@@ -114,6 +123,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         edge_count=own.edge_count,
         around=own.around,
         clamped_cells=clamped,
+        own=own,
     )
 
 
@@ -177,6 +187,7 @@ def _unweighed(surface: Surface) -> _Unweighed:
             rest_length=rest_length,
             edge_count=edge_count,
             around=around,
+            listed_length=np.take(rest_length, around.entry),
         )
     )
 

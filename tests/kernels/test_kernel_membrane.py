@@ -387,7 +387,7 @@ def test_the_matrix_that_follows_bounds_the_stiffness_of_the_present_layout_and_
     springs, rng = network.springs, np.random.default_rng(7)
     offset, neighbor = springs.offset.numpy(), springs.neighbor.numpy()
     k, here = (
-        springs.stiffness.numpy()[springs.index.numpy()],
+        springs.stiffness.numpy(),
         np.repeat(np.arange(len(flat)), np.diff(springs.offset.numpy())),
     )
     assert offset[-1] == len(neighbor)
