@@ -14,6 +14,7 @@ import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Any, Literal
 
@@ -154,11 +155,7 @@ class Relaxation:
         self._face_begin = begins([net.face_count for net in pieces])
         self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
         self.numbers: Sequence[int] = range(len(pieces))
-        springs = [net.spring_arrays for net in pieces]
-        # What a strain of 1e-9 everywhere stores: below it a layout counts as free of strain.
-        self.negligible_energy = 0.5e-18 * np.array([np.sum(s.stiffness * s.rest_length**2) for s in springs])
-        self._mean_stiffness_force = np.array([np.mean(s.stiffness * s.rest_length) for s in springs])
-        self._spring_count = np.array([len(s.ends) for s in springs])
+        self._spring_count = np.array([net.spring_count for net in pieces])
         self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
         self.work_units = 0.0
@@ -166,109 +163,103 @@ class Relaxation:
         self.last: Look
         self.looked = False
         self._views: dict[int, NDArray[Any]] = {}
-        self._record()
 
-    def _record(self) -> None:
-        """Record the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one."""
-        net, h = self.network, self.options.time_step
-        n, f, device = net.vertex_count, net.face_count, net.device
-        evaluate_cells, compute_cell_energy, parameters = net.cell_model
-        seams = []
-        if net.seams is not None:
-            seams.append(
-                record(
-                    evaluate_seams,
-                    dim=net.seam_count,
-                    inputs=[self.position, self.velocity, net.seams, h],
-                    outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
-                    device=device,
-                )
-            )
+    # --- the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one
 
-        def cells(watch: int) -> Launch:
-            return record(
-                evaluate_cells,
-                dim=f,
-                inputs=[self.position, self.velocity, net.cells, parameters, h, watch],
-                outputs=[
-                    self._face_acting,
-                    self._face_clearance,
-                    self._face_force,
-                    self._face_viscosity,
-                    self._face_stiffness,
-                ],
-                device=device,
-            )
-
-        def gather(watch: int) -> Launch:
-            return record(
-                gather_forces,
-                dim=n,
-                inputs=[
-                    self.position,
-                    self.velocity,
-                    net.mass,
-                    net.spring_stiffness,
-                    net.springs,
-                    net.cells,
-                    self._face_acting,
-                    self._face_clearance,
-                    self._face_force,
-                    self._face_viscosity,
-                    self._face_stiffness,
-                    net.bonds,
-                    self._seam_force,
-                    self._seam_viscosity,
-                    self._seam_stiffness,
-                    self.load,
-                    h,
-                    watch,
-                ],
-                outputs=[
-                    self.force,
-                    self._power,
-                    self._driving_force,
-                    self._first_guess,
-                    self._stiffness,
-                    self._anchor,
-                    self._reach,
-                    self._guarded,
-                ],
-                device=device,
-            )
-
-        self._evaluate = LaunchSequence([cells(1), *seams, gather(1)])
-        on = gather(0)
-        self._evaluate_on = LaunchSequence([cells(0), *seams, on])
-        self._evaluate_unguarded = LaunchSequence([*seams, on])
-        self._measure = LaunchSequence(
-            [
-                record(
-                    compute_spring_energy,
-                    dim=n,
-                    inputs=[self.position, net.springs],
-                    outputs=[self._vertex_energy, self._vertex_pull],
-                    device=device,
-                ),
-                record(
-                    compute_cell_energy,
-                    dim=f,
-                    inputs=[self.position, net.cells, parameters],
-                    outputs=[self._face_energy],
-                    device=device,
-                ),
-            ]
+    def _cells(self, watch: int) -> Launch:
+        """Forces on the cells, of all faces (1) or of those that act (0)."""
+        net = self.network
+        kernel, _, parameters = net.cell_model
+        return record(
+            kernel,
+            dim=net.face_count,
+            inputs=[self.position, self.velocity, net.cells, parameters, self.options.time_step, watch],
+            outputs=[
+                self._face_acting,
+                self._face_clearance,
+                self._face_force,
+                self._face_viscosity,
+                self._face_stiffness,
+            ],
+            device=net.device,
         )
-        self._measure_motion = record(
-            compute_kinetic_energy,
-            dim=n,
-            inputs=[net.mass, self.velocity],
-            outputs=[self._vertex_energy],
-            device=device,
+
+    @cached_property
+    def _seams(self) -> list[Launch]:
+        net = self.network
+        if net.seams is None:
+            return []
+        return [
+            record(
+                evaluate_seams,
+                dim=net.seam_count,
+                inputs=[self.position, self.velocity, net.seams, self.options.time_step],
+                outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
+                device=net.device,
+            )
+        ]
+
+    def _gather(self, watch: int) -> Launch:
+        """Forces on the vertices, once all faces have been evaluated (1) or those that act (0)."""
+        net = self.network
+        return record(
+            gather_forces,
+            dim=net.vertex_count,
+            inputs=[
+                self.position,
+                self.velocity,
+                net.mass,
+                net.spring_stiffness,
+                net.springs,
+                net.cells,
+                self._face_acting,
+                self._face_clearance,
+                self._face_force,
+                self._face_viscosity,
+                self._face_stiffness,
+                net.bonds,
+                self._seam_force,
+                self._seam_viscosity,
+                self._seam_stiffness,
+                self.load,
+                self.options.time_step,
+                watch,
+            ],
+            outputs=[
+                self.force,
+                self._power,
+                self._driving_force,
+                self._first_guess,
+                self._stiffness,
+                self._anchor,
+                self._reach,
+                self._guarded,
+            ],
+            device=net.device,
         )
-        self._advance = record(
+
+    @cached_property
+    def _evaluate(self) -> LaunchSequence:
+        return LaunchSequence([self._cells(1), *self._seams, self._gather(1)])
+
+    @cached_property
+    def _gather_on(self) -> Launch:
+        return self._gather(0)
+
+    @cached_property
+    def _evaluate_on(self) -> LaunchSequence:
+        return LaunchSequence([self._cells(0), *self._seams, self._gather_on])
+
+    @cached_property
+    def _evaluate_unguarded(self) -> LaunchSequence:
+        return LaunchSequence([*self._seams, self._gather_on])
+
+    @cached_property
+    def _advance(self) -> Launch:
+        net = self.network
+        return record(
             advance,
-            dim=n,
+            dim=net.vertex_count,
             inputs=[
                 net.mass,
                 net.springs,
@@ -278,21 +269,74 @@ class Relaxation:
                 self._stiffness,
                 self._anchor,
                 self._reach,
-                h,
+                self.options.time_step,
             ],
             outputs=[self.position, self.velocity],
-            device=device,
+            device=net.device,
         )
-        self._stop = [
+
+    @cached_property
+    def _stop(self) -> list[Launch]:
+        """Of each piece."""
+        return [
             record(
                 stop,
                 dim=here.stop - here.start,
-                inputs=[net.mass[here], self.force[here], self._stiffness[here], h],
+                inputs=[self.network.mass[here], self.force[here], self._stiffness[here], self.options.time_step],
                 outputs=[self.velocity[here], self._driving_force[here], self._first_guess[here]],
-                device=device,
+                device=self.network.device,
             )
             for here in self.vertices
         ]
+
+    @cached_property
+    def _measure_springs(self) -> Launch:
+        return record(
+            compute_spring_energy,
+            dim=self.network.vertex_count,
+            inputs=[self.position, self.network.springs],
+            outputs=[self._vertex_energy, self._vertex_pull],
+            device=self.network.device,
+        )
+
+    @cached_property
+    def _measure(self) -> LaunchSequence:
+        net = self.network
+        _, kernel, parameters = net.cell_model
+        cells = record(
+            kernel,
+            dim=net.face_count,
+            inputs=[self.position, net.cells, parameters],
+            outputs=[self._face_energy],
+            device=net.device,
+        )
+        return LaunchSequence([self._measure_springs, cells])
+
+    @cached_property
+    def _measure_motion(self) -> Launch:
+        return record(
+            compute_kinetic_energy,
+            dim=self.network.vertex_count,
+            inputs=[self.network.mass, self.velocity],
+            outputs=[self._vertex_energy],
+            device=self.network.device,
+        )
+
+    # --- what is measured against
+
+    @cached_property
+    def negligible_energy(self) -> FloatArray:
+        """#P [J], what a strain of 1e-9 everywhere stores: below it a layout counts as free of strain."""
+        springs = (net.spring_arrays for net in self.network.pieces)
+        return 0.5e-18 * np.array([np.sum(s.stiffness * s.rest_length**2) for s in springs])
+
+    @cached_property
+    def _mean_stiffness_force(self) -> FloatArray:
+        """#P [N], the mean of k L."""
+        springs = (net.spring_arrays for net in self.network.pieces)
+        return np.array([np.mean(s.stiffness * s.rest_length) for s in springs])
+
+    # --- steps
 
     def step(self) -> None:
         """One approximate implicit step."""
@@ -493,7 +537,7 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        self._measure.launches[0].launch()
+        self._measure_springs.launch()
         mean = _sums(self._vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
         weight = self.network.spring_stiffness.numpy()
