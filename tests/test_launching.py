@@ -48,16 +48,16 @@ def steps_of(threads: int, *, triangles: bool) -> dict[str, np.ndarray]:
     start = develop(surface, surface.lines["centre"]).positions
     network = SpringNetwork.build(surface, find_fabric("denim"), start, device="cpu")
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)
-    assert len(state._advance.commands) == threads
+    assert len(state._buffers.advance.commands) == threads
     state.sweep(20)
     return {
         "position": state.position.numpy().copy(),
         "velocity": state.velocity.numpy().copy(),
         "force": state.force.numpy().copy(),
         # Of corners of faces that act; nobody reads those of the others.
-        "face force": np.where(np.repeat(state._face_acting.numpy(), 4)[:, None] != 0, state._face_force.numpy(), 0.0)[
-            (surface.faces >= 0).ravel()
-        ],
+        "face force": np.where(
+            np.repeat(state._buffers.face_acting.numpy(), 4)[:, None] != 0, state._buffers.face_force.numpy(), 0.0
+        )[(surface.faces >= 0).ravel()],
         "energies": state.potentials(),
     }
 

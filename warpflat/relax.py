@@ -16,7 +16,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass
 from functools import cached_property
 from itertools import pairwise
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 import warp as wp
@@ -24,14 +24,11 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.joined import begins, join_networks
-from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
-from warpflat.kernels.seams import evaluate_seams
-from warpflat.kernels.springs import compute_spring_energy
 from warpflat.kernels.transfer import correct
-from warpflat.launching import Launch, launch_each, record
-from warpflat.launching import Sequence as LaunchSequence
+from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
+from warpflat.step_buffers import StepBuffers
 from warpflat.tangent import TangentMatrix
 from warpflat.upright import Upright, held_upright, without_turning
 
@@ -100,7 +97,7 @@ class RelaxOptions:
 
 @dataclass
 class Relaxation:
-    """State and buffers of a running relaxation: allocated once, then a flat list of launches per step.
+    """A running relaxation: its state, steps from it, and how it stands.
 
     Attributes:
         network: the model.
@@ -123,33 +120,12 @@ class Relaxation:
     upright: Sequence[Upright] = ()
 
     def __post_init__(self, start: FloatArray) -> None:
-        n, f, device = self.network.vertex_count, self.network.face_count, self.network.device
+        n = self.network.vertex_count
         if np.shape(start) != (n, 2):
             raise InputError(f"start layout has shape {np.shape(start)}; must be ({n}, 2), a point per vertex")
-        net_seams = self.network.seam_count
-        self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
-        self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self.load = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self._driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self._first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self._power = wp.zeros(n, dtype=wp.float64, device=device)
-        self._stiffness = wp.zeros(n, dtype=wp.float64, device=device)
-        self._anchor = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self._reach = wp.zeros(n, dtype=wp.float64, device=device)
-        self._guarded = wp.zeros(n, dtype=wp.int32, device=device)
-        self._face_acting = wp.zeros(f, dtype=wp.int32, device=device)
-        # Written and read only where cells act: elsewhere no memory stands behind them.
-        self._face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
-        self._face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
-        self._face_stiffness = wp.empty(4 * f, dtype=wp.float64, device=device)
-        self._face_clearance = wp.zeros(f, dtype=wp.float64, device=device)
-        self._seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
-        self._seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
-        self._seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
-        self._vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
-        self._vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
-        self._face_energy = wp.zeros(f, dtype=wp.float64, device=device)
+        self._buffers = buffers = StepBuffers(self.network, self.options.time_step, start)
+        self.position, self.velocity = buffers.position, buffers.velocity
+        self.force, self.load = buffers.force, buffers.load
         pieces = self.network.pieces
         self._vertex_begin = begins([net.vertex_count for net in pieces])
         self._face_begin = begins([net.face_count for net in pieces])
@@ -162,165 +138,6 @@ class Relaxation:
         self.restarts = 0
         self.last: Look
         self.looked = False
-        self._views: dict[int, NDArray[Any]] = {}
-
-    # --- the launches of a step, over ranges for all cores: a recorded launch costs a fifth of a fresh one
-
-    def _cells(self, watch: int) -> Launch:
-        """Forces on the cells, of all faces (1) or of those that act (0)."""
-        net = self.network
-        kernel, _, parameters = net.cell_model
-        return record(
-            kernel,
-            dim=net.face_count,
-            inputs=[self.position, self.velocity, net.cells, parameters, self.options.time_step, watch],
-            outputs=[
-                self._face_acting,
-                self._face_clearance,
-                self._face_force,
-                self._face_viscosity,
-                self._face_stiffness,
-            ],
-            device=net.device,
-        )
-
-    @cached_property
-    def _seams(self) -> list[Launch]:
-        net = self.network
-        if net.seams is None:
-            return []
-        return [
-            record(
-                evaluate_seams,
-                dim=net.seam_count,
-                inputs=[self.position, self.velocity, net.seams, self.options.time_step],
-                outputs=[self._seam_force, self._seam_viscosity, self._seam_stiffness],
-                device=net.device,
-            )
-        ]
-
-    def _gather(self, watch: int) -> Launch:
-        """Forces on the vertices, once all faces have been evaluated (1) or those that act (0)."""
-        net = self.network
-        return record(
-            gather_forces,
-            dim=net.vertex_count,
-            inputs=[
-                self.position,
-                self.velocity,
-                net.mass,
-                net.spring_stiffness,
-                net.springs,
-                net.cells,
-                self._face_acting,
-                self._face_clearance,
-                self._face_force,
-                self._face_viscosity,
-                self._face_stiffness,
-                net.bonds,
-                self._seam_force,
-                self._seam_viscosity,
-                self._seam_stiffness,
-                self.load,
-                self.options.time_step,
-                watch,
-            ],
-            outputs=[
-                self.force,
-                self._power,
-                self._driving_force,
-                self._first_guess,
-                self._stiffness,
-                self._anchor,
-                self._reach,
-                self._guarded,
-            ],
-            device=net.device,
-        )
-
-    @cached_property
-    def _evaluate(self) -> LaunchSequence:
-        return LaunchSequence([self._cells(1), *self._seams, self._gather(1)])
-
-    @cached_property
-    def _gather_on(self) -> Launch:
-        return self._gather(0)
-
-    @cached_property
-    def _evaluate_on(self) -> LaunchSequence:
-        return LaunchSequence([self._cells(0), *self._seams, self._gather_on])
-
-    @cached_property
-    def _evaluate_unguarded(self) -> LaunchSequence:
-        return LaunchSequence([*self._seams, self._gather_on])
-
-    @cached_property
-    def _advance(self) -> Launch:
-        net = self.network
-        return record(
-            advance,
-            dim=net.vertex_count,
-            inputs=[
-                net.mass,
-                net.springs,
-                net.bonds,
-                self._driving_force,
-                self._first_guess,
-                self._stiffness,
-                self._anchor,
-                self._reach,
-                self.options.time_step,
-            ],
-            outputs=[self.position, self.velocity],
-            device=net.device,
-        )
-
-    @cached_property
-    def _stop(self) -> list[Launch]:
-        """Of each piece."""
-        return [
-            record(
-                stop,
-                dim=here.stop - here.start,
-                inputs=[self.network.mass[here], self.force[here], self._stiffness[here], self.options.time_step],
-                outputs=[self.velocity[here], self._driving_force[here], self._first_guess[here]],
-                device=self.network.device,
-            )
-            for here in self.vertices
-        ]
-
-    @cached_property
-    def _measure_springs(self) -> Launch:
-        return record(
-            compute_spring_energy,
-            dim=self.network.vertex_count,
-            inputs=[self.position, self.network.springs],
-            outputs=[self._vertex_energy, self._vertex_pull],
-            device=self.network.device,
-        )
-
-    @cached_property
-    def _measure(self) -> LaunchSequence:
-        net = self.network
-        _, kernel, parameters = net.cell_model
-        cells = record(
-            kernel,
-            dim=net.face_count,
-            inputs=[self.position, net.cells, parameters],
-            outputs=[self._face_energy],
-            device=net.device,
-        )
-        return LaunchSequence([self._measure_springs, cells])
-
-    @cached_property
-    def _measure_motion(self) -> Launch:
-        return record(
-            compute_kinetic_energy,
-            dim=self.network.vertex_count,
-            inputs=[self.network.mass, self.velocity],
-            outputs=[self._vertex_energy],
-            device=self.network.device,
-        )
 
     # --- what is measured against
 
@@ -359,41 +176,33 @@ class Relaxation:
                 evaluated, and no vertex leaves the reach that it had: three times as fast, and as good where steps are to smooth.
             evaluated: of the state as it is, all cells have been looked at already.
         """
-        evaluate_on = self._evaluate_on
+        buffers, evaluate_on = self._buffers, self._buffers.evaluate_unguarded
         for number in range(steps):
             if number % watch_every == 0:
                 if number or not evaluated:
-                    self._evaluate.launch()
-                evaluate_on = self._evaluate_on if self._on_host(self._guarded).any() else self._evaluate_unguarded
+                    buffers.evaluate.launch()
+                acts = buffers.on_host(buffers.guarded).any()
+                evaluate_on = buffers.evaluate_on if acts else buffers.evaluate_unguarded
             else:
                 evaluate_on.launch()
             if self.options.kinetic_damping:
-                power = _sums(self._on_host(self._power), self._vertex_begin)
+                power = _sums(buffers.on_host(buffers.power), self._vertex_begin)
                 for piece in np.flatnonzero(power < 0.0) if power.min() < 0.0 else ():
-                    self._stop[piece].launch()
+                    buffers.stop[piece].launch()
                     self.restarts += 1
-            self._advance.launch()
+            buffers.advance.launch()
             self.steps += 1
             if each_step is not None:
                 each_step()
 
-    def _on_host(self, array: wp.array) -> NDArray[Any]:
-        """The values of one of the buffers that each step asks for; on the CPU the buffer itself, without the way through Warp."""
-        view = self._views.get(id(array))
-        if view is None:
-            view = array.numpy()
-            if self.network.device.is_cpu:
-                self._views[id(array)] = view
-        return view
-
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""
         self.velocity.zero_()
-        self._evaluate.launch()
+        self._buffers.evaluate.launch()
 
     def mirrored_pieces(self) -> BoolArray:
         """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
-        return np.logical_or.reduceat(self._face_clearance.numpy() <= 0.0, self._face_begin[:-1])
+        return np.logical_or.reduceat(self._buffers.face_clearance.numpy() <= 0.0, self._face_begin[:-1])
 
     def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:
         """Let these pieces (#P) go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
@@ -412,9 +221,9 @@ class Relaxation:
 
     def potentials(self) -> FloatArray:
         """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
-        self._measure.launch()
-        springs = _sums(self._vertex_energy.numpy(), self._vertex_begin)
-        return np.stack([springs, _sums(self._face_energy.numpy(), self._face_begin)], axis=1)
+        self._buffers.measure.launch()
+        springs = _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
+        return np.stack([springs, _sums(self._buffers.face_energy.numpy(), self._face_begin)], axis=1)
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
@@ -423,8 +232,8 @@ class Relaxation:
     def piece_energies(self) -> FloatArray:
         """#P by 3, the same of each piece."""
         spring, cells = self.potentials().T
-        self._measure_motion.launch()
-        kinetic = _sums(self._vertex_energy.numpy(), self._vertex_begin)
+        self._buffers.measure_motion.launch()
+        kinetic = _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
         if self.network.model == "springs":
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
@@ -520,7 +329,7 @@ class Relaxation:
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
         self.velocity.zero_()
-        self._evaluate.launch()
+        self._buffers.evaluate.launch()
         return self.cloth_force()
 
     def cloth_force(self) -> FloatArray:
@@ -537,8 +346,8 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        self._measure_springs.launch()
-        mean = _sums(self._vertex_pull.numpy(), self._vertex_begin) / self._spring_count
+        self._buffers.measure_springs.launch()
+        mean = _sums(self._buffers.vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
         weight = self.network.spring_stiffness.numpy()
         force = without_turning(self.upright, self.position.numpy(), self.cloth_force(), weight)

@@ -1,0 +1,241 @@
+"""The buffers of a step and the launches over them.
+
+Buffers are allocated once. A launch is recorded when it is first asked for, over ranges for all cores: a recorded one costs a fifth of
+a fresh one.
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.joined import begins
+from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
+from warpflat.kernels.seams import evaluate_seams
+from warpflat.kernels.springs import compute_spring_energy
+from warpflat.launching import Launch, record
+from warpflat.launching import Sequence as LaunchSequence
+from warpflat.network import SpringNetwork
+
+__all__ = ["StepBuffers"]
+
+FloatArray = NDArray[np.float64]
+
+
+class StepBuffers:
+    """State of a network and what the kernels of a step leave behind; on the network's device.
+
+    Attributes:
+        position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d, constant
+            forces [N].
+        guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
+        face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
+        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, half of what each spring around pulls with [N].
+        evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
+            none. advance: the places after them. stop: of each piece, the velocities. measure, measure_springs, measure_motion: energies.
+    """
+
+    def __init__(self, network: SpringNetwork, time_step: float, start: FloatArray) -> None:
+        """Of a network at rest at a layout (#V by 2 [m]), stepped by so much [s]."""
+        self.network, self.time_step = network, time_step
+        n, f, device = network.vertex_count, network.face_count, network.device
+        net_seams = network.seam_count
+        self.position = wp.array(np.ascontiguousarray(start), dtype=wp.vec2d, device=device)
+        self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.load = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.power = wp.zeros(n, dtype=wp.float64, device=device)
+        self.stiffness = wp.zeros(n, dtype=wp.float64, device=device)
+        self.anchor = wp.zeros(n, dtype=wp.vec2d, device=device)
+        self.reach = wp.zeros(n, dtype=wp.float64, device=device)
+        self.guarded = wp.zeros(n, dtype=wp.int32, device=device)
+        self.face_acting = wp.zeros(f, dtype=wp.int32, device=device)
+        # Written and read only where cells act: elsewhere no memory stands behind them.
+        self.face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
+        self.face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
+        self.face_stiffness = wp.empty(4 * f, dtype=wp.float64, device=device)
+        self.face_clearance = wp.zeros(f, dtype=wp.float64, device=device)
+        self.seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
+        self.seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
+        self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
+        self.vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
+        self.vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
+        self.face_energy = wp.zeros(f, dtype=wp.float64, device=device)
+        self._views: dict[int, NDArray[Any]] = {}
+
+    def on_host(self, array: wp.array) -> NDArray[Any]:
+        """The values of one of the buffers that each step asks for; on the CPU the buffer itself, without the way through Warp."""
+        view = self._views.get(id(array))
+        if view is None:
+            view = array.numpy()
+            if self.network.device.is_cpu:
+                self._views[id(array)] = view
+        return view
+
+    def _cells(self, watch: int) -> Launch:
+        """Forces on the cells, of all faces (1) or of those that act (0)."""
+        net = self.network
+        kernel, _, parameters = net.cell_model
+        return record(
+            kernel,
+            dim=net.face_count,
+            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, watch],
+            outputs=[
+                self.face_acting,
+                self.face_clearance,
+                self.face_force,
+                self.face_viscosity,
+                self.face_stiffness,
+            ],
+            device=net.device,
+        )
+
+    @cached_property
+    def _seams(self) -> list[Launch]:
+        net = self.network
+        if net.seams is None:
+            return []
+        return [
+            record(
+                evaluate_seams,
+                dim=net.seam_count,
+                inputs=[self.position, self.velocity, net.seams, self.time_step],
+                outputs=[self.seam_force, self.seam_viscosity, self.seam_stiffness],
+                device=net.device,
+            )
+        ]
+
+    def _gather(self, watch: int) -> Launch:
+        """Forces on the vertices, once all faces have been evaluated (1) or those that act (0)."""
+        net = self.network
+        return record(
+            gather_forces,
+            dim=net.vertex_count,
+            inputs=[
+                self.position,
+                self.velocity,
+                net.mass,
+                net.spring_stiffness,
+                net.springs,
+                net.cells,
+                self.face_acting,
+                self.face_clearance,
+                self.face_force,
+                self.face_viscosity,
+                self.face_stiffness,
+                net.bonds,
+                self.seam_force,
+                self.seam_viscosity,
+                self.seam_stiffness,
+                self.load,
+                self.time_step,
+                watch,
+            ],
+            outputs=[
+                self.force,
+                self.power,
+                self.driving_force,
+                self.first_guess,
+                self.stiffness,
+                self.anchor,
+                self.reach,
+                self.guarded,
+            ],
+            device=net.device,
+        )
+
+    @cached_property
+    def evaluate(self) -> LaunchSequence:
+        return LaunchSequence([self._cells(1), *self._seams, self._gather(1)])
+
+    @cached_property
+    def _gather_on(self) -> Launch:
+        return self._gather(0)
+
+    @cached_property
+    def evaluate_on(self) -> LaunchSequence:
+        return LaunchSequence([self._cells(0), *self._seams, self._gather_on])
+
+    @cached_property
+    def evaluate_unguarded(self) -> LaunchSequence:
+        return LaunchSequence([*self._seams, self._gather_on])
+
+    @cached_property
+    def advance(self) -> Launch:
+        net = self.network
+        return record(
+            advance,
+            dim=net.vertex_count,
+            inputs=[
+                net.mass,
+                net.springs,
+                net.bonds,
+                self.driving_force,
+                self.first_guess,
+                self.stiffness,
+                self.anchor,
+                self.reach,
+                self.time_step,
+            ],
+            outputs=[self.position, self.velocity],
+            device=net.device,
+        )
+
+    @cached_property
+    def _pieces(self) -> list[slice]:
+        ends = begins([net.vertex_count for net in self.network.pieces]).tolist()
+        return [slice(*pair) for pair in pairwise(ends)]
+
+    @cached_property
+    def stop(self) -> list[Launch]:
+        """Of each piece."""
+        return [
+            record(
+                stop,
+                dim=here.stop - here.start,
+                inputs=[self.network.mass[here], self.force[here], self.stiffness[here], self.time_step],
+                outputs=[self.velocity[here], self.driving_force[here], self.first_guess[here]],
+                device=self.network.device,
+            )
+            for here in self._pieces
+        ]
+
+    @cached_property
+    def measure_springs(self) -> Launch:
+        return record(
+            compute_spring_energy,
+            dim=self.network.vertex_count,
+            inputs=[self.position, self.network.springs],
+            outputs=[self.vertex_energy, self.vertex_pull],
+            device=self.network.device,
+        )
+
+    @cached_property
+    def measure(self) -> LaunchSequence:
+        net = self.network
+        _, kernel, parameters = net.cell_model
+        cells = record(
+            kernel,
+            dim=net.face_count,
+            inputs=[self.position, net.cells, parameters],
+            outputs=[self.face_energy],
+            device=net.device,
+        )
+        return LaunchSequence([self.measure_springs, cells])
+
+    @cached_property
+    def measure_motion(self) -> Launch:
+        return record(
+            compute_kinetic_energy,
+            dim=self.network.vertex_count,
+            inputs=[self.network.mass, self.velocity],
+            outputs=[self.vertex_energy],
+            device=self.network.device,
+        )
