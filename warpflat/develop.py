@@ -133,9 +133,9 @@ def develop(surface: Surface, datum: IntArray) -> Development:
         if positions is None:
             continue
         mirrored = _mirrored(cells, positions)
-        folded = len(np.unique(cells.face[mirrored]))
-        if folded == 0:
+        if len(mirrored) == 0:
             return Development(positions=positions, method=method, notes=tuple(notes))
+        folded = len(np.unique(cells.face[mirrored]))
         notes.append(f"the {method} development mirrors or crushes {folded:,} of {len(surface.faces):,} faces")
         if folded > _FEW * len(surface.faces):
             continue

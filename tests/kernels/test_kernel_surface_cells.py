@@ -160,3 +160,5 @@ def test_cells_are_those_of_numpy(name: str):
         np.testing.assert_array_equal(have, wished)
     np.testing.assert_allclose(cells.edges, edges, rtol=1e-13, atol=1e-13 * edges.max())
     np.testing.assert_allclose(cells.area, 0.5 * weight * twice, rtol=1e-13)
+    at_vertices = np.bincount(corner.ravel(), np.repeat(cells.area / 3.0, 3), minlength=len(surface.vertices))
+    np.testing.assert_allclose(cells.vertex_areas, at_vertices, rtol=1e-12)
