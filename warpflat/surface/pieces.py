@@ -85,6 +85,9 @@ def carry_lines(
     carried: dict[str, NDArray[np.int32]] = {}
     taken = set(lines)
     for name, line in lines.items():
+        if len(line) > 1 and not cut_at[line].any():
+            carried[name] = np.asarray(line, dtype=np.int32)
+            continue
         streams: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}
         for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
             left, backward = ends.get((a, b)), ends.get((b, a))
