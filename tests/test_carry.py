@@ -26,14 +26,14 @@ def test_cubics_are_kept(count: int, even: bool) -> None:
     steps = np.ones(count - 1) if even else np.random.default_rng(count).uniform(0.5, 2.0, count - 1)
     place = np.append(0.0, np.cumsum(steps)) / count
     values = np.polynomial.polynomial.polyval(place, [0.3, -1.0, 2.0, 1.5][: degree + 1])
-    carried = cubics_between(place, keep)(values[keep])
+    carried = cubics_between(place[keep], place)(values[keep])
     np.testing.assert_allclose(carried, values, atol=1e-12)
 
 
 def test_kept_values_stay_what_they_are() -> None:
     keep = every_second(12)
     values = np.random.default_rng(1).normal(size=len(keep))
-    assert np.array_equal(cubics_between(np.arange(12.0), keep)(values)[keep], values)
+    assert np.array_equal(cubics_between(1.0 * keep, np.arange(12.0))(values)[keep], values)
 
 
 @pytest.mark.parametrize("count", [(17, 33, 65), (16, 32, 64)])
@@ -69,3 +69,22 @@ def test_rows_at_one_place_are_told_apart_by_number() -> None:
     keep = every_second(7)
     carried = GridCarry(space.reshape(-1, 3), grid, (keep, keep))(np.ones((16, 2)))
     np.testing.assert_allclose(carried, 1.0, rtol=1e-12)
+
+
+def test_sampled_from_a_finer_grid_and_carried_back_cubics_are_kept() -> None:
+    """Rows and columns of the coarser grid lie between those of the finer one, both of uneven widths."""
+    rng = np.random.default_rng(3)
+    across, up = (np.cumsum(rng.uniform(0.5, 2.0, count)) / count for count in (14, 11))
+    space = in_space(across, up)
+    u, v = space[..., 0], space[..., 1]
+    layout = np.stack([u**3 - u * v**2, v**3 + 2.0 * u**2 * v], axis=-1).reshape(-1, 2)
+    grid = np.arange(14 * 11, dtype=np.int32).reshape(11, 14)
+    carry = GridCarry(space.reshape(-1, 3), grid, (np.linspace(0.0, 10.0, 6), np.linspace(0.0, 13.0, 8)))
+    coarse = carry.sample(layout)
+    assert coarse.shape == (48, 2)
+    np.testing.assert_allclose(coarse[[0, 7, 40, 47]], layout[[0, 13, 140, 153]], rtol=1e-14)
+    np.testing.assert_allclose(carry(coarse), layout, atol=1e-12)
+    # The coarse vertices lie on the sheet, where their rows and columns do.
+    places = carry.sample(space.reshape(-1, 3)).reshape(6, 8, 3)
+    np.testing.assert_allclose(places[:, 0, 1], np.interp(np.linspace(0.0, 10.0, 6), np.arange(11), up), rtol=1e-12)
+    np.testing.assert_allclose(places[0, :, 0], np.interp(np.linspace(0.0, 13.0, 8), np.arange(14), across), rtol=1e-12)

@@ -12,11 +12,20 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, inherit_levels, is_coarsest, levels_meanwhile
+from warpflat.coarsen import (
+    Coarser,
+    coarser,
+    coarser_surfaces,
+    inherit_levels,
+    is_coarsest,
+    levels_meanwhile,
+    spread_surface,
+)
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.topology import (
     border_loops,
     components,
@@ -208,6 +217,33 @@ def test_levels_of_a_surface_are_made_once_the_finest_first():
 def test_levels_of_a_grid_go_down_to_fewer_vertices():
     steps = coarser_surfaces(sheet(65, 65))
     assert [len(step.kept) for step in steps] == [33**2, 17**2, 9**2]
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "expected"),
+    [(101, 101, (57, 57)), (72, 143, (41, 81)), (1_000, 21, (393, 9)), (2_000, 5, (785, 5)), (90, 70, (65, 49))],
+)
+def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expected: tuple[int, int]):
+    """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
+    all can be halved."""
+    surface = sheet(columns, rows)
+    found = spread_surface(surface)
+    assert found is not None
+    small, carry, face_of = found
+    grid = rows_and_columns(small)
+    assert grid is not None
+    assert sorted(grid.shape) == sorted(expected)
+    middle = small.vertices[small.faces].mean(axis=1)
+    there = surface.vertices[surface.faces[face_of]]
+    assert (there.min(axis=1) - 1e-9 <= middle).all()
+    assert (middle <= there.max(axis=1) + 1e-9).all()
+    np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
+    assert spread_surface(surface) is found
+
+
+def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
+    assert spread_surface(sheet(2_000, 4)) is None
+    assert spread_surface(sheet(21, 21, triangles=True)) is None
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

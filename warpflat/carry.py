@@ -51,18 +51,18 @@ class Cubics:
         return result
 
 
-def cubics_between(place: FloatArray, keep: IntArray) -> Cubics:
-    """Values at all places from those at the kept ones, by the cubic through the four nearest.
+def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
+    """Values at places from those at nodes, by the cubic through the four nearest.
 
     Args:
-        place: #N, rising.
-        keep: which of them are kept, rising, the first and the last among them; with fewer than four, the polynomial through all.
+        nodes: #K, rising; of fewer than four, the polynomial through all.
+        place: #N, from the first node to the last.
     """
-    count, points = len(place), min(4, len(keep))
-    before = np.searchsorted(keep, np.arange(count), side="right") - 1
-    begin = np.clip(before - (points // 2 - 1), 0, len(keep) - points)
+    count, points = len(place), min(4, len(nodes))
+    before = np.searchsorted(nodes, place, side="right") - 1
+    begin = np.clip(before - (points // 2 - 1), 0, len(nodes) - points)
     column = begin[:, None] + np.arange(points)
-    node = place[keep[column]]
+    node = nodes[column]
     weight = np.ones((count, points))
     for k in range(points):
         for other in range(points):
@@ -71,37 +71,52 @@ def cubics_between(place: FloatArray, keep: IntArray) -> Cubics:
     return Cubics(column=column.astype(np.int32), weight=weight)
 
 
-def _places(lines: FloatArray) -> FloatArray:
-    """#N, how far each row of a grid (#N by #M by 3 [m]) lies from the first one, along the surface: the mean over some columns. By number
-    where two of them lie at one place."""
-    some = lines[:, np.unique(np.linspace(0, lines.shape[1] - 1, _LINES).astype(int))]
+def _places(vertices: FloatArray, grid: IntArray) -> FloatArray:
+    """#N, how far each row of a grid (#N by #M, of vertices #V by 3 [m]) lies from the first one, along the surface: the mean over some
+    columns. By number where two of them lie at one place."""
+    some = vertices[grid[:, np.unique(np.linspace(0, grid.shape[1] - 1, _LINES).astype(int))]]
     steps = np.linalg.norm(np.diff(some, axis=0), axis=2).mean(axis=1)
     return np.append(0.0, np.cumsum(steps if steps.min() > 0.0 else np.ones_like(steps)))
 
 
 class GridCarry:
-    """From the layout of a coarser grid to that of the finer one."""
+    """From the layout of a coarser grid to that of the finer one, and the other way."""
 
-    def __init__(self, vertices: FloatArray, grid: IntArray, keep: tuple[IntArray, IntArray]) -> None:
+    def __init__(self, vertices: FloatArray, grid: IntArray, lines: tuple[IntArray | FloatArray, ...]) -> None:
         """Of a grid.
 
         Args:
             vertices: #V by 3, the finer grid's, in space [m].
             grid: #rows by #columns, their numbers.
-            keep: rows and columns that the coarser one keeps; its vertices are numbered row by row.
+            lines: where the coarser one's rows and columns lie, counted in those of the finer one, the first and the last among them;
+                its vertices are numbered row by row.
         """
-        self._vertices, self._grid, self._keep = vertices, grid, keep
+        self._vertices, self._grid, self._lines = vertices, grid, lines
 
     @cached_property
-    def _cubics(self) -> tuple[Cubics, Cubics]:
-        (rows, columns), space = self._keep, self._vertices[self._grid]
-        return cubics_between(_places(space), rows), cubics_between(_places(space.transpose(1, 0, 2)), columns)
+    def _places(self) -> list[tuple[FloatArray, FloatArray]]:
+        """Of rows and of columns: where the coarser grid's lie, and the finer one's."""
+        found = [_places(self._vertices, grid) for grid in (self._grid, self._grid.T)]
+        return [
+            (np.interp(lines, np.arange(len(place)), place), place)
+            for lines, place in zip(self._lines, found, strict=True)
+        ]
+
+    @cached_property
+    def _cubics(self) -> list[Cubics]:
+        return [cubics_between(coarse, fine) for coarse, fine in self._places]
+
+    def sample(self, values: FloatArray) -> FloatArray:
+        """#C by #K, values of the coarser grid from those of the finer one (#V by #K)."""
+        by_rows, by_columns = (cubics_between(fine, coarse) for coarse, fine in self._places)
+        on_rows = np.einsum("rk,rkcd->crd", by_rows.weight, values[self._grid[by_rows.column]])
+        return by_columns(on_rows).swapaxes(0, 1).reshape(-1, values.shape[1])
 
     def __call__(self, layout: FloatArray) -> FloatArray:
         """#V by 2, the finer layout of a coarser one (#C by 2) [m]."""
         by_rows, by_columns = self._cubics
         # x + iy, so that a vertex is one number.
-        coarse = np.ascontiguousarray(layout).view(np.complex128).reshape(*map(len, self._keep))
+        coarse = np.ascontiguousarray(layout).view(np.complex128).reshape(*map(len, self._lines))
         result = np.empty(self._grid.size, dtype=np.complex128)
         result[self._grid] = by_columns.along_rows(by_rows(coarse))
         return result.view(np.float64).reshape(-1, 2)

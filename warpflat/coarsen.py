@@ -31,9 +31,17 @@ from warpflat.launching import record, thread_count
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import triangulate
-from warpflat.thinning import Transfer, thinned_of
+from warpflat.thinning import Transfer, spread_of, thinned_of
 
-__all__ = ["Coarser", "coarser", "coarser_surfaces", "inherit_levels", "is_coarsest", "levels_meanwhile"]
+__all__ = [
+    "Coarser",
+    "coarser",
+    "coarser_surfaces",
+    "inherit_levels",
+    "is_coarsest",
+    "levels_meanwhile",
+    "spread_surface",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -96,7 +104,7 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     thinned = thinned_of(surface)
     if thinned is not None:
         return Coarser(
-            surface=_part(surface, thinned.kept, thinned.faces, thinned.of_faces),
+            surface=_part(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
             kept=thinned.kept,
             transfer=thinned.transfer,
             face_of=thinned.face_of,
@@ -117,7 +125,7 @@ def inherit_levels(surface: Surface, other: Surface) -> None:
     """Let a surface have the coarser levels of another one of the same faces, whose vertices do not lie far from its own."""
     for step in coarser_surfaces(other):
         if step.smooth_carry is None:
-            part = _part(surface, step.kept, step.surface.faces, step.surface.of_faces)
+            part = _part(surface, surface.vertices[step.kept], step.surface.faces, step.surface.of_faces)
             _inherited[surface] = replace(step, surface=part)
         # Lattices share what their faces tell anyway.
         following = _next(surface)
@@ -139,6 +147,18 @@ def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
     return tuple(steps)
 
 
+@once_per_surface
+def spread_surface(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
+    """The small grid that is spread over a large one (`warpflat.thinning.spread_of`), what carries layouts up from it, and #G, for each of
+    its faces one of the large grid's that lies in it; None of any other surface. Made once for each."""
+    spread = spread_of(surface)
+    if spread is None:
+        return None
+    carry = spread.carry(surface.vertices)
+    part = _part(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
+    return part, carry, spread.face_of
+
+
 @contextmanager
 def levels_meanwhile(surface: Surface) -> Iterator[None]:
     """Make `coarser_surfaces` of a large surface on another core while the body runs, and be done with both at its end."""
@@ -152,16 +172,15 @@ def levels_meanwhile(surface: Surface) -> Iterator[None]:
 
 
 def _part(
-    surface: Surface, kept: IntArray, faces: NDArray[np.integer], of_faces: dict[str, Any] | None = None
+    surface: Surface, vertices: FloatArray, faces: NDArray[np.integer], of_faces: dict[str, Any] | None = None
 ) -> Surface:
-    """The surface with these vertices and faces (numbered among the kept), and what is known of the faces."""
-    vertices = surface.vertices[kept]
+    """The surface with these vertices (#C by 3 [m]) and faces, and what is known of the faces."""
     return Surface(
         vertices=vertices,
         faces=faces.astype(np.int32, copy=False),
         name=surface.name,
         input_vertices=vertices,
-        input_index=np.arange(len(kept), dtype=np.int32),
+        input_index=np.arange(len(vertices), dtype=np.int32),
         of_faces={} if of_faces is None else of_faces,
     )
 
@@ -204,7 +223,7 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     corners = corners[whole]
     prolongation = _prolongation(gone.numpy(), parent.numpy(), weight.numpy())
     return Coarser(
-        surface=_part(surface, kept, np.column_stack([corners, np.full(len(corners), -1)])),
+        surface=_part(surface, surface.vertices[kept], np.column_stack([corners, np.full(len(corners), -1)])),
         kept=kept,
         transfer=Transfer(lambda: prolongation),
         face_of=face[whole],

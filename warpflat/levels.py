@@ -43,7 +43,7 @@ _AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 _LITTLE_GAIN = 0.07
-# Grids of more vertices start where a coarser one of at most so many has come to rest: cubics from this size on leave a few hundredths
+# Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
 # of a per cent.
 _CYCLED = 5_000
 # Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
@@ -420,12 +420,12 @@ class Levels:
 
 
 def carry_up(state: Relaxation) -> Levels | None:
-    """Start pieces that are large grids where a coarser grid of theirs has come to rest; the others where their own levels lead.
+    """Start pieces that are large lattices where a small one of theirs has come to rest; the others where their own levels lead.
 
     Nothing is made or evaluated of the levels in between. The state is looked at in the end.
 
     Returns:
-        The levels of what was relaxed; None where no piece is such a grid, or one would not be lower than it lies: then
+        The levels of what was relaxed; None where no piece is such a lattice, or one would not be lower than it lies: then
         all are where they were.
     """
     pieces, layout = state.network.pieces, state.positions()
@@ -436,8 +436,8 @@ def carry_up(state: Relaxation) -> Levels | None:
     if not any(below):
         return None
     before = state.last
-    networks = [net if way is None else way[1].network for net, way in zip(pieces, below, strict=True)]
-    start = [layout[own] if way is None else way[1].layout for own, way in zip(state.vertices, below, strict=True)]
+    networks = [net if way is None else way.network for net, way in zip(pieces, below, strict=True)]
+    start = [layout[own] if way is None else way.layout for own, way in zip(state.vertices, below, strict=True)]
     coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
     levels = Levels(coarse, mend=True)
     levels.rise()
@@ -449,10 +449,10 @@ def carry_up(state: Relaxation) -> Levels | None:
     for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
         up = relaxed[of]
         if way is not None:
-            levels.leading[way[1].step.surface] = way[1]
-            for step in reversed(way[0]):
-                assert step.smooth_carry is not None
-                up = step.smooth_carry(up)
+            if way.rung is not None:
+                levels.leading[way.rung.step.surface] = way.rung
+            for carry in way.carries:
+                up = carry(up)
         carried[own] = up
     load = wp.clone(state.load)
     state.position.assign(carried)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye
 
 from warpflat.cells import cells_of
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest
+from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, spread_surface
 from warpflat.network import SpringNetwork
 from warpflat.sums import products, weighted_rows
 from warpflat.surface.mesh import Surface
@@ -20,6 +20,7 @@ from warpflat.thinning import Transfer
 __all__ = ["Rung", "far_below", "rungs_of", "stay"]
 
 FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.int32]
 
 # A cell pressed to less than this share of its area is mended as if it were mirrored.
 _LEAST_AREA = 1e-6
@@ -87,9 +88,25 @@ def rungs_of(
     return rungs
 
 
-def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> tuple[Sequence[Coarser], Rung] | None:
-    """The largest coarser grid of a grid that has at most so many vertices, and the steps that lead there; None if there is none, or
-    where it would be mirrored."""
+@dataclass(frozen=True, kw_only=True)
+class FarBelow:
+    """Where a large lattice starts: a small one's network and layout [m], what carries layouts up from it, in order, and the small one
+    as one of the large one's levels, if it is."""
+
+    network: SpringNetwork
+    layout: FloatArray
+    carries: Sequence[Callable[[FloatArray], FloatArray]]
+    rung: Rung | None = None
+
+
+def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow | None:
+    """The small grid that is spread over a grid, or the largest coarser one of any other lattice that has at most so many vertices; None
+    if there is none, or where it would be mirrored."""
+    spread = spread_surface(network.surface)
+    if spread is not None:
+        surface, carry, face_of = spread
+        found = _network_below(network, surface, carry.sample(layout), face_of, mend=True)
+        return None if found is None else FarBelow(network=found[0], layout=found[1], carries=[carry])
     steps: list[Coarser] = []
     kept, face_of = (
         np.arange(network.vertex_count, dtype=np.int32),
@@ -102,31 +119,46 @@ def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> tuple[Se
         steps.append(step)
     if not steps:
         return None
-    rung = _rung(network, layout, replace(steps[-1], kept=kept, face_of=face_of), mend=True)
-    return (steps, replace(rung, step=steps[-1])) if rung is not None else None
+    found = _network_below(network, steps[-1].surface, layout[kept], face_of, mend=True)
+    if found is None:
+        return None
+    rung = Rung(step=steps[-1], network=found[0], layout=found[1])
+    carries = [step.smooth_carry for step in reversed(steps) if step.smooth_carry is not None]
+    return FarBelow(network=rung.network, layout=rung.layout, carries=carries, rung=rung)
 
 
 def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> Rung | None:
     """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
     if step is None:
         return None
-    layout = np.ascontiguousarray(fine_layout[step.kept])
-    if (cells_of(step.surface).least_shares(layout) <= 0.0).any():
-        layout, left = untangle(step.surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
+    found = _network_below(fine, step.surface, fine_layout[step.kept], step.face_of, mend=mend)
+    if found is None:
+        return None
+    network, layout = found
+    return Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
+
+
+def _network_below(
+    fine: SpringNetwork, surface: Surface, layout: FloatArray, face_of: IntArray, *, mend: bool
+) -> tuple[SpringNetwork, FloatArray] | None:
+    """The network of a coarser surface, and where it lies, mended if need be; None where cells are mirrored."""
+    layout = np.ascontiguousarray(layout)
+    if (cells_of(surface).least_shares(layout) <= 0.0).any():
+        layout, left = untangle(surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
         if left:
             return None
     network = SpringNetwork.build(
-        step.surface,
+        surface,
         fine.fabric,
         layout,
         grain_angle=fine.grain_angle,
         device=fine.device,
         model=fine.model,
-        stretch=None if fine.stretch is None else fine.stretch[step.face_of],
+        stretch=None if fine.stretch is None else fine.stretch[face_of],
         # What threads are held by is a matter of the finest mesh.
         hold=float(fine.shear_hold),
     )
-    return Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
+    return network, layout
 
 
 def stay(surface: Surface) -> Coarser:
