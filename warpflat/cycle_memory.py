@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +21,8 @@ _SOUND = 1e-3
 
 Mark = tuple[FloatArray, FloatArray]
 """#V by 2, a layout [m], and the forces there [N]."""
+Way = tuple[NDArray[np.float32], NDArray[np.float32]]
+"""#V by 2, a way from one layout to another [m], and how much the forces fell on it [N]. Only directions count: single precision does."""
 
 
 class CycleMemory:
@@ -33,45 +34,54 @@ class CycleMemory:
     """
 
     def __init__(self, depth: int = _DEPTH) -> None:
-        """Of so many cycles, besides the one that has just ended."""
+        """Of so many cycles, besides the present one."""
         self._depth = depth
-        self._begin: Mark | None = None
-        self._past: list[Mark] = []
+        self._last: Mark | None = None
+        self._ways: list[Way] = []
+        self._past: list[Way] = []
 
-    def lowest(self, marks: Sequence[Mark]) -> FloatArray | None:
-        """#V by 2, the way from where the last cycle has ended to where the energy is least [m]; None where that cannot be told.
-
-        Args:
-            marks: of the last cycle, its begin, where its parts have met, and its end: each part is a way of its own. Of those in
-                between nothing is left afterwards.
-        """
-        begin = marks[0]
-        if self._begin is not None:
-            # A cycle before counts to where the next began: its leap is part of it, and holds what cycles before it have told.
-            self._past.append(_between(self._begin, begin))
+    def begin(self, mark: Mark) -> None:
+        """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told."""
+        if self._ways:
+            self.come_to(mark)
+            self._past.append(_joined(self._ways))
             del self._past[: -self._depth]
-        self._begin = begin
-        parts = [*self._past, _between(begin, marks[1])]
-        for first, second in pairwise(marks[1:]):
-            # In the place of the first, which nobody needs any more.
-            np.subtract(second[0], first[0], out=first[0])
-            np.subtract(first[1], second[1], out=first[1])
-            parts.append(first)
-        parts = [part for part in parts if part[0].any()]
+        self._last, self._ways = mark, []
+
+    def come_to(self, mark: Mark) -> None:
+        """A part of the cycle has led here: each is a way of its own."""
+        assert self._last is not None
+        self._ways.append((_difference(mark[0], self._last[0]), _difference(self._last[1], mark[1])))
+        self._last = mark
+
+    def lowest(self) -> FloatArray | None:
+        """#V by 2, the way from where the cycle has come to where the energy is least [m]; None where that cannot be told."""
+        assert self._last is not None
+        parts = [way for way in (*self._past, *self._ways) if way[0].any()]
         ways, falls = ([part[k].ravel() for part in parts] for k in (0, 1))
         curvature = products(ways, falls)
         curvature = 0.5 * (curvature + curvature.T)
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not len(size) or not (size > 0.0).all():
             return None
-        left = marks[-1][1]
+        left = self._last[1]
         gain = products(ways, [left.ravel()])[:, 0]
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
-        return weighted_rows(share, ways).reshape(left.shape)
+        lowest = weighted_rows(share, ways).reshape(left.shape)
+        self._ways = [_joined(self._ways)]
+        return lowest
 
 
-def _between(first: Mark, second: Mark) -> Mark:
-    """The way from one to the other, and how much the forces fell."""
-    return second[0] - first[0], first[1] - second[1]
+def _difference(a: FloatArray, b: FloatArray) -> NDArray[np.float32]:
+    """a - b, rounded in the end only."""
+    return np.subtract(a, b, out=np.empty(a.shape, dtype=np.float32))
+
+
+def _joined(ways: Sequence[Way]) -> Way:
+    """One after the other, in the place of the first."""
+    for way in ways[1:]:
+        for total, more in zip(ways[0], way, strict=True):
+            total += more
+    return ways[0]

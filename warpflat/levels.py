@@ -27,7 +27,7 @@ from warpflat.rungs import Rung, far_below, rungs_of, stay
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
-__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "carry_up", "mark", "softness"]
+__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "carry_up", "softness"]
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -142,7 +142,7 @@ class Levels:
         self._levels = [_Level(finest)]
         self.leading: dict[Surface, Rung] = {}
         self._watch_every = _watch_every(finest.network)
-        self._marks: list[Mark] = []
+        self._memories: Sequence[CycleMemory] = ()
         self.stale = False
         ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
         for rungs in zip(*ladders, strict=True):
@@ -228,16 +228,18 @@ class Levels:
 
         aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
         first = before = now = self._objective(last)
-        begin, leaping = _all_forces(state), self._lattice or not little
+        leaping = self._lattice or not little
+        _begin(state, memories, _all_forces(state))
         for number in range(1, 1 + math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
             state.sweep(_BOTTOM_STEPS, watch_every=self._watch_every)
             self._count(last, _BOTTOM_STEPS)
             now = self._objective(last)
             if leaping and number % _LEAP_EVERY == 0 and np.isfinite(now).all():
                 state.evaluate_at_rest()
-                now = self._leap(last, memories, [begin, _all_forces(state)], now)
+                _come_to(state, memories, _all_forces(state))
+                now = self._leap(last, memories, now)
                 state.evaluate_at_rest()
-                begin = _all_forces(state)
+                _begin(state, memories, _all_forces(state))
             with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
                 slow = before - now < little * (first - now)
             if ((forces() <= aim) | slow).all():
@@ -265,8 +267,8 @@ class Levels:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
         self._count(level, FORCE_WORK)
-        if level == 0:
-            self._marks = [mark(state)]
+        if level == 0 and self._memories:
+            _come_to(state, self._memories, _mark(state))
         way.down.launch()
         way.coarse.load.zero_()
         way.coarse.evaluate_at_rest()
@@ -280,8 +282,8 @@ class Levels:
         self.cycle(level + 1)
         before = self._objective(level)
         self._correct(level, way)
-        if level == 0:
-            self._marks.append(mark(state))
+        if level == 0 and self._memories:
+            _come_to(state, self._memories, _mark(state))
         self.smooth(level, each_step, evaluated=True)
         energy = self._objective(level)
         higher = ~(energy <= before)
@@ -337,32 +339,35 @@ class Levels:
             share = 0.5 * share if share > least else 0.0
         return energy
 
-    def leap(self, memories: Sequence[CycleMemory], begin: Mark, energy: FloatArray) -> None:
-        """Go on from where a cycle on the finest level has led to where the cycles before say that the energy is least, as far as it is
-        lower there.
+    def remember(self, memories: Sequence[CycleMemory]) -> None:
+        """A cycle on the finest level begins here, to be remembered; `memories` are of each piece."""
+        self._memories = memories
+        _begin(self._levels[0].state, memories, _mark(self._levels[0].state))
 
-        Args:
-            memories: of each piece, of the cycles before; gets this one.
-            begin: where the cycle began.
-            energy: #P, at its end [J].
-        """
+    def leap(self, energy: FloatArray) -> None:
+        """Go on from where a cycle on the finest level has led, to where this one and those before say that the energy is least, as far as
+        it is lower there. energy: #P, at its end [J]."""
         state = self._levels[0].state
         self._count(0, FORCE_WORK)
         state.evaluate_at_rest()
-        self._leap(0, memories, [begin, *self._marks, mark(state)], energy)
+        _come_to(state, self._memories, _mark(state))
+        self._leap(0, self._memories, energy)
 
-    def _leap(
-        self, level: int, memories: Sequence[CycleMemory], marks: Sequence[Mark], energy: FloatArray
-    ) -> FloatArray:
-        """The same on any level, with all marks from the begin to the end; returns #P, the energy where that leads to [J]."""
-        state = self._levels[level].state
-        by, leapt = np.zeros_like(marks[-1][0]), np.zeros(len(memories), dtype=bool)
+    def _leap(self, level: int, memories: Sequence[CycleMemory], energy: FloatArray) -> FloatArray:
+        """The same on any level; returns #P, the energy where that leads to [J]."""
+        state, between = self._levels[level].state, self._levels[level].way
+        by, leapt = np.zeros((state.network.vertex_count, 2)), np.zeros(len(memories), dtype=bool)
         for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
-            way = memory.lowest([(place[own], force[own]) for place, force in marks])
+            way = memory.lowest()
             if way is not None:
                 by[own], leapt[piece] = way, True
-        device = state.network.device
-        base, way_on = wp.clone(state.position), wp.array(by, dtype=wp.vec2d, device=device)
+        if between is None:
+            base, way_on = wp.empty_like(state.position), wp.empty_like(state.position)
+        else:
+            # The cycle is over, and needs its own no more.
+            base, way_on = between.base, between.correction
+        wp.copy(base, state.position)
+        way_on.assign(by)
         return self._go(level, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
 
     def follow(self) -> None:
@@ -467,7 +472,18 @@ def carry_up(state: Relaxation) -> Levels | None:
     return None
 
 
-def mark(state: Relaxation) -> Mark:
+def _begin(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> None:
+    """Of all pieces."""
+    for memory, own in zip(memories, state.vertices, strict=True):
+        memory.begin((mark[0][own], mark[1][own]))
+
+
+def _come_to(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> None:
+    for memory, own in zip(memories, state.vertices, strict=True):
+        memory.come_to((mark[0][own], mark[1][own]))
+
+
+def _mark(state: Relaxation) -> Mark:
     """Where it is, and the forces of the cloth there, as they have just been evaluated."""
     return state.positions(), state.cloth_force()
 

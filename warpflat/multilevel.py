@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.cycle_memory import CycleMemory
-from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels, carry_up, mark, softness
+from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels, carry_up, softness
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, Watch, relax
@@ -90,9 +90,8 @@ class _Cycles:
         if self.levels.stale and self.renewals < _RENEWALS:
             self.levels, self.renewals = Levels(state), self.renewals + 1
         work = state.work_units
-        begin = mark(state)
-        energy = self.levels.cycle(0, each_step)
-        self.levels.leap([pace.memory for pace in paces], begin, energy)
+        self.levels.remember([pace.memory for pace in paces])
+        self.levels.leap(self.levels.cycle(0, each_step))
         state.hold_upright()
         self.levels.follow()
         state.evaluate_at_rest()
@@ -138,7 +137,9 @@ def relax_multilevel(
     below = carry_up(state) if nested and levels is None else None
     if below is not None and each_step is not None:
         each_step(state, state.last.total, float(state.last.residual.max()))
-    levels = Levels(state, mend=nested, below=below) if levels is None else levels
+    levels, carried = Levels(state, mend=nested, below=below) if levels is None else levels, below is not None
+    # What is not among the levels themselves is not needed any more.
+    del below
     if len(levels.sizes) == 1:
         return relax(state, watch=watch, each_step=each_step)
     cycles = _Cycles(state=state, levels=levels, paces=[_Pace() for _ in state.vertices])
@@ -148,7 +149,7 @@ def relax_multilevel(
             look = cycles.state.last
             call(cycles.state, look.total, float(look.residual.max()))
 
-    if nested and below is None:
+    if nested and not carried:
         levels.rise()
         state.hold_upright()
         state.begin()

@@ -177,7 +177,7 @@ class SpringNetwork:
         self.bonds = Bonds()
         self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
         self.bonds.slot = wp.zeros(0, dtype=wp.int32, device=device)
-        self.bonds.freedom = _on(device, np.ones((count, 2)), wp.vec2d)
+        self.bonds.freedom = _on(device, np.broadcast_to(np.ones(2), (count, 2)), wp.vec2d)
 
         warp, weft = grain_axes(self.grain_angle)
         guard = ThreadGuard()

@@ -334,7 +334,7 @@ class Relaxation:
 
     def cloth_force(self) -> FloatArray:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
-        return np.array(self.force.numpy()) - self.load.numpy()
+        return np.asarray(self.force.numpy() - self.load.numpy())
 
     def residual(self) -> float:
         """The worst of `residuals`."""

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 __all__ = ["dot", "products", "weighted_rows"]
 
 FloatArray = NDArray[np.float64]
+Rows = Sequence[NDArray[np.floating]] | NDArray[np.floating]
 
 # Products of so many columns are small enough to stay on one core; so many are gathered at a time.
 _COLUMNS = 512
@@ -25,19 +26,19 @@ def dot(a: FloatArray, b: FloatArray) -> float:
     return float(np.einsum("i,i->", a.ravel(), b.ravel()))
 
 
-def products(a: Sequence[FloatArray] | FloatArray, b: Sequence[FloatArray] | FloatArray) -> FloatArray:
-    """#A by #B, scalar products of the rows of `a` (#A by #N) with those of `b` (#B by #N)."""
+def products(a: Rows, b: Rows) -> FloatArray:
+    """#A by #B, scalar products of the rows of `a` (#A by #N) with those of `b` (#B by #N), in double precision."""
     total = np.zeros((len(a), len(b)))
     count = len(a[0]) if len(a) else 0
     for begin in range(0, count, _GATHERED):
-        rows, others = (np.stack([row[begin : begin + _GATHERED] for row in of]) for of in (a, b))
+        rows, others = (np.stack([row[begin : begin + _GATHERED] for row in of], dtype=np.float64) for of in (a, b))
         for first in range(0, rows.shape[1], _COLUMNS):
             some = slice(first, first + _COLUMNS)
             total += rows[:, some] @ others[:, some].T
     return total
 
 
-def weighted_rows(weight: FloatArray, rows: Sequence[FloatArray] | FloatArray) -> FloatArray:
+def weighted_rows(weight: FloatArray, rows: Rows) -> FloatArray:
     """#N, the sum of rows (#A by #N), each times its weight (#A)."""
     total = weight[0] * rows[0]
     for k in range(1, len(rows)):

@@ -178,8 +178,8 @@ def _bilinear(grid: IntArray, keep: tuple[IntArray, IntArray]) -> csr_array:
     offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
     prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
     prolongation.eliminate_zeros()
-    prolongation.prune()
-    return prolongation
+    # Without the room for what was zero.
+    return csr_array(prolongation.copy())
 
 
 def _second(count: int) -> IntArray:
@@ -269,5 +269,5 @@ def _between_corners(
     size = int(corners.max()) + 1
     prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
     prolongation.eliminate_zeros()
-    prolongation.prune()
-    return prolongation
+    # Without the room for what was zero.
+    return csr_array(prolongation.copy())
