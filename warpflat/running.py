@@ -192,8 +192,8 @@ class _Batch:
             clamped = net.spring_arrays.clamped_cells
             if clamped:
                 run.notes.append(
-                    f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them; their "
-                    "structural springs were kept at 5 % of it"
+                    f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them, and are too stiff: "
+                    'cut them into nearly square ones, or set model = "membrane", which any quads will do for'
                 )
         if twice:
             state.options = replace(
