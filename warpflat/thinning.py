@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import pairwise
 from typing import Any
 
@@ -90,20 +90,21 @@ class Spread:
 
     Attributes:
         lines: where its rows and columns lie, counted in those of the large one.
-        faces: #G by 4, of its vertices, which are numbered row by row.
+        of_faces: what is known of its faces (`warpflat.surface.mesh.once_per_faces`).
         face_of: #G, for each of them one of the large grid's that lies in it.
         carry: of the large grid's vertices (#V by 3 [m]), what carries layouts up by cubics, and samples what is there.
     """
 
     lines: tuple[FloatArray, ...]
-    faces: IntArray
+    of_faces: dict[str, Any]
     face_of: IntArray
     carry: Callable[[FloatArray], GridCarry]
 
-    @cached_property
-    def of_faces(self) -> dict[str, Any]:
-        """As in `Thinned`."""
-        return {"faces": self.faces}
+    @property
+    def faces(self) -> IntArray:
+        """#G by 4, of its vertices, which are numbered row by row."""
+        faces: IntArray = self.of_faces["faces"]
+        return faces
 
 
 @once_per_faces
@@ -118,7 +119,7 @@ def spread_of(surface: Surface) -> Spread | None:
     middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
     return Spread(
         lines=lines,
-        faces=_faces_of(*map(len, lines)),
+        of_faces=_known_of_grid(*map(len, lines)),
         face_of=_some_face(surface, grid[np.ix_(*middle)].ravel()),
         carry=lambda vertices: GridCarry(vertices, grid, lines),
     )
@@ -133,6 +134,12 @@ def _quads(shape: tuple[int, ...]) -> list[int]:
     result[short] = min(quads[short], max(round(quads[short] * share / _MULTIPLE), 1) * _MULTIPLE)
     result[long] = min(quads[long], max(round(_SPREAD**2 / result[short] / _MULTIPLE), 1) * _MULTIPLE)
     return result
+
+
+@lru_cache(maxsize=16)
+def _known_of_grid(rows: int, columns: int) -> dict[str, Any]:
+    """What has been worked out of the faces of a small grid: pieces that are about as long for their width have the same."""
+    return {"faces": _faces_of(rows, columns)}
 
 
 def _faces_of(rows: int, columns: int) -> IntArray:
