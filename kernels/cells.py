@@ -26,6 +26,8 @@ class Cells:
     slot: 4 times the face plus the corner, for every face around a vertex.
     slack: #F, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
     onset: #F, worn stretch along warp and weft at which the guard begins to act.
+    shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad lack there [N/m];
+        zero of any other face.
     """
 
     face: wp.array(dtype=wp.vec4i)
@@ -35,6 +37,7 @@ class Cells:
     slot: wp.array(dtype=wp.int32)
     slack: wp.array(dtype=wp.vec2d)
     onset: wp.array(dtype=wp.vec2d)
+    shear: wp.array(dtype=wp.vec2d)
 
 
 @wp.struct
@@ -184,6 +187,19 @@ def thread_curvature(worn: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset:
     return stiffness * wp.dot(back, back) / (length * length)
 
 
+@wp.func
+def sheared(shear: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, slack: wp.vec2d):
+    """`Cells.shear` on the cloth as it is meant to be worn; warp, weft: unit vectors times the slack."""
+    along = wp.dot(shear, warp) / slack[0]
+    over = wp.dot(shear, weft) / slack[1]
+    return warp * along + weft * over
+
+
+@wp.func
+def turned_left(v: wp.vec2d):
+    return wp.vec2d(-v[1], v[0])
+
+
 @wp.kernel
 def evaluate_guard(
     position: wp.array(dtype=wp.vec2d),
@@ -200,14 +216,15 @@ def evaluate_guard(
     viscosity: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
 ):
-    """Forces of the thread guard: minus the gradient of a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft].
+    """Forces of the thread guard: minus the gradient of a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft], and of what long
+    quads lack in shear, a 1/2 (F s . F s')^2, with s' at right angles to s = `Cells.shear`.
 
     a is the flat area of the cell. The energy grows without bound as the cell collapses. Its viscosity, the share of the
     guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
     that moves as a whole is not held back.
 
     position: #V [m]. velocity: #V [m/s]. watch: 1 to look at all faces; with 0 those in which the guard did not act are passed over.
-    acting: #F, 1 where the guard acts in a cell or is about to; elsewhere the last three are not written.
+    acting: #F, 1 where the guard acts in a cell or is about to, and of long quads; elsewhere the last three are not written.
     clearance: #F, the least height of its cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the faces'
     corners [N]; a triangle's fourth is not used.
     stiffness k: 4 #F, bound on the energy's second derivative by the corner's place [N/m].
@@ -235,10 +252,15 @@ def evaluate_guard(
         h3, near3 = look_at(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset)
         height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
         acts = near0 | near1 | near2 | near3
+    lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
+    if lacks_shear:
+        acts = int(1)
     acting[f] = acts
     clearance[f] = wp.sqrt(height2)
     if acts != 0:
         weight = cell_weight(face)
+        s = sheared(cells.shear[f], warp, weft, cells.slack[f])
+        t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
         slot = 4 * f
         for corner_slot in range(4):
             force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
@@ -253,8 +275,8 @@ def evaluate_guard(
             q0 = position[i0]
             q1 = position[i1]
             q2 = position[i2]
-            _, near = look_at(q0, q1, q2, laid, warp, weft, onset)
-            if near != 0:
+            cell_height2, near = look_at(q0, q1, q2, laid, warp, weft, onset)
+            if near != 0 or (lacks_shear and cell_height2 > wp.float64(0.0)):
                 D = edge_matrix(q0, q1, q2)
                 det = wp.determinant(D)
                 early = early_share(det, longest_square(D))
@@ -264,6 +286,9 @@ def evaluate_guard(
                 worn_weft = F * weft
                 y_warp = excess_stretch(worn_warp, onset[0])
                 y_weft = excess_stretch(worn_weft, onset[1])
+                worn_s = F * s
+                worn_t = F * t
+                angle = wp.dot(worn_s, worn_t)
                 area = wp.float64(0.5) * det * weight
                 density = wp.float64(0.5) * (
                     guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
@@ -271,9 +296,10 @@ def evaluate_guard(
                 P = thread_stress(worn_warp, warp, guard.stiffness_warp, onset[0]) + thread_stress(
                     worn_weft, weft, guard.stiffness_weft, onset[1]
                 )
+                P += (wp.outer(worn_t, s) + wp.outer(worn_s, t)) * angle
                 # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
                 inv_t = wp.transpose(inv)
-                G = (inv_t * density - wp.transpose(F) * P * inv_t) * area
+                G = (inv_t * (density + wp.float64(0.5) * angle * angle) - wp.transpose(F) * P * inv_t) * area
                 f1 = wp.vec2d(-G[0, 0], -G[1, 0])
                 f2 = wp.vec2d(-G[0, 1], -G[1, 1])
                 q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, early * onset[0])
@@ -281,9 +307,16 @@ def evaluate_guard(
                 # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
                 w1 = wp.vec2d(inv[0, 0], inv[0, 1])
                 w2 = wp.vec2d(inv[1, 0], inv[1, 1])
-                k0 = area * guard_bound(-(w1 + w2), warp, weft, q_warp, q_weft, density)
-                k1 = area * guard_bound(w1, warp, weft, q_warp, q_weft, density)
-                k2 = area * guard_bound(w2, warp, weft, q_warp, q_weft, density)
+                back_s = wp.transpose(F) * worn_s
+                back_t = wp.transpose(F) * worn_t
+                bent = wp.abs(angle) * wp.ddot(F, F)
+                w0 = -(w1 + w2)
+                k0 = guard_bound(w0, warp, weft, q_warp, q_weft, density) + shear_bound(w0, s, t, back_s, back_t, bent)
+                k1 = guard_bound(w1, warp, weft, q_warp, q_weft, density) + shear_bound(w1, s, t, back_s, back_t, bent)
+                k2 = guard_bound(w2, warp, weft, q_warp, q_weft, density) + shear_bound(w2, s, t, back_s, back_t, bent)
+                k0 *= area
+                k1 *= area
+                k2 *= area
                 v0 = velocity[i0]
                 v1 = velocity[i1]
                 v2 = velocity[i2]
@@ -314,6 +347,19 @@ def guard_bound(
 
 
 @wp.func
+def shear_bound(w: wp.vec2d, s: wp.vec2d, t: wp.vec2d, back_s: wp.vec2d, back_t: wp.vec2d, bent: wp.float64):
+    """The same of 1/2 (F s . F t)^2. Its second derivative along a unit vector u by the place of the corner, with that of the area, is
+    (u . g)^2 + 2 (F s . F t) (w . s) (w . t) |F u|^2 with g = (w . s) F^T F t + (w . t) F^T F s.
+
+    back_s, back_t: F^T F s, F^T F t. bent: |F s . F t| times the square of F's norm.
+    """
+    along_s = wp.dot(w, s)
+    along_t = wp.dot(w, t)
+    g = back_t * along_s + back_s * along_t
+    return wp.float64(2.0) * (wp.dot(g, g) + bent * (along_s * along_s + along_t * along_t))
+
+
+@wp.func
 def guard_energy(
     p0: wp.vec2d,
     p1: wp.vec2d,
@@ -322,21 +368,26 @@ def guard_energy(
     warp: wp.vec2d,
     weft: wp.vec2d,
     onset: wp.vec2d,
+    s: wp.vec2d,
+    t: wp.vec2d,
     guard: ThreadGuard,
 ):
-    """Of a cell [J], infinite if it is collapsed or mirrored."""
+    """Of a cell [J], infinite if it is collapsed or mirrored; s, t: as `evaluate_guard` has them."""
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     if det <= wp.float64(0.0):
         return wp.float64(wp.inf)
     worn_warp = on_body(laid, across(D, warp))
     worn_weft = on_body(laid, across(D, weft))
+    density = wp.float64(0.0)
     if is_beyond(worn_warp, det, onset[0]) or is_beyond(worn_weft, det, onset[1]):
         y_warp = excess_stretch(worn_warp / det, onset[0])
         y_weft = excess_stretch(worn_weft / det, onset[1])
         density = guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
-        return wp.float64(0.25) * det * density
-    return wp.float64(0.0)
+    if wp.dot(s, s) > wp.float64(0.0):
+        angle = wp.dot(on_body(laid, across(D, s)), on_body(laid, across(D, t))) / (det * det)
+        density += angle * angle
+    return wp.float64(0.25) * det * density
 
 
 @wp.kernel
@@ -348,25 +399,28 @@ def compute_guard_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """Energy of the thread guard per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
+    """Energy of the thread guard per face, and of what long quads lack in shear. position: #V [m]. energy: #F [J], infinite where a cell
+    is collapsed or mirrored."""
     f = wp.tid() + first
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
+    s = sheared(cells.shear[f], warp, weft, cells.slack[f])
+    t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
     begin = cells.first[f]
     p0 = position[face[0]]
     p1 = position[face[1]]
     p2 = position[face[2]]
     if face[3] < 0:
-        energy[f] = guard_energy(p0, p1, p2, cells.laid[begin], warp, weft, onset, guard)
+        energy[f] = guard_energy(p0, p1, p2, cells.laid[begin], warp, weft, onset, s, t, guard)
     else:
         p3 = position[face[3]]
         energy[f] = wp.float64(0.5) * (
-            guard_energy(p3, p0, p1, cells.laid[begin], warp, weft, onset, guard)
-            + guard_energy(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset, guard)
-            + guard_energy(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset, guard)
-            + guard_energy(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset, guard)
+            guard_energy(p3, p0, p1, cells.laid[begin], warp, weft, onset, s, t, guard)
+            + guard_energy(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset, s, t, guard)
+            + guard_energy(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset, s, t, guard)
+            + guard_energy(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset, s, t, guard)
         )
 
 

@@ -162,14 +162,16 @@ def weigh_quads(
     # outputs
     stiffness: wp.array(dtype=wp.float64),
     diagonal: wp.array(dtype=wp.float64),
-    clamped: wp.array(dtype=wp.int8),
+    lack: wp.array(dtype=wp.vec2d),
 ):
     """Stiffness [N/m] that a quad gives to the springs along its sides and to both its diagonals.
 
     A cell a by b of springs K b/a, less what its diagonals G (a2 + b2)/2ab take over, and half of them to each of two sides. Which
-    pair of edges is nearer to the warp is each quad's own.
+    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that next to nothing would be left along it, its
+    diagonals are weaker.
 
-    side: #Q, the first of each quad's half-edges. stiffness: #H. diagonal: #Q. clamped: #Q, 1 where the diagonals take too much.
+    side: #Q, the first of each quad's half-edges. stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as
+    `cells.Cells.shear` has it.
     """
     q = wp.tid() + first
     quad = quads[q]
@@ -188,20 +190,17 @@ def weigh_quads(
     a = half * (wp.length(p1 - p0) + wp.length(p3 - p2))
     b = half * (wp.length(p2 - p1) + wp.length(p0 - p3))
     ratio = b / a
-    taken_a = lattice.shear / (ratio * ratio)
-    taken_b = lattice.shear * (ratio * ratio)
-    half_a = half * wp.max(ka - taken_a, lattice.least * ka) * ratio
-    half_b = half * wp.max(kb - taken_b, lattice.least * kb) / ratio
-    left = wp.float64(1.0) - lattice.least
-    clamped[q] = wp.int8(0)
-    if taken_a > left * ka or taken_b > left * kb:
-        clamped[q] = wp.int8(1)
+    most = (wp.float64(1.0) - lattice.least) * wp.min(ka * ratio * ratio, kb / (ratio * ratio))
+    shear = wp.min(lattice.shear, most)
+    half_a = half * (ka - shear / (ratio * ratio)) * ratio
+    half_b = half * (kb - shear * ratio * ratio) / ratio
+    lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
     h = side[q]
     stiffness[h] = half_a
     stiffness[h + 1] = half_b
     stiffness[h + 2] = half_a
     stiffness[h + 3] = half_b
-    diagonal[q] = lattice.shear * (a * a + b * b) / (wp.float64(2.0) * a * b)
+    diagonal[q] = shear * (a * a + b * b) / (wp.float64(2.0) * a * b)
 
 
 @wp.kernel

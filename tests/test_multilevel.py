@@ -106,6 +106,44 @@ def test_on_a_grid_thirty_units_of_work_come_within_a_thousandth(shape: str, res
     assert min(work for work, energy in seen if energy < 1.001 * minimum(done)) <= 30.0
 
 
+def uneven(columns: int, rows: int) -> Surface:
+    """A dome of quads whose rows and columns are three and five times as far apart beside the middle as in it."""
+
+    def places(count: int) -> np.ndarray:
+        first, middle = count // 4, count // 2
+        ends = [
+            np.linspace(*span, number, endpoint=False) for *span, number in ((-0.5, -0.2, first), (-0.2, 0.0, middle))
+        ]
+        return np.concatenate([*ends, np.linspace(0.0, 0.5, count - first - middle)])
+
+    x, y = np.meshgrid(places(columns), places(rows))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    return make_surface(np.stack([x, y, 0.3 * np.cos(2 * x) * np.cos(2 * y)], axis=-1).reshape(-1, 3), faces)
+
+
+@pytest.mark.parametrize("shear", [375.0, 100.0])
+def test_uneven_rows_take_sixty_units_too_and_stay_rows(shear: float):
+    """Long quads among them: were their shear springs to hold all of the shear, next to nothing would hold one vertex against its four
+    neighbours, and every second one would move by half a millimetre, in hundreds of cycles."""
+    surface = uneven(100, 120)
+    history: list[tuple[float, float]] = []
+    done = flatten(
+        surface,
+        fabric=cloth(shear),
+        device="cpu",
+        callback=lambda p: history.append((p.work_units, p.spring_energy + p.guard_energy)),
+    )
+    assert done.network.spring_arrays.long_quads > 4_000
+    assert next(work for work, energy in history if energy <= 1.001 * minimum(done)) < 60.0
+    place = done.positions.reshape(120, 100, 2)
+    against = place[1:-1, 1:-1] - 0.25 * (place[:-2, 1:-1] + place[2:, 1:-1] + place[1:-1, :-2] + place[1:-1, 2:])
+    chess = (-1.0) ** np.add.outer(np.arange(118), np.arange(98))[..., None]
+    # Every second one to one side: what is left of the mean over twelve by twelve.
+    moved = (chess * against)[:108, :96].reshape(9, 12, 8, 12, 2).mean(axis=(1, 3))
+    assert np.linalg.norm(moved, axis=-1).max() < 1e-5
+
+
 @pytest.mark.parametrize("kind", ["crack", "irregular"])
 def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     surface = cracked(51, column=17) if kind == "crack" else irregular(2_500)

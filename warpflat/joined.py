@@ -56,7 +56,7 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
         surface=join_surfaces([net.surface for net in networks]),
         fabric=first.fabric,
         grain_angle=first.grain_angle,
-        spring_arrays=_join_springs([net.spring_arrays for net in networks], vertex),
+        spring_arrays=_join_springs([net.spring_arrays for net in networks], vertex, _join_lacks(networks)),
         cell_arrays=_join_cells(networks, vertex),
         device=first.device,
         model=first.model,
@@ -67,8 +67,18 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     )
 
 
-def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray) -> SpringArrays:
-    """Mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
+def _join_lacks(networks: Sequence[SpringNetwork]) -> NDArray[np.float64] | None:
+    """#F by 2, what long quads lack in shear; None where no piece has one."""
+    lacks = [net.spring_arrays.lack for net in networks]
+    if not any(lack is not None for lack in lacks):
+        return None
+    return np.concatenate(
+        [np.zeros((net.face_count, 2)) if lack is None else lack for net, lack in zip(networks, lacks, strict=True)]
+    )
+
+
+def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray, lack: NDArray[np.float64] | None) -> SpringArrays:
+    """Mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering. lack: of all."""
     edge = begins([s.edge_count for s in springs])
     diagonal = edge[-1] + begins([len(s.ends) - s.edge_count for s in springs])
 
@@ -91,7 +101,7 @@ def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray) -> SpringAr
             entry=np.concatenate(entry),
             neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
         ),
-        clamped_cells=sum(s.clamped_cells for s in springs),
+        lack=lack,
     )
 
 

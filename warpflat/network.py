@@ -15,6 +15,10 @@ with F from the plane to the surface and a the flat area. It is zero below the o
 kinks (its sideways stiffness outweighs the springs' loss), and it grows without bound as a cell collapses, so that no
 face can be mirrored. Its share is reported as `guard_energy_j`.
 
+**Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs of all of G would be stiffer than the fabric, and
+hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a 1/2 G' (F s . F t)^2
+for what is missing, s along the quad and t across; it counts among the guard's.
+
 **Or a membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`):
 exact on any mesh, and without a guard. The springs then pull at nothing; their k_ij, set so that they bound the membrane's
 stiffness, stay the matrix of the approximate implicit step.
@@ -173,6 +177,8 @@ class SpringNetwork:
         hold = np.minimum(fabric.shear_stiffness, self.shear_hold)
         onset = np.stack([hold / fabric.stiffness_warp, hold / fabric.stiffness_weft], axis=-1)
         cells.onset = _on(device, np.broadcast_to(onset, (self.face_count, 2)), wp.vec2d)
+        lack = np.broadcast_to(np.zeros(2), (self.face_count, 2)) if s.lack is None else s.lack
+        cells.shear = _on(device, lack, wp.vec2d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)

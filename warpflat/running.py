@@ -188,13 +188,6 @@ class _Batch:
         begin = state.begin().energies
         stage = self._runs[0].stage_name
         self._tell(state, "develop" if stage == "relax" else stage)
-        for run, net in zip(self._runs, state.network.pieces, strict=True):
-            clamped = net.spring_arrays.clamped_cells
-            if clamped:
-                run.notes.append(
-                    f"{clamped:,} quads are so long that their shear springs outweigh the fabric along them, and are too stiff: "
-                    'cut them into nearly square ones, or set model = "membrane", which any quads will do for'
-                )
         if twice:
             state.options = replace(
                 self._options,

@@ -40,7 +40,8 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# A shear spring stiffens tension too; where a cell is so long that nothing is left for the structural spring, it keeps this share.
+# A shear spring stiffens tension too; a cell so long that nothing would be left for the structural spring keeps this share of it, has
+# weaker shear springs, and is sheared as a whole against what they lack.
 _LEAST_STRUCTURAL_SHARE = 0.05
 # Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
 # guard begins at this share of it.
@@ -70,15 +71,21 @@ class _Unweighed:
 @dataclass(frozen=True, kw_only=True)
 class SpringArrays:
     """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
-    are `around` each vertex. Of a surface's own springs, what they share with those of other fabrics."""
+    are `around` each vertex. `lack` #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None
+    where there are none. Of a surface's own springs, what they share with those of other fabrics."""
 
     ends: IntArray
     rest_length: FloatArray
     stiffness: FloatArray
     edge_count: int
     around: SpringsAround
-    clamped_cells: int = 0
+    lack: FloatArray | None = None
     own: _Unweighed | None = None
+
+    @property
+    def long_quads(self) -> int:
+        """How many quads lack something in shear."""
+        return 0 if self.lack is None else int(np.count_nonzero(self.lack.any(axis=1)))
 
     @property
     def listed_length(self) -> FloatArray:
@@ -103,18 +110,20 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
     of_side, stiffness = np.empty(len(sides)), np.empty(len(own.ends))
-    position, clamped = np.ascontiguousarray(positions, dtype=np.float64), 0
+    position, lack = np.ascontiguousarray(positions, dtype=np.float64), None
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
         given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
         launch_each(weigh_triangles, len(triangles), given, [of_side])
     if is_quad.any():
         quads = rows_of(faces, is_quad)
-        diagonal, over = np.empty(len(quads)), np.empty(len(quads), dtype=np.int8)
+        diagonal, short = np.empty(len(quads)), np.empty((len(quads), 2))
         given = [surface.vertices, position, quads, rows_of(first, is_quad), _lattice(fabric, quads, position, warp)]
-        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, over])
+        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
-        clamped = int(np.count_nonzero(over))
+        if short.any():
+            lack = np.zeros((len(faces), 2))
+            lack[is_quad] = short
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         ends=own.ends,
@@ -122,7 +131,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         stiffness=stiffness,
         edge_count=own.edge_count,
         around=own.around,
-        clamped_cells=clamped,
+        lack=lack,
         own=own,
     )
 
@@ -245,7 +254,7 @@ def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray
     """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
     side = springs_of_sides(springs, cells)
     stiffness = np.bincount(side, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
-    return replace(springs, stiffness=stiffness, clamped_cells=0)
+    return replace(springs, stiffness=stiffness, lack=None)
 
 
 def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:

@@ -100,9 +100,11 @@ def _keep_near(
     tried = {**fitted, **near}
     left = list(_sewn(pieces, seams))
     # An edge of a pair is sewn at two seams: what one of them takes back concerns the other.
-    while odd := [seam for seam in left if not _agree(*_both(seam, lines, tried), SAFE)]:
+    while odd := [seam for seam in left if _apart(*_both(seam, lines, tried)) > SAFE]:
         for sides, ease in odd:
-            if _agree(*_both((sides, ease), lines, fitted), 1.0):
+            near_apart, apart = (_apart(*_both((sides, ease), lines, curves)) for curves in (tried, fitted))
+            # On a coarse mesh neither may be as near as it should be.
+            if apart <= max(near_apart, 1.0):
                 tried |= {key: fitted[key] for row in sides for key in ((side.piece, side.edge) for side in row)}
         left = [seam for seam in left if seam not in odd]
     fitted |= tried
@@ -138,11 +140,11 @@ def _places(
     return np.concatenate(rows)
 
 
-def _agree(first: Vector, second: Vector, ease: float, share: float) -> bool:
-    """Whether the sides of a seam differ by no more than a share of what they may."""
+def _apart(first: Vector, second: Vector, ease: float) -> float:
+    """How much the sides of a seam differ, over what they may."""
     near = worst_difference(first, second, ease)
-    whole = abs(second[-1] - first[-1] * (1 + ease))
-    return bool(whole <= share * SEAM_TOLERANCE) and (near is None or near <= share * LOCAL_TOLERANCE)
+    whole = abs(second[-1] - first[-1] * (1 + ease)) / SEAM_TOLERANCE
+    return float(whole if near is None else max(whole, near / LOCAL_TOLERANCE))
 
 
 def _pairs(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[EdgeKey, EdgeKey, bool, float]]:
