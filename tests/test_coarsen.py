@@ -241,6 +241,25 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     assert spread_surface(surface) is found
 
 
+def test_rows_much_farther_apart_than_columns_all_stay():
+    """Until quads are nearly square; what goes up from there is exact for linear layouts."""
+    x, y = np.meshgrid(0.001 * np.arange(65), 0.008 * np.arange(9))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    for points in (np.stack([x, y, 0 * x], axis=-1), np.stack([y, -x, 0 * x], axis=-1)):
+        surface = make_surface(points.reshape(-1, 3), faces)
+        shapes = []
+        for step in coarser_surfaces(surface):
+            grid = rows_and_columns(step.surface)
+            assert grid is not None
+            shapes.append(tuple(sorted(grid.shape)))
+            np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(surface), atol=1e-12)
+            assert step.smooth_carry is not None
+            np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(surface), atol=1e-12)
+            surface = step.surface
+        assert shapes == [(9, 33), (9, 17), (5, 9)]
+
+
 def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
     assert spread_surface(sheet(2_000, 4)) is None
     assert spread_surface(sheet(21, 21, triangles=True)) is None

@@ -144,6 +144,25 @@ def test_uneven_rows_take_sixty_units_too_and_stay_rows(shear: float):
     assert np.linalg.norm(moved, axis=-1).max() < 1e-5
 
 
+@pytest.mark.parametrize(("columns", "rows"), [(161, 9), (9, 161), (241, 31)])
+def test_long_quads_take_sixty_units_too(columns: int, rows: int):
+    """Halved across only until they are nearly square; halved both ways, those 20 times as long as wide took 320 units."""
+    x, y = np.meshgrid(np.linspace(-0.4, 0.4, columns), np.linspace(-0.4, 0.4, rows))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    surface = make_surface(np.stack([x, y, 0.3 * np.cos(2 * x) * np.cos(2 * y)], axis=-1).reshape(-1, 3), faces)
+    history: list[tuple[float, float]] = []
+    done = flatten(
+        surface,
+        fabric=cloth(375.0),
+        device="cpu",
+        callback=lambda p: history.append((p.work_units, p.spring_energy + p.guard_energy)),
+    )
+    assert next(work for work, energy in history if energy <= 1.001 * minimum(done)) < 60.0
+    assert done.stages[-1].converged
+    assert not done.flipped_faces
+
+
 @pytest.mark.parametrize("kind", ["crack", "irregular"])
 def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     surface = cracked(51, column=17) if kind == "crack" else irregular(2_500)

@@ -17,7 +17,7 @@ from warpflat.kernels.cubics import carry_along, weigh_cubics
 from warpflat.launching import launch_each
 from warpflat.surface.grid import Lattice
 
-__all__ = ["GridCarry", "LatticeCarry", "cubics_between"]
+__all__ = ["GridCarry", "LatticeCarry", "cubics_between", "places_of_rows"]
 
 FloatArray = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.complex128)
@@ -71,7 +71,7 @@ def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
     return Cubics(column=column.astype(np.int32), weight=weight)
 
 
-def _places(vertices: FloatArray, grid: IntArray) -> FloatArray:
+def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
     """#N, how far each row of a grid (#N by #M, of vertices #V by 3 [m]) lies from the first one, along the surface: the mean over some
     columns. By number where two of them lie at one place."""
     some = vertices[grid[:, np.unique(np.linspace(0, grid.shape[1] - 1, _LINES).astype(int))]]
@@ -96,7 +96,7 @@ class GridCarry:
     @cached_property
     def _places(self) -> list[tuple[FloatArray, FloatArray]]:
         """Of rows and of columns: where the coarser grid's lie, and the finer one's."""
-        found = [_places(self._vertices, grid) for grid in (self._grid, self._grid.T)]
+        found = [places_of_rows(self._vertices, grid) for grid in (self._grid, self._grid.T)]
         return [
             (np.interp(lines, np.arange(len(place)), place), place)
             for lines, place in zip(self._lines, found, strict=True)

@@ -1,8 +1,9 @@
-"""Quads on a lattice with fewer rows and columns: all that the faces alone tell of a coarser level.
+"""Quads on a lattice with fewer rows and columns: all that their faces tell of a coarser level.
 
-A rectangular grid keeps every second row and column, any other lattice those too in which its border turns, at corners and at the tips
-of cracks: then between two kept rows and two kept columns there is cloth everywhere or nowhere. Surfaces that differ only in where their
-vertices lie, such as the sizes of a pattern, share what is worked out here.
+A rectangular grid keeps every second row and column (all rows where these lie much farther apart than its columns), any other lattice
+those too in which its border turns, at corners and at the tips of cracks: then between two kept rows and two kept columns there is cloth
+everywhere or nowhere. Surfaces that differ only in where their vertices lie, such as the sizes of a pattern, share what is worked out
+here, of the first that asks.
 
 A large rectangular grid starts where a small one has come to rest that is spread evenly over it, its rows and columns between those of
 the large one: of any number of them, it is as fine, and nowhere uneven.
@@ -20,7 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
-from warpflat.carry import GridCarry, LatticeCarry
+from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_faces
 
@@ -34,6 +35,8 @@ BoolArray = NDArray[np.bool_]
 _LEAST_LINES = 5
 # Quads across the narrowest strip of a coarser lattice: a single one bends several times as stiffly as its cloth.
 _LEAST_QUADS = 2
+# Rows this many times as far apart as columns all stay, and columns as rows.
+_MUCH = 2.5
 # A level of a lattice with more than this share of the finer one's vertices is not worth having.
 _MOST_LEFT = 0.7
 # A small grid spread over a large one has so many quads along its sides, more along the longer one. What cubics leave of a layout is then
@@ -163,7 +166,7 @@ def _every_second(surface: Surface, grid: IntArray) -> Thinned | None:
     rows, columns = grid.shape
     if min(rows, columns) < _LEAST_LINES:
         return None
-    keep = _second(rows), _second(columns)
+    keep = _lines_to_keep(surface, grid)
     kept = grid[np.ix_(*keep)]
     return Thinned(
         kept=kept.ravel(),
@@ -172,6 +175,18 @@ def _every_second(surface: Surface, grid: IntArray) -> Thinned | None:
         transfer=Transfer(lambda: _bilinear(grid, keep)),
         carry=lambda vertices: GridCarry(vertices, grid, keep),
     )
+
+
+def _lines_to_keep(surface: Surface, grid: IntArray) -> tuple[IntArray, IntArray]:
+    """Every second row and column; all of those that lie much farther apart than the others: quads are to become squarer, since steps only
+    smooth along their short sides."""
+    rows, columns = grid.shape
+    apart = [places_of_rows(surface.vertices, lines)[-1] / (len(lines) - 1) for lines in (grid, grid.T)]
+    if apart[0] > _MUCH * apart[1]:
+        return np.arange(rows, dtype=np.int32), _second(columns)
+    if apart[1] > _MUCH * apart[0]:
+        return _second(rows), np.arange(columns, dtype=np.int32)
+    return _second(rows), _second(columns)
 
 
 def _bilinear(grid: IntArray, keep: tuple[IntArray, IntArray]) -> csr_array:
@@ -198,7 +213,7 @@ def _second(count: int) -> IntArray:
 def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
     """#count by 2, of each index the places in `keep` before and after, and their shares, linear by index."""
     index = np.arange(count, dtype=np.int32)
-    place = np.minimum(index // 2, len(keep) - 2)
+    place = np.minimum(np.searchsorted(keep, index, side="right") - 1, len(keep) - 2)
     share = (index - keep[place]) / (keep[place + 1] - keep[place])
     return np.column_stack([place, place + 1]), np.column_stack([1.0 - share, share])
 
