@@ -163,6 +163,35 @@ def look_at(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.v
 
 
 @wp.func
+def look_at_face(
+    position: wp.array(dtype=wp.vec2d),
+    face: wp.vec4i,
+    laid: wp.array(dtype=wp.vec3d),
+    begin: int,
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    onset: wp.vec2d,
+):
+    """The same of all cells of a face, the least and any; `begin`: the first of them."""
+    p0 = position[face[0]]
+    p1 = position[face[1]]
+    p2 = position[face[2]]
+    height2 = wp.float64(0.0)
+    near = int(0)
+    if face[3] < 0:
+        height2, near = look_at(p0, p1, p2, laid[begin], warp, weft, onset)
+    else:
+        p3 = position[face[3]]
+        h0, near0 = look_at(p3, p0, p1, laid[begin], warp, weft, onset)
+        h1, near1 = look_at(p0, p1, p2, laid[begin + 1], warp, weft, onset)
+        h2, near2 = look_at(p1, p2, p3, laid[begin + 2], warp, weft, onset)
+        h3, near3 = look_at(p2, p3, p0, laid[begin + 3], warp, weft, onset)
+        height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
+        near = near0 | near1 | near2 | near3
+    return height2, near
+
+
+@wp.func
 def excess_stretch(worn: wp.vec2d, onset: wp.float64):
     """How far the stretch of a worn thread, a unit vector mapped to `worn`, lies beyond the onset."""
     return wp.max(wp.length(worn) - wp.float64(1.0) - onset, wp.float64(0.0))
@@ -237,21 +266,7 @@ def evaluate_guard(
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     begin = cells.first[f]
-    p0 = position[face[0]]
-    p1 = position[face[1]]
-    p2 = position[face[2]]
-    acts = int(0)
-    height2 = wp.float64(0.0)
-    if face[3] < 0:
-        height2, acts = look_at(p0, p1, p2, cells.laid[begin], warp, weft, onset)
-    else:
-        p3 = position[face[3]]
-        h0, near0 = look_at(p3, p0, p1, cells.laid[begin], warp, weft, onset)
-        h1, near1 = look_at(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset)
-        h2, near2 = look_at(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset)
-        h3, near3 = look_at(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset)
-        height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
-        acts = near0 | near1 | near2 | near3
+    height2, acts = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
     if lacks_shear:
         acts = int(1)

@@ -260,6 +260,18 @@ def test_rows_much_farther_apart_than_columns_all_stay():
         assert shapes == [(9, 33), (9, 17), (5, 9)]
 
 
+def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
+    """Of the same rows and columns, pulled long or not, each has the levels that it had if it were alone."""
+    square = sheet(33, 33)
+    long = replace(square, vertices=square.vertices * [8.0, 1.0, 1.0])
+    shapes = []
+    for surface in (long, square, replace(long)):
+        grid = rows_and_columns(coarser_surfaces(surface)[0].surface)
+        assert grid is not None
+        shapes.append(grid.shape)
+    assert shapes == [(17, 33), (17, 17), (17, 33)]
+
+
 def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
     assert spread_surface(sheet(2_000, 4)) is None
     assert spread_surface(sheet(21, 21, triangles=True)) is None

@@ -3,7 +3,7 @@
 A rectangular grid keeps every second row and column (all rows where these lie much farther apart than its columns), any other lattice
 those too in which its border turns, at corners and at the tips of cracks: then between two kept rows and two kept columns there is cloth
 everywhere or nowhere. Surfaces that differ only in where their vertices lie, such as the sizes of a pattern, share what is worked out
-here, of the first that asks.
+here.
 
 A large rectangular grid starts where a small one has come to rest that is spread evenly over it, its rows and columns between those of
 the large one: of any number of them, it is as fine, and nowhere uneven.
@@ -92,13 +92,11 @@ class Spread:
     """A small grid spread over a large one.
 
     Attributes:
-        lines: where its rows and columns lie, counted in those of the large one.
         of_faces: what is known of its faces (`warpflat.surface.mesh.once_per_faces`).
         face_of: #G, for each of them one of the large grid's that lies in it.
         carry: of the large grid's vertices (#V by 3 [m]), what carries layouts up by cubics, and samples what is there.
     """
 
-    lines: tuple[FloatArray, ...]
     of_faces: dict[str, Any]
     face_of: IntArray
     carry: Callable[[FloatArray], GridCarry]
@@ -121,7 +119,6 @@ def spread_of(surface: Surface) -> Spread | None:
     )
     middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
     return Spread(
-        lines=lines,
         of_faces=_known_of_grid(*map(len, lines)),
         face_of=_some_face(surface, grid[np.ix_(*middle)].ravel()),
         carry=lambda vertices: GridCarry(vertices, grid, lines),
@@ -151,22 +148,52 @@ def _faces_of(rows: int, columns: int) -> IntArray:
     return np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
-@once_per_faces
 def thinned_of(surface: Surface) -> Thinned | None:
-    """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having."""
+    """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having.
+
+    Of a grid whose rows lie much farther apart than its columns all rows stay, or the other way round: quads are to become squarer, since
+    steps smooth along their short sides only.
+    """
     grid = rows_and_columns(surface)
-    if grid is not None:
-        return _every_second(surface, grid)
+    if grid is None:
+        return _of_lattice(surface)
+    if min(grid.shape) < _LEAST_LINES:
+        return None
+    rows, columns = (places_of_rows(surface.vertices, lines)[-1] / (len(lines) - 1) for lines in (grid, grid.T))
+    if rows > _MUCH * columns:
+        return _across_rows(surface)
+    return _across_columns(surface) if columns > _MUCH * rows else _both_ways(surface)
+
+
+@once_per_faces
+def _of_lattice(surface: Surface) -> Thinned | None:
     lattice = lattice_of(surface)
     return None if lattice is None else _every_other(lattice)
 
 
-def _every_second(surface: Surface, grid: IntArray) -> Thinned | None:
-    """Every second row and column, and the last ones; between them linear by index."""
-    rows, columns = grid.shape
-    if min(rows, columns) < _LEAST_LINES:
-        return None
-    keep = _lines_to_keep(surface, grid)
+@once_per_faces
+def _both_ways(surface: Surface) -> Thinned:
+    return _every_second(surface, rows=True, columns=True)
+
+
+@once_per_faces
+def _across_rows(surface: Surface) -> Thinned:
+    return _every_second(surface, rows=False, columns=True)
+
+
+@once_per_faces
+def _across_columns(surface: Surface) -> Thinned:
+    return _every_second(surface, rows=True, columns=False)
+
+
+def _every_second(surface: Surface, *, rows: bool, columns: bool) -> Thinned:
+    """Every second row of a grid, or column, or both, and the last ones; between them linear by index."""
+    grid = rows_and_columns(surface)
+    assert grid is not None
+    keep = tuple(
+        _second(count) if thin else np.arange(count, dtype=np.int32)
+        for count, thin in zip(grid.shape, (rows, columns), strict=True)
+    )
     kept = grid[np.ix_(*keep)]
     return Thinned(
         kept=kept.ravel(),
@@ -177,19 +204,7 @@ def _every_second(surface: Surface, grid: IntArray) -> Thinned | None:
     )
 
 
-def _lines_to_keep(surface: Surface, grid: IntArray) -> tuple[IntArray, IntArray]:
-    """Every second row and column; all of those that lie much farther apart than the others: quads are to become squarer, since steps only
-    smooth along their short sides."""
-    rows, columns = grid.shape
-    apart = [places_of_rows(surface.vertices, lines)[-1] / (len(lines) - 1) for lines in (grid, grid.T)]
-    if apart[0] > _MUCH * apart[1]:
-        return np.arange(rows, dtype=np.int32), _second(columns)
-    if apart[1] > _MUCH * apart[0]:
-        return _second(rows), np.arange(columns, dtype=np.int32)
-    return _second(rows), _second(columns)
-
-
-def _bilinear(grid: IntArray, keep: tuple[IntArray, IntArray]) -> csr_array:
+def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
     """#V by #kept, a grid's values from those at the rows and columns kept, by the four around each vertex."""
     (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
     height, width = map(len, keep)
