@@ -81,23 +81,20 @@ def find_sides(
 
 
 @wp.kernel
-def spread_stiffness(
+def sum_stiffness(
     offset: wp.array(dtype=wp.int32),
-    spring: wp.array(dtype=wp.int32),
     stiffness: wp.array(dtype=wp.float64),
     pair_share: wp.float64,
     first: int,
     # outputs
-    at_entry: wp.array(dtype=wp.float64),
     around: wp.array(dtype=wp.float64),
 ):
-    """k_ij [N/m] of each entry around each vertex, and #V, their sum and a share of the stiffest. stiffness: #S."""
+    """#V, the sum of the k_ij [N/m] that are listed around each vertex, and a share of the stiffest."""
     i = wp.tid() + first
     total = wp.float64(0.0)
     stiffest = wp.float64(0.0)
     for e in range(offset[i], offset[i + 1]):
-        k = stiffness[spring[e]]
-        at_entry[e] = k
+        k = stiffness[e]
         total += k
         stiffest = wp.max(stiffest, k)
     around[i] = total + pair_share * stiffest
@@ -248,7 +245,6 @@ def measure_hold(
     position: wp.array(dtype=wp.vec2d),
     offset: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
-    spring: wp.array(dtype=wp.int32),
     rest_length: wp.array(dtype=wp.float64),
     stiffness: wp.array(dtype=wp.float64),
     area: wp.array(dtype=wp.float64),
@@ -258,7 +254,7 @@ def measure_hold(
     hold: wp.array(dtype=wp.float64),
 ):
     """Shear stiffness [N/m] of the springs around each vertex against warp and weft: sum of 1/2 k L^2 cos^2 sin^2 over the
-    vertex's area [m2]. rest_length, stiffness: #S."""
+    vertex's area [m2]. rest_length, stiffness: 2 #S, as they are listed around the vertices."""
     i = wp.tid() + first
     held = wp.float64(0.0)
     for e in range(offset[i], offset[i + 1]):
@@ -266,6 +262,57 @@ def measure_hold(
         along = wp.dot(d, warp)
         across = d[0] * warp[1] - d[1] * warp[0]
         share = along * across / wp.max(along * along + across * across, TINY)
-        s = spring[e]
-        held += wp.float64(0.5) * stiffness[s] * rest_length[s] * rest_length[s] * share * share
+        held += wp.float64(0.5) * stiffness[e] * rest_length[e] * rest_length[e] * share * share
     hold[i] = held / area[i]
+
+
+@wp.func
+def strain_field(d: wp.vec2d):
+    """c^4, s^4 and c^2 s^2 of a direction: what a spring along it stores of uniform strains along x, along y and of both."""
+    c2 = d[0] * d[0] / wp.max(wp.dot(d, d), TINY)
+    s2 = wp.float64(1.0) - c2
+    return wp.vec3d(c2 * c2, s2 * s2, c2 * s2)
+
+
+@wp.kernel
+def sum_strain_fields(
+    position: wp.array(dtype=wp.vec2d),
+    offset: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+    rest_length: wp.array(dtype=wp.float64),
+    stiffness: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    stored: wp.array(dtype=wp.vec3d),
+    products: wp.array(dtype=wp.mat33d),
+):
+    """Sums over the springs around each vertex of k L^2 w, w their `strain_field` in a layout [J], and of k L^2 w w^T."""
+    i = wp.tid() + first
+    total = wp.vec3d()
+    squares = wp.mat33d()
+    for e in range(offset[i], offset[i + 1]):
+        field = strain_field(position[neighbor[e]] - position[i])
+        share = stiffness[e] * rest_length[e] * rest_length[e] * field
+        total += share
+        squares += wp.outer(share, field)
+    stored[i] = total
+    products[i] = squares
+
+
+@wp.kernel
+def weigh_by_direction(
+    position: wp.array(dtype=wp.vec2d),
+    offset: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+    factor: wp.vec3d,
+    least: wp.float64,
+    most: wp.float64,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.float64),
+):
+    """Multiply k_ij, listed around the vertices, by `factor` times the `strain_field` in a layout, within bounds."""
+    i = wp.tid() + first
+    for e in range(offset[i], offset[i + 1]):
+        field = strain_field(position[neighbor[e]] - position[i])
+        stiffness[e] = stiffness[e] * wp.clamp(wp.dot(factor, field), least, most)

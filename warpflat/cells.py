@@ -82,7 +82,7 @@ class CellArrays:
         """#C, weighted areas on the body [m2]."""
         return np.asarray(0.5 * self.weight * self.laid[:, 0] * self.laid[:, 2])
 
-    @cached_property
+    @property
     def vertex_areas(self) -> FloatArray:
         """#V [m2], a third of each cell's share of the cloth at each of its corners."""
         around, total = self.around, np.empty(len(self.around.offset) - 1)

@@ -171,9 +171,13 @@ def _wider_springs(
     length = np.maximum(np.linalg.norm(before, axis=1), np.finfo(np.float64).tiny)
     longer = np.linalg.norm(before * here, axis=1) / length
     wider = np.linalg.norm(before[:, ::-1] * here, axis=1) / length
-    diagonal = np.arange(len(springs.ends)) >= springs.edge_count
+    diagonal = np.arange(springs.count) >= springs.edge_count
     factor = np.where(diagonal, longer**2 / (here[:, 0] * here[:, 1]), wider / longer)
-    return replace(springs, rest_length=springs.rest_length * longer, stiffness=springs.stiffness * factor)
+    return replace(
+        springs,
+        listed_length=springs.listed(springs.rest_length * longer),
+        listed_stiffness=springs.listed(springs.stiffness * factor),
+    )
 
 
 def _wider_cells(

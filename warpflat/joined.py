@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +15,6 @@ from warpflat.surface.mesh import Surface
 __all__ = ["begins", "join_networks", "join_surfaces"]
 
 IntArray = NDArray[np.int32]
-Number = TypeVar("Number", bound=np.generic)
 
 
 def begins(counts: Sequence[int]) -> IntArray:
@@ -78,29 +76,23 @@ def _join_lacks(networks: Sequence[SpringNetwork]) -> NDArray[np.float64] | None
 
 
 def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray, lack: NDArray[np.float64] | None) -> SpringArrays:
-    """Mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering. lack: of all."""
+    """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering. lack: of all."""
     edge = begins([s.edge_count for s in springs])
-    diagonal = edge[-1] + begins([len(s.ends) - s.edge_count for s in springs])
-
-    def both(of_each: Sequence[NDArray[Number]]) -> NDArray[Number]:
-        edges = [values[: s.edge_count] for values, s in zip(of_each, springs, strict=True)]
-        return np.concatenate([*edges, *(values[s.edge_count :] for values, s in zip(of_each, springs, strict=True))])
-
+    diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
     entry = [
         a.entry + np.where(a.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
         for k, (s, a) in enumerate(zip(springs, around, strict=True))
     ]
     return SpringArrays(
-        ends=both([s.ends + at for s, at in zip(springs, vertex, strict=False)]),
-        rest_length=both([s.rest_length for s in springs]),
-        stiffness=both([s.stiffness for s in springs]),
-        edge_count=int(edge[-1]),
         around=SpringsAround(
             offset=_join_offsets(around),
             entry=np.concatenate(entry),
             neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
         ),
+        listed_length=np.concatenate([s.listed_length for s in springs]),
+        listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
+        edge_count=int(edge[-1]),
         lack=lack,
     )
 

@@ -27,7 +27,7 @@ stiffness, stay the matrix of the approximate implicit step.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import warp as wp
@@ -40,7 +40,7 @@ from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
-from warpflat.kernels.stiffness import spread_stiffness
+from warpflat.kernels.stiffness import sum_stiffness
 from warpflat.launching import launch_each
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.springs import SpringArrays, shear_hold, shortened, springs_of, with_stiffness
@@ -64,7 +64,7 @@ class SpringNetwork:
 
     Attributes:
         surface, fabric, grain_angle: what it was made from.
-        spring_arrays, cell_arrays: the same on the host, springs and cells once each.
+        spring_arrays, cell_arrays: the same on the host.
         model: "springs", with their guard, or "membrane".
         stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
         held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
@@ -94,7 +94,6 @@ class SpringNetwork:
     bonds: Bonds = field(init=False)
     mass: wp.array = field(init=False)
     spring_stiffness: wp.array = field(init=False)
-    _listed: wp.array = field(init=False, repr=False)
 
     @classmethod
     def build(
@@ -157,12 +156,10 @@ class SpringNetwork:
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
         springs.rest_length = _on(device, s.listed_length, wp.float64)
-        springs.stiffness = wp.empty(len(at.entry), dtype=wp.float64, device=device)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
         self.spring_stiffness = wp.empty(count, dtype=wp.float64, device=device)
-        self._listed = _on(device, at.entry, wp.int32)
-        self.weigh(s.stiffness)
+        self.make_springs(s.listed_stiffness)
 
         self.mass = _on(device, self.fabric.areal_density * c.vertex_areas, wp.float64)
         cells = Cells()
@@ -194,11 +191,22 @@ class SpringNetwork:
             # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
             self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
 
+    def make_springs(self, listed_stiffness: FloatArray) -> None:
+        """Make the springs anew, with these k_ij [N/m] (2 #S), before anything is recorded of them."""
+        self.spring_arrays = replace(self.spring_arrays, listed_stiffness=listed_stiffness)
+        # Those of a membrane follow it.
+        k_ij = listed_stiffness if self.model == "springs" else listed_stiffness.copy()
+        self.springs.stiffness = _on(self.device, k_ij, wp.float64)
+        self._sum_stiffness()
+
     def weigh(self, stiffness: FloatArray) -> None:
-        """Give the springs (#S) these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
-        given = [self.springs.offset, self._listed, _on(self.device, stiffness, wp.float64), _PAIR_SHARE]
-        made = [self.springs.stiffness, self.spring_stiffness]
-        launch_each(spread_stiffness, self.vertex_count, given, made, device=self.device)
+        """Give the springs (#S) of a membrane these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
+        self.springs.stiffness.assign(self.spring_arrays.listed(stiffness))
+        self._sum_stiffness()
+
+    def _sum_stiffness(self) -> None:
+        given = [self.springs.offset, self.springs.stiffness, _PAIR_SHARE]
+        launch_each(sum_stiffness, self.vertex_count, given, [self.spring_stiffness], device=self.device)
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
@@ -276,7 +284,7 @@ class SpringNetwork:
     @property
     def spring_count(self) -> int:
         """#S."""
-        return len(self.spring_arrays.ends)
+        return self.spring_arrays.count
 
 
 def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:

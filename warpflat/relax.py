@@ -29,6 +29,7 @@ from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
 from warpflat.step_buffers import StepBuffers
+from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
 from warpflat.upright import Upright, held_upright, without_turning
 
@@ -145,13 +146,16 @@ class Relaxation:
     def negligible_energy(self) -> FloatArray:
         """#P [J], what a strain of 1e-9 everywhere stores: below it a layout counts as free of strain."""
         springs = (net.spring_arrays for net in self.network.pieces)
-        return 0.5e-18 * np.array([np.sum(s.stiffness * s.rest_length**2) for s in springs])
+        # Each spring is listed twice.
+        return 0.25e-18 * np.array(
+            [np.einsum("i,i,i->", s.listed_stiffness, s.listed_length, s.listed_length) for s in springs]
+        )
 
     @cached_property
     def _mean_stiffness_force(self) -> FloatArray:
         """#P [N], the mean of k L."""
         springs = (net.spring_arrays for net in self.network.pieces)
-        return np.array([np.mean(s.stiffness * s.rest_length) for s in springs])
+        return np.array([dot(s.listed_stiffness, s.listed_length) / len(s.listed_length) for s in springs])
 
     # --- steps
 

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye
 
 from warpflat.cells import cells_of
 from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, spread_surface
+from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
+from warpflat.launching import launch_each
 from warpflat.network import SpringNetwork
-from warpflat.sums import products, weighted_rows
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 from warpflat.thinning import Transfer
@@ -24,6 +26,8 @@ IntArray = NDArray[np.int32]
 
 # A cell pressed to less than this share of its area is mended as if it were mirrored.
 _LEAST_AREA = 1e-6
+# By so much springs of coarser levels may be made weaker or stronger, to store what the finer ones do.
+_WEIGHTS = (0.1, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,28 +40,27 @@ class Rung:
 
 
 def _strain_fields(network: SpringNetwork, layout: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """#S, k L^2 of the springs, and 3 by #S, c^4, s^4 and c^2 s^2 of their directions: what each stores of uniform strains."""
-    s = network.spring_arrays
-    d = layout[s.ends[:, 1]] - layout[s.ends[:, 0]]
-    c2 = d[:, 0] ** 2 / np.maximum(np.einsum("ij,ij->i", d, d), 1e-300)
-    return s.stiffness * s.rest_length**2, np.stack([c2 * c2, (1.0 - c2) ** 2, c2 * (1.0 - c2)])
+    """3, and 3 by 3, sums over the springs: what they store of uniform strains, by their directions, and what each of three weights of
+    directions adds to that."""
+    s, count = network.spring_arrays, network.vertex_count
+    stored, products = np.empty((count, 3)), np.empty((count, 3, 3))
+    given = [layout, s.around.offset, s.around.neighbor, s.listed_length, s.listed_stiffness]
+    launch_each(sum_strain_fields, count, given, [stored, products])
+    return stored.sum(axis=0), products.sum(axis=0)
 
 
-def _calibrated(
-    network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray
-) -> SpringNetwork:
-    """The coarse network with its springs weighed by their directions, so that under uniform strains it stores what the fine one
-    does: edge springs on triangles store that only roughly, each mesh in its own way."""
+def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray) -> None:
+    """Weigh the springs of a coarse network by their directions, so that under uniform strains it stores what the fine one does: edge
+    springs on triangles store that only roughly, each mesh in its own way."""
     if network.model != "springs" or network.surface.is_quad.all():
-        return network
-    energy, fields = _strain_fields(fine, fine_layout)
-    wished = products(fields, energy[None])[:, 0]
-    energy, fields = _strain_fields(network, layout)
-    factor = np.linalg.lstsq(products(fields * energy, fields), wished, rcond=1e-6)[0].astype(np.float64)
-    s = network.spring_arrays
-    return replace(
-        network, spring_arrays=replace(s, stiffness=np.clip(weighted_rows(factor, fields), 0.1, 10.0) * s.stiffness)
-    )
+        return
+    wished, _ = _strain_fields(fine, fine_layout)
+    _, products = _strain_fields(network, layout)
+    factor = np.linalg.lstsq(products, wished, rcond=1e-6)[0]
+    s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
+    given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_WEIGHTS]
+    launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
+    network.make_springs(stiffness)
 
 
 def rungs_of(
@@ -135,7 +138,8 @@ def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *,
     if found is None:
         return None
     network, layout = found
-    return Rung(step=step, network=_calibrated(network, layout, fine, fine_layout), layout=layout)
+    _calibrate(network, layout, fine, fine_layout)
+    return Rung(step=step, network=network, layout=layout)
 
 
 def _network_below(

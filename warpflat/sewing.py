@@ -167,7 +167,7 @@ def sew(
     if folds:
         network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
     if len(ties):
-        hold = np.where(ties.soft, _SOFT, _STIFFNESS) * float(np.median(network.spring_arrays.stiffness))
+        hold = np.where(ties.soft, _SOFT, _STIFFNESS) * float(np.median(network.spring_arrays.listed_stiffness))
         network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
     # A piece with a guided line needs no other hold: the line cannot turn.
     upright = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]

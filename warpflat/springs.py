@@ -6,6 +6,7 @@ Each quad has four structural edges and two diagonals; a triangle has its edges 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -52,17 +53,16 @@ _ALIGNED = np.deg2rad(15.0)
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAround(ByVertex):
-    """The springs around each vertex, and for each entry the vertex at the far end, by which they are sorted."""
+    """The springs around each vertex, by their numbers, mesh edges first, and for each entry the vertex at the far end, by which they
+    are sorted."""
 
     neighbor: IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
 class _Unweighed:
-    """Of a surface's springs what no fabric changes: as in SpringArrays, and the rest lengths as they are listed around the vertices."""
+    """Of a surface's springs what no fabric changes, as in SpringArrays."""
 
-    ends: IntArray
-    rest_length: FloatArray
     edge_count: int
     around: SpringsAround
     listed_length: FloatArray
@@ -70,29 +70,61 @@ class _Unweighed:
 
 @dataclass(frozen=True, kw_only=True)
 class SpringArrays:
-    """The springs once each: `ends` #S by 2, `rest_length` #S [m], `stiffness` #S [N/m]; the first #E are the mesh edges. Which of them
-    are `around` each vertex. `lack` #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None
-    where there are none. Of a surface's own springs, what they share with those of other fabrics."""
+    """The springs as the kernels want them, each listed at both of its ends.
 
-    ends: IntArray
-    rest_length: FloatArray
-    stiffness: FloatArray
-    edge_count: int
+    Attributes:
+        around: which springs there are around each vertex.
+        listed_length, listed_stiffness: 2 #S, rest length [m] and stiffness [N/m] of each entry.
+        edge_count: #E; the first springs are the mesh edges.
+        lack: #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None where there are none.
+    """
+
     around: SpringsAround
+    listed_length: FloatArray
+    listed_stiffness: FloatArray
+    edge_count: int
     lack: FloatArray | None = None
-    own: _Unweighed | None = None
+
+    # Once each: lists are all that a relaxation needs, so these are made when they are asked for.
+
+    @property
+    def count(self) -> int:
+        """#S."""
+        return len(self.around.entry) // 2
+
+    @cached_property
+    def ends(self) -> IntArray:
+        """#S by 2, the lower vertex first."""
+        offset, neighbor = self.around.offset, self.around.neighbor
+        vertex = np.repeat(np.arange(len(offset) - 1, dtype=np.int32), np.diff(offset))
+        lower = vertex < neighbor
+        ends = np.empty((self.count, 2), dtype=np.int32)
+        ends[self.around.entry[lower]] = np.stack([vertex[lower], neighbor[lower]], axis=1)
+        return ends
+
+    @cached_property
+    def rest_length(self) -> FloatArray:
+        """#S [m]."""
+        return self._once(self.listed_length)
+
+    @cached_property
+    def stiffness(self) -> FloatArray:
+        """#S [N/m]."""
+        return self._once(self.listed_stiffness)
+
+    def _once(self, listed: FloatArray) -> FloatArray:
+        values = np.empty(self.count)
+        values[self.around.entry] = listed
+        return values
+
+    def listed(self, values: FloatArray) -> FloatArray:
+        """2 #S, the springs' values (#S) at both of their ends."""
+        return np.take(values, self.around.entry)
 
     @property
     def long_quads(self) -> int:
         """How many quads lack something in shear."""
         return 0 if self.lack is None else int(np.count_nonzero(self.lack.any(axis=1)))
-
-    @property
-    def listed_length(self) -> FloatArray:
-        """2 #S, the rest lengths as they are listed around the vertices [m]."""
-        if self.own is not None and self.own.rest_length is self.rest_length:
-            return self.own.listed_length
-        return np.take(self.rest_length, self.around.entry)
 
 
 def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
@@ -109,7 +141,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     warp, _ = grain_axes(grain_angle)
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
-    of_side, stiffness = np.empty(len(sides)), np.empty(len(own.ends))
+    of_side, stiffness = np.empty(len(sides)), np.empty(len(own.around.entry) // 2)
     position, lack = np.ascontiguousarray(positions, dtype=np.float64), None
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
@@ -126,13 +158,11 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
             lack[is_quad] = short
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
-        ends=own.ends,
-        rest_length=own.rest_length,
-        stiffness=stiffness,
-        edge_count=own.edge_count,
         around=own.around,
+        listed_length=own.listed_length,
+        listed_stiffness=np.take(stiffness, own.around.entry),
+        edge_count=own.edge_count,
         lack=lack,
-        own=own,
     )
 
 
@@ -184,35 +214,22 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 
 @once_per_surface
 def _unweighed(surface: Surface) -> _Unweighed:
-    vertices, edge_count = surface.vertices, len(half_edges_of(surface).edges)
+    vertices, edges, around = surface.vertices, half_edges_of(surface).edges, _springs_around(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
-    ends, around = _ends_of(surface)
-    rest_length = np.empty(len(ends))
-    rest_length[edge_count:] = diagonal.T.ravel()
-    launch_each(measure_edges, edge_count, [vertices, ends], [rest_length])
-    return read_only(
-        _Unweighed(
-            ends=ends,
-            rest_length=rest_length,
-            edge_count=edge_count,
-            around=around,
-            listed_length=np.take(rest_length, around.entry),
-        )
-    )
+    rest_length = np.empty(len(around.entry) // 2)
+    rest_length[len(edges) :] = diagonal.T.ravel()
+    launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])
+    return read_only(_Unweighed(edge_count=len(edges), around=around, listed_length=np.take(rest_length, around.entry)))
 
 
 @once_per_faces
-def _ends_of(surface: Surface) -> tuple[IntArray, SpringsAround]:
-    """#S by 2, the ends of the springs, edges first, then diagonals; and the springs around each vertex."""
+def _springs_around(surface: Surface) -> SpringsAround:
+    """The springs around each vertex, edges first, then diagonals."""
     corner = rows_of(surface.faces, surface.is_quad)
     ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
-    return ends, _springs_at(ends, len(surface.vertices))
-
-
-def _springs_at(ends: IntArray, count: int) -> SpringsAround:
-    end, offset = order_by(ends[:, ::-1].T.ravel(), count)
+    end, offset = order_by(ends[:, ::-1].T.ravel(), len(surface.vertices))
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
-    launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
+    launch_each(list_springs, len(surface.vertices), [offset, end, ends, len(ends)], [neighbor, spring])
     return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
 
 
@@ -238,7 +255,7 @@ def shortened(
     length = np.linalg.norm(d, axis=1)
     u = np.stack([d @ axes[0], d @ axes[1]], axis=1) / np.where(length > 0.0, length, 1.0)[:, None]
     worn = np.linalg.norm(u * 0.5 * (at_vertex[springs.ends[:, 0]] + at_vertex[springs.ends[:, 1]]), axis=1)
-    return replace(springs, rest_length=springs.rest_length / np.where(worn > 0.0, worn, 1.0))
+    return replace(springs, listed_length=springs.listed(springs.rest_length / np.where(worn > 0.0, worn, 1.0)))
 
 
 def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
@@ -253,8 +270,8 @@ def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
 def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
     """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
     side = springs_of_sides(springs, cells)
-    stiffness = np.bincount(side, weights.ravel(), minlength=len(springs.ends)).astype(np.float64)
-    return replace(springs, stiffness=stiffness, lack=None)
+    stiffness = np.bincount(side, weights.ravel(), minlength=springs.count).astype(np.float64)
+    return replace(springs, listed_stiffness=springs.listed(stiffness), lack=None)
 
 
 def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:
@@ -275,8 +292,8 @@ def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, w
     around, count = springs.around, len(surface.vertices)
     hold = np.empty(count)
     layout = np.ascontiguousarray(positions, dtype=np.float64)
-    lists = [around.offset, around.neighbor, around.entry]
-    given = [layout, *lists, springs.rest_length, springs.stiffness, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
+    lists = [around.offset, around.neighbor, springs.listed_length, springs.listed_stiffness]
+    given = [layout, *lists, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
     launch_each(measure_hold, count, given, [hold])
     hold[surface.faces[is_quad].ravel()] = np.inf
     return _HOLD_SHARE * float(np.partition(hold, count // 4)[count // 4])
