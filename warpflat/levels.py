@@ -69,7 +69,8 @@ class _Way:
     Attributes:
         coarse: the coarser level.
         down: its vertices go where they are on the finer one. load: it gets the finer one's residual forces.
-        differ: how far it has come from `base`, #V of the finer level. up: that, as `correction` of the finer level.
+        differ: how far it has come from `base`, #V of the finer level. up: that, as `correction` of the finer level, which is there until
+            forces are evaluated on that.
         carry: its layout, as that of the finer level.
         steps: of each piece its step down.
     """
@@ -182,8 +183,8 @@ class Levels:
         kept = wp.array(ids, dtype=wp.int32, device=device)
         prolongation = _weights([step.prolongation for step in steps], device)
         restriction = _weights([step.transfer.restriction for step in steps], device)
-        base, correction = (wp.zeros(n, dtype=wp.vec2d, device=device) for _ in range(2))
-        difference = wp.zeros(c, dtype=wp.vec2d, device=device)
+        base, correction = wp.empty(n, dtype=wp.vec2d, device=device), fine.spare
+        difference = wp.empty(c, dtype=wp.vec2d, device=device)
         return _Way(
             coarse=coarse,
             down=record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device),
@@ -304,6 +305,7 @@ class Levels:
             share = 0.5 * share if share > _LEAST_SHARE else 0.0
             if turned.any():
                 self._count(level, FORCE_WORK)
+                way.up.launch()
 
     @staticmethod
     def _carry_correction(state: Relaxation, way: _Way) -> None:
@@ -328,6 +330,7 @@ class Levels:
         Returns:
             #P, their energy where they are [J].
         """
+        # Energies are measured on the way, but no forces: those would overwrite what is spare.
         state, share, energy = self._levels[level].state, most, before
         while which.any():
             state.move(base, by, share, which)
@@ -356,19 +359,16 @@ class Levels:
     def _leap(self, level: int, memories: Sequence[CycleMemory], energy: FloatArray) -> FloatArray:
         """The same on any level; returns #P, the energy where that leads to [J]."""
         state, between = self._levels[level].state, self._levels[level].way
-        by, leapt = np.zeros((state.network.vertex_count, 2)), np.zeros(len(memories), dtype=bool)
-        for piece, (memory, own) in enumerate(zip(memories, state.vertices, strict=True)):
-            way = memory.lowest()
-            if way is not None:
-                by[own], leapt[piece] = way, True
-        if between is None:
-            base, way_on = wp.empty_like(state.position), wp.empty_like(state.position)
-        else:
-            # The cycle is over, and needs its own no more.
-            base, way_on = between.base, between.correction
+        ways = [memory.lowest() for memory in memories]
+        leapt = np.array([way is not None for way in ways])
+        by = [
+            np.zeros((own.stop - own.start, 2)) if w is None else w for w, own in zip(ways, state.vertices, strict=True)
+        ]
+        state.spare.assign(by[0] if len(by) == 1 else np.concatenate(by))
+        # The cycle is over, and needs its own no more.
+        base = wp.empty_like(state.position) if between is None else between.base
         wp.copy(base, state.position)
-        way_on.assign(by)
-        return self._go(level, base, way_on, energy, leapt, least=_LEAST_OF_LEAP)
+        return self._go(level, base, state.spare, energy, leapt, least=_LEAST_OF_LEAP)
 
     def follow(self) -> None:
         """Let the matrices of a membrane's steps bound its stiffness in the present layouts."""

@@ -108,7 +108,7 @@ class Relaxation:
             nothing else says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to
             the plane.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
-            constant forces [N]. On the network's device.
+            constant forces [N]. spare: #V vec2d, for anybody, until forces are evaluated. On the network's device.
         steps: taken. work_units: all work, in steps of this mesh; those of coarser levels count by their vertices.
         vertices: of each piece, its vertices.
         numbers: of each piece, which it was before others left.
@@ -127,6 +127,7 @@ class Relaxation:
         self._buffers = buffers = StepBuffers(self.network, self.options.time_step, start)
         self.position, self.velocity = buffers.position, buffers.velocity
         self.force, self.load = buffers.force, buffers.load
+        self.spare = buffers.first_guess
         pieces = self.network.pieces
         self._vertex_begin = begins([net.vertex_count for net in pieces])
         self._face_begin = begins([net.face_count for net in pieces])

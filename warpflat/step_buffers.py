@@ -35,7 +35,8 @@ class StepBuffers:
             forces [N].
         guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
-        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, half of what each spring around pulls with [N].
+        vertex_energy, face_energy: #V and #F, as last measured [J]; the former where `power` is: each is read as soon as it is
+            written. vertex_pull: #V, half of what each spring around pulls with [N].
         evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
             none. advance: the places after them. stop: of each piece, the velocities. measure, measure_springs, measure_motion: energies.
     """
@@ -65,7 +66,7 @@ class StepBuffers:
         self.seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
-        self.vertex_energy = wp.zeros(n, dtype=wp.float64, device=device)
+        self.vertex_energy = self.power
         self.vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
         self.face_energy = wp.zeros(f, dtype=wp.float64, device=device)
         self._views: dict[int, NDArray[Any]] = {}

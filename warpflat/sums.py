@@ -39,8 +39,9 @@ def products(a: Rows, b: Rows) -> FloatArray:
 
 
 def weighted_rows(weight: FloatArray, rows: Rows) -> FloatArray:
-    """#N, the sum of rows (#A by #N), each times its weight (#A)."""
-    total = weight[0] * rows[0]
-    for k in range(1, len(rows)):
-        total += weight[k] * rows[k]
-    return np.asarray(total)
+    """#N, the sum of rows (#A by #N), each times its weight (#A), in double precision."""
+    total = np.empty(len(rows[0]))
+    for begin in range(0, len(total), _GATHERED):
+        here = slice(begin, begin + _GATHERED)
+        total[here] = sum(w * row[here].astype(np.float64) for w, row in zip(weight, rows, strict=True))
+    return total
