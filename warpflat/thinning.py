@@ -33,7 +33,7 @@ BoolArray = NDArray[np.bool_]
 
 # A grid of fewer rows or columns has no coarser one.
 _LEAST_LINES = 5
-# Quads across the narrowest strip of a coarser lattice: a single one bends several times as stiffly as its cloth.
+# Quads that are left across a strip between two lines in which the border turns: a single one bends several times as stiffly as its cloth.
 _LEAST_QUADS = 2
 # Rows this many times as far apart as columns all stay, and columns as rows.
 _MUCH = 2.5
@@ -241,12 +241,8 @@ def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
 
 
 def _every_other(lattice: Lattice) -> Thinned | None:
-    """Every second row and column between those in which the border turns, which all stay; None where too little would go, or a
-    strip between two of them would be a single quad wide, which bends several times as stiffly as its cloth."""
+    """Every second row and column between those in which the border turns, which all stay; None where too little would go."""
     keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
-    for line, lines in zip((lattice.row, lattice.column), keep, strict=True):
-        if np.diff(np.searchsorted(lines, np.unique(line[lattice.bends]))).min() < _LEAST_QUADS:
-            return None
     places = lattice.face_row, lattice.face_column
     block_row, block_column = (
         np.searchsorted(lines, place, side="right") - 1 for lines, place in zip(keep, places, strict=True)
@@ -282,10 +278,13 @@ def _every_other(lattice: Lattice) -> Thinned | None:
 
 
 def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
-    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second."""
-    fixed = np.unique(line[bends])
-    between = [begin + _second(end - begin + 1) for begin, end in pairwise(fixed.tolist())]
-    return np.unique(np.concatenate([fixed, *between])).astype(np.int32)
+    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second, but for
+    strips that are as narrow as may be."""
+    strips = []
+    for begin, end in pairwise(np.unique(line[bends]).tolist()):
+        lines = _second(end - begin + 1)
+        strips.append(begin + (lines if len(lines) > _LEAST_QUADS else np.arange(end - begin + 1, dtype=np.int32)))
+    return np.unique(np.concatenate(strips)).astype(np.int32)
 
 
 def _between_corners(

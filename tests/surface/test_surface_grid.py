@@ -196,11 +196,26 @@ def test_nothing_is_carried_across_a_crack() -> None:
     np.testing.assert_allclose(carried[right & (y < 0.06)], 1.0, atol=1e-12)
 
 
-def test_strips_of_a_single_quad_are_left_to_triangles() -> None:
-    """A crack three columns from the border: a coarser lattice would bend several times as stiffly there."""
+def test_a_narrow_strip_keeps_its_lines_and_the_rest_is_thinned() -> None:
+    """A crack three columns from the border: with a single quad between them a coarser lattice would bend too stiffly there."""
     surface = piece(np.ones((20, 24), dtype=bool), crack=[(row, 3) for row in range(13)])
     step = coarser(surface)
     assert step is not None
-    assert not step.surface.is_quad.any()
-    four = coarser_surfaces(piece(np.ones((20, 24), dtype=bool), crack=[(row, 4) for row in range(13)]))
-    assert [level.surface.is_quad.all() for level in four[:2]] == [True, False]
+    x, y = (np.unique(np.rint(100.0 * step.surface.vertices[:, k])) for k in range(2))
+    np.testing.assert_array_equal(x, [0, 1, 2, 3, *range(6, 25, 2)])
+    np.testing.assert_array_equal(y, range(0, 21, 2))
+
+
+def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level() -> None:
+    """Neck, shoulder and armhole of a bodice are steps in its border, a few quads from one another."""
+    solid = np.ones((90, 40), dtype=bool)
+    solid[76:, :6] = solid[76:, 34:] = False
+    solid[86:, 16:24] = False
+    steps = coarser_surfaces(piece(solid))
+    assert len(steps) >= 3
+    for step in steps:
+        assert step.surface.is_quad.all()
+        lattice = lattice_of(step.surface)
+        assert lattice is not None
+        for line in (lattice.row, lattice.column):
+            assert np.diff(np.unique(line[lattice.bends])).min() >= 2
