@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
+from warpflat import flatten_all, levels
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
@@ -323,3 +325,50 @@ def test_a_work_limit_is_reported_not_hidden():
     piece = flatten(make_shape("dome", resolution=33), fabric=cloth(20.0), datum="centre", device="cpu", relax=options)
     assert not piece.converged
     assert piece.measures["stages"][-1]["converged"] is False
+
+
+@pytest.mark.parametrize("kind", ["grid", "crack", "bodice"])
+def test_steps_along_lines_bring_soft_cloth_to_the_same_minimum_in_less_work(kind: str, monkeypatch):
+    """Where the cloth is K/G = 80 times as stiff along its threads as in shear."""
+    surface, datum = make_shape("bodice" if kind == "bodice" else "dome", resolution=41), "centre"
+    exact = RelaxOptions(residual_tolerance=1e-4, energy_tolerance=1e-8)
+    done = []
+    for softest in (levels._SOFT, math.inf):
+        monkeypatch.setattr(levels, "_SOFT", softest)
+        piece = flatten(surface, fabric=cloth(1000.0 / 80.0), datum=datum, device="cpu", relax=exact)
+        if kind == "crack":
+            path = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:21, 12]
+            piece = cut(piece, CutPlan(name="dart", paths=(path,)), relax=exact)
+        assert piece.converged
+        assert piece.flipped_faces == 0
+        done.append((minimum(piece), piece.stages[-1].work_units))
+    (here, work), (there, before) = done
+    assert here == pytest.approx(there, rel=1e-5)
+    assert work < 0.75 * before
+
+
+@pytest.mark.parametrize("shear", [100.0, 10.0, 2.0])
+def test_a_step_along_lines_never_raises_the_energy_and_mirrors_nothing(shear: float):
+    surface = make_shape("bodice", resolution=33)
+    piece = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
+    made = Levels(state, mend=True)
+    rng = np.random.default_rng(5)
+    for strained in (1.0, 0.98, 1.03):
+        state.position.assign(strained * piece.development.positions + rng.normal(scale=1e-4, size=(33 * 33, 2)))
+        for _ in range(12):
+            before = state.energies().potential
+            (after,) = made._step_along_lines(0)
+            assert after <= before
+            assert after == pytest.approx(state.energies().potential)
+        state.evaluate_at_rest()
+        assert not state.mirrored_pieces().any()
+
+
+def test_pieces_with_and_without_lines_are_relaxed_side_by_side():
+    surfaces = [make_shape("dome", resolution=33), make_shape("dome", resolution=33, triangles=True)]
+    given = {"fabric": cloth(1000.0 / 60.0), "device": "cpu", "relax": RelaxOptions(residual_tolerance=1e-3)}
+    together = flatten_all(surfaces, datum="centre", **given)
+    for piece, surface in zip(together, surfaces, strict=True):
+        assert piece.converged
+        assert minimum(piece) == pytest.approx(minimum(flatten(surface, datum="centre", **given)), rel=1e-4)

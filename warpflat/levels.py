@@ -57,8 +57,11 @@ _LEAST_OF_LEAP = 0.2
 # that in between cells would come far beyond, and raise the energy.
 _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
-# In units of a step: evaluating the forces, evaluating the energy.
+# K/G from which two of the steps on a lattice are one along its lines.
+_SOFT = 8.0
+# In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
+LINE_WORK = 2.0
 ENERGY_WORK = 0.5
 
 
@@ -88,10 +91,13 @@ class _Way:
 
 @dataclass
 class _Level:
-    """A level, and its way down, but for the coarsest."""
+    """A level, and its way down, but for the coarsest; whether the last of the steps that smooth goes along lines, and how many there are
+    before that."""
 
     state: Relaxation
     way: _Way | None = None
+    lines: bool = False
+    steps: int = _STEPS
 
 
 def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
@@ -139,8 +145,7 @@ class Levels:
     ) -> None:
         self._ladders, self._mend = ladders, mend
         self._lattice = all(rungs[0].step.smooth_carry is not None for rungs in ladders if rungs)
-        self._steps = _STEPS_SMOOTH if self._lattice or not mend else _STEPS
-        self._levels = [_Level(finest)]
+        self._levels = [_Level(finest, steps=_STEPS_SMOOTH if self._lattice or not mend else _STEPS)]
         self.leading: dict[Surface, Rung] = {}
         self._watch_every = _watch_every(finest.network)
         self._memories: Sequence[CycleMemory] = ()
@@ -149,13 +154,18 @@ class Levels:
         for rungs in zip(*ladders, strict=True):
             networks = [rung.network for rung in rungs]
             coarse = ready.get(tuple(map(id, networks)))
-            if coarse is None:
+            if coarse is not None:
+                coarse.steps = _STEPS
+            else:
                 start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
                 coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start))
             fine = self._levels[-1]
             if fine.way is None:
                 fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
             self._levels.append(coarse)
+        if finest.network.model == "springs" and softness(finest.network.fabric) >= _SOFT:
+            for level in self._levels:
+                _smooth_along_lines(level)
         self.follow()
 
     def keep(self, finest: Relaxation, pieces: Sequence[int]) -> Levels:
@@ -209,12 +219,33 @@ class Levels:
         finest = self._levels[0].state
         finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
 
-    def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> None:
-        """Some steps from rest; `evaluated` says that the forces there have just been evaluated."""
-        state, steps = self._levels[level].state, _STEPS if level else self._steps
+    def smooth(
+        self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False
+    ) -> FloatArray | None:
+        """Some steps from rest; `evaluated` says that the forces there have just been evaluated. In a soft cloth on a lattice the last goes
+        along its lines; then it returns #P, the energy that it has led to [J]."""
+        state, steps = self._levels[level].state, self._levels[level].steps
         state.velocity.zero_()
         state.sweep(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
         self._count(level, steps)
+        if not self._levels[level].lines:
+            return None
+        energy = self._step_along_lines(level)
+        if each_step is not None:
+            each_step()
+        return energy
+
+    def _step_along_lines(self, level: int) -> FloatArray:
+        """One step along the lines, or a half, a quarter ... of it, so that the energy is not higher; returns that, #P [J]."""
+        state, before = self._levels[level].state, self._objective(level)
+        state.step_along_lines()
+        self._count(level, LINE_WORK)
+        energy = self._objective(level)
+        higher = ~(energy <= before)
+        if higher.any():
+            state.spare.assign(state.positions() - state.anchor.numpy())
+            energy = np.where(higher, self._go(level, state.anchor, state.spare, before, higher, most=0.5), energy)
+        return energy
 
     def _settle(self, share: float, little: float = 0.0) -> FloatArray:
         """Relax the coarsest level until the forces of each piece have come down to a share of what they were, or steps take no more
@@ -229,12 +260,13 @@ class Levels:
 
         aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
         first = before = now = self._objective(last)
-        leaping = self._lattice or not little
+        leaping, lines = self._lattice or not little, self._levels[last].lines
+        steps = self._levels[last].steps if lines else _BOTTOM_STEPS
         _begin(state, memories, _all_forces(state))
         for number in range(1, 1 + math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
-            state.sweep(_BOTTOM_STEPS, watch_every=self._watch_every)
-            self._count(last, _BOTTOM_STEPS)
-            now = self._objective(last)
+            state.sweep(steps, watch_every=self._watch_every)
+            self._count(last, steps)
+            now = self._step_along_lines(last) if lines else self._objective(last)
             if leaping and number % _LEAP_EVERY == 0 and np.isfinite(now).all():
                 state.evaluate_at_rest()
                 _come_to(state, memories, _all_forces(state))
@@ -263,7 +295,7 @@ class Levels:
         state, way = self._levels[level].state, self._levels[level].way
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
-        self.smooth(level, each_step, evaluated=level == 0)
+        smoothed = self.smooth(level, each_step, evaluated=level == 0)
         if level == 0:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
@@ -277,16 +309,16 @@ class Levels:
         mirrored = way.coarse.mirrored_pieces()
         self.stale = self.stale or bool(mirrored.any())
         if mirrored.all():
-            self.smooth(level, each_step)
-            return self._objective(level)
+            smoothed = self.smooth(level, each_step)
+            return self._objective(level) if smoothed is None else smoothed
         way.load.launch()
         self.cycle(level + 1)
-        before = self._objective(level)
+        before = self._objective(level) if smoothed is None else smoothed
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, _mark(state))
-        self.smooth(level, each_step, evaluated=True)
-        energy = self._objective(level)
+        smoothed = self.smooth(level, each_step, evaluated=True)
+        energy = self._objective(level) if smoothed is None else smoothed
         higher = ~(energy <= before)
         if higher.any():
             way.correction.assign(state.positions() - way.base.numpy())
@@ -470,6 +502,14 @@ def carry_up(state: Relaxation) -> Levels | None:
     wp.copy(state.load, load)
     state.last = before
     return None
+
+
+def _smooth_along_lines(level: _Level) -> None:
+    """Let the last steps go along lines, where there are any; two less, if these are everywhere."""
+    network = level.state.network
+    level.lines = network.line_arrays is not None
+    if all(piece.line_arrays is not None for piece in network.pieces):
+        level.steps = _STEPS_SMOOTH
 
 
 def _begin(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> None:

@@ -28,6 +28,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 import warp as wp
@@ -41,11 +42,13 @@ from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_m
 from warpflat.kernels.seams import Seams
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
+from warpflat.kernels.thread_lines import ThreadLines
 from warpflat.launching import launch_each
 from warpflat.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.springs import SpringArrays, shear_hold, shortened, springs_of, with_stiffness
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import order_by
+from warpflat.thread_lines import LineArrays, join_lines, lines_of
 
 __all__ = ["SpringNetwork"]
 
@@ -239,6 +242,25 @@ class SpringNetwork:
     def seam_count(self) -> int:
         """#P, pairs of edges that are sewn together."""
         return 0 if self.seams is None else len(self.seams.ends)
+
+    @cached_property
+    def line_arrays(self) -> LineArrays | None:
+        """The rows and columns of the pieces that lie on a lattice, along which steps may go; None where none does."""
+        if not self.parts:
+            return lines_of(self.surface)
+        return join_lines([net.line_arrays for net in self.parts], [net.vertex_count for net in self.parts])
+
+    @cached_property
+    def lines(self) -> ThreadLines | None:
+        """The same on the device."""
+        arrays = self.line_arrays
+        if arrays is None:
+            return None
+        lines = ThreadLines()
+        lines.offset = _on(self.device, arrays.offset, wp.int32)
+        lines.vertex = _on(self.device, arrays.vertex, wp.int32)
+        lines.rows = arrays.rows
+        return lines
 
     def sew(
         self,

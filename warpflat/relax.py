@@ -108,7 +108,8 @@ class Relaxation:
             nothing else says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to
             the plane.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
-            constant forces [N]. spare: #V vec2d, for anybody, until forces are evaluated. On the network's device.
+            constant forces [N]. anchor: #V vec2d, where all cells were last looked at [m]. spare: #V vec2d, for anybody, until
+            forces are evaluated. On the network's device.
         steps: taken. work_units: all work, in steps of this mesh; those of coarser levels count by their vertices.
         vertices: of each piece, its vertices.
         numbers: of each piece, which it was before others left.
@@ -127,7 +128,7 @@ class Relaxation:
         self._buffers = buffers = StepBuffers(self.network, self.options.time_step, start)
         self.position, self.velocity = buffers.position, buffers.velocity
         self.force, self.load = buffers.force, buffers.load
-        self.spare = buffers.first_guess
+        self.anchor, self.spare = buffers.anchor, buffers.first_guess
         pieces = self.network.pieces
         self._vertex_begin = begins([net.vertex_count for net in pieces])
         self._face_begin = begins([net.face_count for net in pieces])
@@ -204,6 +205,12 @@ class Relaxation:
         """The forces of the present layout; velocities become zero."""
         self.velocity.zero_()
         self._buffers.evaluate.launch()
+
+    def step_along_lines(self) -> None:
+        """One step along the rows and columns of pieces on a lattice, all vertices of a line at once; velocities become zero."""
+        self.evaluate_at_rest()
+        if self._buffers.along_lines is not None:
+            self._buffers.along_lines.launch()
 
     def mirrored_pieces(self) -> BoolArray:
         """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""

@@ -18,6 +18,7 @@ from warpflat.joined import begins
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy
+from warpflat.kernels.thread_lines import go_along_lines, solve_lines
 from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.network import SpringNetwork
@@ -25,6 +26,9 @@ from warpflat.network import SpringNetwork
 __all__ = ["StepBuffers"]
 
 FloatArray = NDArray[np.float64]
+
+# So many lines of a lattice are worth a thread of their own: they have about as many vertices each.
+_LEAST_LINES = 64
 
 
 class StepBuffers:
@@ -38,7 +42,9 @@ class StepBuffers:
         vertex_energy, face_energy: #V and #F, as last measured [J]; the former where `power` is: each is read as soon as it is
             written. vertex_pull: #V, half of what each spring around pulls with [N].
         evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
-            none. advance: the places after them. stop: of each piece, the velocities. measure, measure_springs, measure_motion: energies.
+            none. advance: the places after them. along_lines: the places after a step along the lines of a lattice, once forces have been
+            evaluated; its ways take the place of `first_guess` and `driving_force`. stop: of each piece, the velocities. measure,
+            measure_springs, measure_motion: energies.
     """
 
     def __init__(self, network: SpringNetwork, time_step: float, start: FloatArray) -> None:
@@ -188,6 +194,41 @@ class StepBuffers:
             outputs=[self.position, self.velocity],
             device=net.device,
         )
+
+    @cached_property
+    def along_lines(self) -> LaunchSequence | None:
+        """None of a network without lines."""
+        net = self.network
+        if net.lines is None:
+            return None
+        ways = [self.first_guess, self.driving_force]
+        solve = record(
+            solve_lines,
+            dim=len(net.lines.offset) - 1,
+            inputs=[
+                self.position,
+                self.force,
+                net.mass,
+                net.springs,
+                net.cells,
+                self.face_acting,
+                self.face_stiffness,
+                self.guarded,
+                net.lines,
+                self.time_step,
+            ],
+            outputs=ways,
+            device=net.device,
+            least=_LEAST_LINES,
+        )
+        go = record(
+            go_along_lines,
+            dim=net.vertex_count,
+            inputs=[*ways, self.reach, net.bonds.freedom],
+            outputs=[self.position],
+            device=net.device,
+        )
+        return LaunchSequence([solve, go])
 
     @cached_property
     def _pieces(self) -> list[slice]:

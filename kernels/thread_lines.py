@@ -1,0 +1,181 @@
+"""Steps along the threads of a lattice: all vertices of a row, or of a column, at once.
+
+A soft cloth is K/G times as stiff along its threads as in shear. A step by single vertices then leaves what shears from one row to
+the next, since each vertex is held along its row by its neighbours there, which would have gone along. Here each row goes
+where its springs balance the forces along it, and what else holds it, vertex by vertex (line relaxation): a system with three
+diagonals.
+"""
+
+import warp as wp
+
+from .cells import Cells
+from .springs import Springs
+
+wp.set_module_options({"enable_backward": False})
+
+# Of what the guard's cells hold at a vertex alone, this share is left where its neighbours on the line go along; with them the
+# guard makes a thread once more as stiff as its springs.
+GUARD_LEFT = wp.constant(wp.float64(0.03125))
+
+
+@wp.struct
+class ThreadLines:
+    """The vertices of a lattice, line by line: each is in one row and in one column.
+
+    offset: #L+1, where the vertices of each line begin. vertex: 2 #V, in their order along the lines. rows: how many of the lines are rows;
+    they come first.
+    """
+
+    offset: wp.array(dtype=wp.int32)
+    vertex: wp.array(dtype=wp.int32)
+    rows: int
+
+
+@wp.func
+def line_direction(position: wp.array(dtype=wp.vec2d), lines: ThreadLines, e: int, begin: int, end: int):
+    """Unit vector along a line at its entry e, zero where it has no length."""
+    before = lines.vertex[wp.max(e - 1, begin)]
+    after = lines.vertex[wp.min(e + 1, end - 1)]
+    return wp.normalize(position[after] - position[before])
+
+
+@wp.func
+def held_across(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64, along: wp.vec2d):
+    """Stiffness of a spring against motion of one end along a unit vector, where that is positive [N/m]; d: the vector to its far end."""
+    length = wp.max(wp.length(d), wp.float64(1.0e-300))
+    c = wp.dot(d, along) / length
+    taut = wp.max(wp.float64(1.0) - rest_length / length, wp.float64(0.0))
+    return stiffness * (c * c + taut * (wp.float64(1.0) - c * c))
+
+
+@wp.func
+def solve_line(
+    line: int,
+    position: wp.array(dtype=wp.vec2d),
+    force: wp.array(dtype=wp.vec2d),
+    mass: wp.array(dtype=wp.float64),
+    springs: Springs,
+    cells: Cells,
+    face_acting: wp.array(dtype=wp.int32),
+    face_stiffness: wp.array(dtype=wp.float64),
+    guarded: wp.array(dtype=wp.int32),
+    lines: ThreadLines,
+    time_step: wp.float64,
+    way: wp.array(dtype=wp.vec2d),
+):
+    """way: #V, of the vertices on the line where each goes [m]."""
+    begin = lines.offset[line]
+    end = lines.offset[line + 1]
+    k_before = wp.float64(0.0)
+    passed = wp.float64(0.0)
+    pushed = wp.float64(0.0)
+    for e in range(begin, end):
+        i = lines.vertex[e]
+        before = int(-1)
+        after = int(-1)
+        if e > begin:
+            before = lines.vertex[e - 1]
+        if e + 1 < end:
+            after = lines.vertex[e + 1]
+        along = line_direction(position, lines, e, begin, end)
+        k_after = wp.float64(0.0)
+        held = mass[i] / (time_step * time_step)
+        for s in range(springs.offset[i], springs.offset[i + 1]):
+            j = springs.neighbor[s]
+            if j == after:
+                k_after = springs.stiffness[s]
+            elif j != before:
+                held += held_across(position[j] - position[i], springs.rest_length[s], springs.stiffness[s], along)
+        if guarded[i] != 0:
+            for c in range(cells.offset[i], cells.offset[i + 1]):
+                slot = cells.slot[c]
+                if face_acting[slot / 4] != 0:
+                    held += GUARD_LEFT * face_stiffness[slot]
+            if after >= 0 and guarded[wp.max(after, 0)] != 0:
+                k_after = wp.float64(2.0) * k_after
+        # Elimination from the first vertex on: here = pushed + passed * there.
+        rest = wp.max(held + k_before * (wp.float64(1.0) - passed) + k_after, wp.float64(1.0e-300))
+        pushed = (wp.dot(force[i], along) + k_before * pushed) / rest
+        passed = k_after / rest
+        way[i] = wp.vec2d(pushed, passed)
+        k_before = k_after
+    gone = wp.float64(0.0)
+    for back in range(end - begin):
+        e = end - 1 - back
+        i = lines.vertex[e]
+        gone = way[i][0] + way[i][1] * gone
+        way[i] = gone * line_direction(position, lines, e, begin, end)
+
+
+@wp.kernel
+def solve_lines(
+    position: wp.array(dtype=wp.vec2d),
+    force: wp.array(dtype=wp.vec2d),
+    mass: wp.array(dtype=wp.float64),
+    springs: Springs,
+    cells: Cells,
+    face_acting: wp.array(dtype=wp.int32),
+    face_stiffness: wp.array(dtype=wp.float64),
+    guarded: wp.array(dtype=wp.int32),
+    lines: ThreadLines,
+    time_step: wp.float64,
+    first: int,
+    # outputs
+    along_rows: wp.array(dtype=wp.vec2d),
+    along_columns: wp.array(dtype=wp.vec2d),
+):
+    """Where the vertices go along their row and along their column [m], both #V: all of a line at once, so that what its springs and what
+    else holds its vertices balance the forces along it.
+
+    position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at these positions.
+    """
+    line = wp.tid() + first
+    if line < lines.rows:
+        solve_line(
+            line,
+            position,
+            force,
+            mass,
+            springs,
+            cells,
+            face_acting,
+            face_stiffness,
+            guarded,
+            lines,
+            time_step,
+            along_rows,
+        )
+    else:
+        solve_line(
+            line,
+            position,
+            force,
+            mass,
+            springs,
+            cells,
+            face_acting,
+            face_stiffness,
+            guarded,
+            lines,
+            time_step,
+            along_columns,
+        )
+
+
+@wp.kernel
+def go_along_lines(
+    along_rows: wp.array(dtype=wp.vec2d),
+    along_columns: wp.array(dtype=wp.vec2d),
+    reach: wp.array(dtype=wp.float64),
+    freedom: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    position: wp.array(dtype=wp.vec2d),
+):
+    """Both ways one after the other, where a vertex is free to go, and no further than its reach [m]. All #V."""
+    i = wp.tid() + first
+    way = wp.cw_mul(along_rows[i] + along_columns[i], freedom[i])
+    length = wp.length(way)
+    if length > reach[i]:
+        way = way * (reach[i] / length)
+    position[i] = position[i] + way
