@@ -13,7 +13,8 @@ from warpflat import flatten_all, levels
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
-from warpflat.levels import Levels, carry_up
+from warpflat.large_start import carry_up
+from warpflat.levels import Levels
 from warpflat.looks import Outcome
 from warpflat.multilevel import relax_multilevel
 from warpflat.network import SpringNetwork

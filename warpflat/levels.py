@@ -1,7 +1,6 @@
 """The levels of a relaxation: a piece's coarser meshes as spring networks of their own, and cycles over them.
 
-`warpflat.multilevel` says what a cycle is; here are its parts, and the ways to start: `Levels.rise`, level by level, and `carry_up`, for
-large grids, at once.
+`warpflat.multilevel` says what a cycle is; here are its parts, and `Levels.rise`, the start level by level.
 """
 
 from __future__ import annotations
@@ -23,11 +22,11 @@ from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, i
 from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
-from warpflat.rungs import Rung, far_below, rungs_of, stay
+from warpflat.rungs import Rung, rungs_of, stay
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
-__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "carry_up", "softness"]
+__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "softness"]
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -43,9 +42,6 @@ _AT_REST = 0.05
 _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 _LITTLE_GAIN = 0.07
-# Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
-# of a per cent.
-_CYCLED = 5_000
 # Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
 # straight lines, whose kinks they have to smooth first.
 _STEPS = 4
@@ -454,54 +450,6 @@ class Levels:
             state.position.assign(layout)
             self._carry_correction(state, way)
             self._go(level, way.base, way.correction, energy, ~lower)
-
-
-def carry_up(state: Relaxation) -> Levels | None:
-    """Start pieces that are large lattices where a small one of theirs has come to rest; the others where their own levels lead.
-
-    Nothing is made or evaluated of the levels in between. The state is looked at in the end.
-
-    Returns:
-        The levels of what was relaxed; None where no piece is such a lattice, or one would not be lower than it lies: then
-        all are where they were.
-    """
-    pieces, layout = state.network.pieces, state.positions()
-    below = [
-        far_below(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
-        for net, own in zip(pieces, state.vertices, strict=True)
-    ]
-    if not any(below):
-        return None
-    before = state.last
-    networks = [net if way is None else way.network for net, way in zip(pieces, below, strict=True)]
-    start = [layout[own] if way is None else way.layout for own, way in zip(state.vertices, below, strict=True)]
-    coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
-    levels = Levels(coarse, mend=True)
-    levels.rise()
-    coarse.evaluate_at_rest()
-    coarse.work_units += FORCE_WORK
-    levels.cycle(0)
-    state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
-    carried, relaxed = layout.copy(), coarse.positions()
-    for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
-        up = relaxed[of]
-        if way is not None:
-            if way.rung is not None:
-                levels.leading[way.rung.step.surface] = way.rung
-            for carry in way.carries:
-                up = carry(up)
-        carried[own] = up
-    load = wp.clone(state.load)
-    state.position.assign(carried)
-    state.hold_upright()
-    state.work_units += ENERGY_WORK
-    if (state.begin().potential < before.potential).all():
-        return levels
-    state.position.assign(layout)
-    state.velocity.zero_()
-    wp.copy(state.load, load)
-    state.last = before
-    return None
 
 
 def _smooth_along_lines(level: _Level) -> None:

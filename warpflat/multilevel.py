@@ -30,7 +30,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.cycle_memory import CycleMemory
-from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels, carry_up, softness
+from warpflat.large_start import carry_up
+from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels, softness
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, Watch, relax
