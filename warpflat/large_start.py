@@ -6,7 +6,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.joined import join_networks
-from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels
+from warpflat.levels import ENERGY_WORK, Levels
 from warpflat.relax import Relaxation
 from warpflat.rungs import far_below
 
@@ -38,10 +38,7 @@ def carry_up(state: Relaxation) -> Levels | None:
     start = [layout[own] if way is None else way.layout for own, way in zip(state.vertices, below, strict=True)]
     coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
     levels = Levels(coarse, mend=True)
-    levels.rise()
-    coarse.evaluate_at_rest()
-    coarse.work_units += FORCE_WORK
-    levels.cycle(0)
+    levels.start()
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
     carried, relaxed = layout.copy(), coarse.positions()
     for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):

@@ -55,6 +55,7 @@ _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
 # K/G from which two of the steps on a lattice are one along its lines.
 _SOFT = 8.0
+_CYCLES_ALONG_LINES = 2
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
 LINE_WORK = 2.0
@@ -417,6 +418,21 @@ class Levels:
             sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
             if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
                 self.cycle(number)
+
+    def start(self) -> None:
+        """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: they take far more off each,
+        and what is left in such a cloth is more."""
+        self.rise()
+        finest = self._levels[0]
+        memories = [CycleMemory() for _ in self._ladders]
+        for _ in range(_CYCLES_ALONG_LINES if finest.lines else 1):
+            finest.state.evaluate_at_rest()
+            self._count(0, FORCE_WORK)
+            if not finest.lines:
+                self.cycle(0)
+                continue
+            self.remember(memories)
+            self.leap(self.cycle(0))
 
     def _rise_to(self, level: int) -> None:
         """Start a level where the coarser one ended, or else moved as far as it went: the former is smoother, the latter keeps
