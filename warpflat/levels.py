@@ -420,8 +420,8 @@ class Levels:
                 self.cycle(number)
 
     def start(self) -> None:
-        """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: they take far more off each,
-        and what is left in such a cloth is more."""
+        """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: in such a cloth more is
+        left, and cycles take more of it away."""
         self.rise()
         finest = self._levels[0]
         memories = [CycleMemory() for _ in self._ladders]
