@@ -1,0 +1,93 @@
+"""Work and time of relaxations in the library's fabrics, soft in shear as cloth is: dome and bodice, and the pieces of forms.
+
+    OMP_NUM_THREADS=1 python benchmarks/cloths.py [--fabrics woven] [--kinds grid crack irregular] [--sizes 2500 10000]
+    OMP_NUM_THREADS=1 python benchmarks/cloths.py --kinds --forms princess_dress dress basic_block [--edge 10]
+
+Work units, and milliseconds from the start of `flatten`, until the energy is within 1 % and within 0.1 % of where it ends, and until it
+has come to rest. There is no peer here: they take isotropic cloth.
+"""
+
+from __future__ import annotations
+
+import argparse
+import time
+from collections.abc import Iterator
+from dataclasses import replace
+
+import warp as wp
+from meshes import KINDS, Mesh
+
+import warpflat
+from warpflat.fabric import Fabric, find_fabric
+from warpflat.flattening import Progress
+from warpflat.mannequin import Mannequin, form_names
+
+
+def meshes_of(chosen: argparse.Namespace) -> Iterator[Mesh]:
+    """Those that are asked for."""
+    for kind in chosen.kinds:
+        for shape in chosen.shapes:
+            for size in chosen.sizes:
+                yield KINDS[kind](shape, size)
+    if chosen.forms:
+        mannequin = Mannequin.from_size("EU 38", resolution_mm=chosen.edge)
+        for form in chosen.forms:
+            for name, piece in mannequin.form(form).pieces.items():
+                datum = piece.surface.lines[piece.datum] if piece.datum else None
+                yield Mesh(name=f"{form}, {name}", surface=piece.surface, datum=datum)
+
+
+def measure(mesh: Mesh, fabric: Fabric, repeats: int) -> str:
+    """A line; the fastest of several."""
+    best = ""
+    least = float("inf")
+    for _ in range(repeats):
+        looks: list[tuple[float, float, float]] = []
+        # As if read anew each time.
+        surface = replace(mesh.surface, faces=mesh.surface.faces.copy())
+        begun = time.perf_counter()
+
+        def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
+            looks.append((at.spring_energy + at.guard_energy, at.work_units, time.perf_counter() - begun))
+
+        piece = warpflat.flatten(surface, fabric=fabric, datum=mesh.datum, device="cpu", callback=look)
+        seconds, last = time.perf_counter() - begun, piece.stages[-1]
+        energy = last.spring_energy_j + last.guard_energy_j
+        looks.append((energy, last.work_units, seconds))
+        if seconds < least:
+            least = seconds
+            near = [next(each[1:] for each in looks if each[0] <= share * energy) for share in (1.01, 1.001)]
+            columns = [f"{units:7.0f} {1e3 * taken:8.1f}" for units, taken in (*near, (last.work_units, seconds))]
+            ended = "" if piece.converged else "  not at rest"
+            best = f"{' '.join(columns)}   {energy:11.5g}  {piece.flipped_faces:5d}{ended}"
+    return best
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--fabrics", nargs="+", default=["woven"], help="of the library")
+    parser.add_argument("--kinds", nargs="*", choices=list(KINDS), default=list(KINDS))
+    parser.add_argument("--shapes", nargs="+", choices=["dome", "bodice"], default=["dome", "bodice"])
+    parser.add_argument("--sizes", type=int, nargs="+", default=[2_500, 10_000], metavar="VERTICES")
+    parser.add_argument(
+        "--forms", nargs="*", choices=form_names(), default=[], metavar="FORM", help=", ".join(form_names())
+    )
+    parser.add_argument("--edge", type=float, default=10.0, metavar="MM", help="length of the mannequin's edges")
+    parser.add_argument("--repeats", type=int, default=3, help="the fastest counts")
+    chosen = parser.parse_args()
+    wp.config.quiet = True
+    for name in chosen.fabrics:
+        fabric = find_fabric(name)
+        softness = max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
+        print(f"{name}, K/G {softness:.0f}")
+        print(
+            f"{'':42s} {'1 %':>7s} {'ms':>8s} {'0.1 %':>7s} {'ms':>8s} {'rest':>7s} {'ms':>8s}   {'energy J':>11s}  flips"
+        )
+        for mesh in meshes_of(chosen):
+            count = f"{mesh.name}, {len(mesh.surface.vertices):,}"
+            print(f"{count:42s} {measure(mesh, fabric, chosen.repeats)}", flush=True)
+
+
+if __name__ == "__main__":
+    main()
