@@ -373,3 +373,13 @@ def test_pieces_with_and_without_lines_are_relaxed_side_by_side():
     for piece, surface in zip(together, surfaces, strict=True):
         assert piece.converged
         assert minimum(piece) == pytest.approx(minimum(flatten(surface, datum="centre", **given)), rel=1e-4)
+
+
+def test_steps_go_along_lines_that_carry_the_threads_only():
+    surface = make_shape("dome", resolution=33)
+    for grain_angle, expected in ((0.0, True), (10.0, True), (90.0, True), (45.0, False)):
+        flat = surface.vertices[:, :2]
+        network = SpringNetwork.build(surface, cloth(10.0), flat, grain_angle=grain_angle, device="cpu")
+        assert (network.line_arrays is not None) == expected
+        made = Levels(Relaxation(network, LEVELS, start=flat), mend=True)
+        assert [level.lines for level in made._levels] == [expected] * len(made.sizes)

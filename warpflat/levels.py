@@ -54,7 +54,7 @@ _LEAST_OF_LEAP = 0.2
 _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
 # K/G from which two of the steps on a lattice are one along its lines.
-_SOFT = 8.0
+_SOFT = 12.0
 _CYCLES_ALONG_LINES = 2
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0

@@ -245,9 +245,10 @@ class SpringNetwork:
 
     @cached_property
     def line_arrays(self) -> LineArrays | None:
-        """The rows and columns of the pieces that lie on a lattice, along which steps may go; None where none does."""
+        """The rows and columns of the pieces that lie on a lattice, along which steps may go; None where none does, or threads run across
+        them."""
         if not self.parts:
-            return lines_of(self.surface)
+            return lines_of(self.surface) if self.spring_arrays.aligned else None
         return join_lines([net.line_arrays for net in self.parts], [net.vertex_count for net in self.parts])
 
     @cached_property

@@ -49,6 +49,7 @@ _LEAST_STRUCTURAL_SHARE = 0.05
 _HOLD_SHARE = 0.75
 # Quad cells that lie within this angle of the grain carry the threads along their edges.
 _ALIGNED = np.deg2rad(15.0)
+_QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,6 +78,7 @@ class SpringArrays:
         listed_length, listed_stiffness: 2 #S, rest length [m] and stiffness [N/m] of each entry.
         edge_count: #E; the first springs are the mesh edges.
         lack: #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None where there are none.
+        aligned: whether there are quads, and their edges carry the threads.
     """
 
     around: SpringsAround
@@ -84,6 +86,7 @@ class SpringArrays:
     listed_stiffness: FloatArray
     edge_count: int
     lack: FloatArray | None = None
+    aligned: bool = False
 
     # Once each: lists are all that a relaxation needs, so these are made when they are asked for.
 
@@ -142,7 +145,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
     of_side, stiffness = np.empty(len(sides)), np.empty(len(own.around.entry) // 2)
-    position, lack = np.ascontiguousarray(positions, dtype=np.float64), None
+    position, lack, aligned = np.ascontiguousarray(positions, dtype=np.float64), None, False
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
         given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
@@ -150,7 +153,9 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     if is_quad.any():
         quads = rows_of(faces, is_quad)
         diagonal, short = np.empty(len(quads)), np.empty((len(quads), 2))
-        given = [surface.vertices, position, quads, rows_of(first, is_quad), _lattice(fabric, quads, position, warp)]
+        lattice = _lattice(fabric, quads, position, warp)
+        aligned = _off_threads(lattice.angle) <= _ALIGNED
+        given = [surface.vertices, position, quads, rows_of(first, is_quad), lattice]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
         if short.any():
@@ -163,6 +168,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         listed_stiffness=np.take(stiffness, own.around.entry),
         edge_count=own.edge_count,
         lack=lack,
+        aligned=aligned,
     )
 
 
@@ -173,10 +179,8 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
     elasticity; a crossed lattice has C12 = C66 = G, and no coupling of shear with tension, so there it is an
     approximation.
     """
-    quarter = np.pi / 2
-    nearest = np.round(angle / quarter)
-    if abs(angle - nearest * quarter) <= _ALIGNED:
-        if int(nearest) % 2:
+    if _off_threads(angle) <= _ALIGNED:
+        if int(np.round(angle / _QUARTER)) % 2:
             return fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness
         return fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
     c, s = np.cos(angle), np.sin(angle)
@@ -186,6 +190,11 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
     across = warp * s**4 + weft * c**4 + both
     turned = (warp + weft - 2.0 * shear) * s**2 * c**2 + shear * (c**2 - s**2) ** 2
     return float(along), float(across), float(turned)
+
+
+def _off_threads(angle: float) -> float:
+    """How far a direction at `angle` [rad] from the warp is from the nearer of warp and weft [rad]."""
+    return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
 
 
 def _compliance(fabric: Fabric) -> wp.vec3d:
