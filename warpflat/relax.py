@@ -214,7 +214,8 @@ class Relaxation:
 
     def mirrored_pieces(self) -> BoolArray:
         """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
-        return np.logical_or.reduceat(self._buffers.face_clearance.numpy() <= 0.0, self._face_begin[:-1])
+        clearance = self._buffers.on_host(self._buffers.face_clearance)
+        return np.logical_or.reduceat(clearance <= 0.0, self._face_begin[:-1])
 
     def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:
         """Let these pieces (#P) go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
@@ -228,14 +229,15 @@ class Relaxation:
 
     def work_of_load(self) -> FloatArray:
         """#P, sum of load times place [J]."""
-        load, position = self.load.numpy(), self.position.numpy()
+        load, position = (self._buffers.on_host(array) for array in (self.load, self.position))
         return np.array([np.einsum("ij,ij->", load[here], position[here]) for here in self.vertices])
 
     def potentials(self) -> FloatArray:
         """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
-        self._buffers.measure.launch()
-        springs = _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
-        return np.stack([springs, _sums(self._buffers.face_energy.numpy(), self._face_begin)], axis=1)
+        buffers = self._buffers
+        buffers.measure.launch()
+        springs = _sums(buffers.on_host(buffers.vertex_energy), self._vertex_begin)
+        return np.stack([springs, _sums(buffers.on_host(buffers.face_energy), self._face_begin)], axis=1)
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
