@@ -48,9 +48,8 @@ def held_across(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64, alo
     return stiffness * (c * c + taut * (wp.float64(1.0) - c * c))
 
 
-@wp.func
-def solve_line(
-    line: int,
+@wp.kernel
+def solve_lines(
     position: wp.array(dtype=wp.vec2d),
     force: wp.array(dtype=wp.vec2d),
     mass: wp.array(dtype=wp.float64),
@@ -61,9 +60,18 @@ def solve_line(
     guarded: wp.array(dtype=wp.int32),
     lines: ThreadLines,
     time_step: wp.float64,
-    way: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    along_rows: wp.array(dtype=wp.vec2d),
+    along_columns: wp.array(dtype=wp.vec2d),
 ):
-    """way: #V, of the vertices on the line where each goes [m]."""
+    """Where the vertices go along their row and along their column [m], both #V: all of a line at once, so that what its springs and what
+    else holds its vertices balance the forces along it.
+
+    position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at these positions.
+    """
+    line = wp.tid() + first
+    way = wp.where(line < lines.rows, along_rows, along_columns)
     begin = lines.offset[line]
     end = lines.offset[line + 1]
     k_before = wp.float64(0.0)
@@ -105,61 +113,6 @@ def solve_line(
         i = lines.vertex[e]
         gone = way[i][0] + way[i][1] * gone
         way[i] = gone * line_direction(position, lines, e, begin, end)
-
-
-@wp.kernel
-def solve_lines(
-    position: wp.array(dtype=wp.vec2d),
-    force: wp.array(dtype=wp.vec2d),
-    mass: wp.array(dtype=wp.float64),
-    springs: Springs,
-    cells: Cells,
-    face_acting: wp.array(dtype=wp.int32),
-    face_stiffness: wp.array(dtype=wp.float64),
-    guarded: wp.array(dtype=wp.int32),
-    lines: ThreadLines,
-    time_step: wp.float64,
-    first: int,
-    # outputs
-    along_rows: wp.array(dtype=wp.vec2d),
-    along_columns: wp.array(dtype=wp.vec2d),
-):
-    """Where the vertices go along their row and along their column [m], both #V: all of a line at once, so that what its springs and what
-    else holds its vertices balance the forces along it.
-
-    position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at these positions.
-    """
-    line = wp.tid() + first
-    if line < lines.rows:
-        solve_line(
-            line,
-            position,
-            force,
-            mass,
-            springs,
-            cells,
-            face_acting,
-            face_stiffness,
-            guarded,
-            lines,
-            time_step,
-            along_rows,
-        )
-    else:
-        solve_line(
-            line,
-            position,
-            force,
-            mass,
-            springs,
-            cells,
-            face_acting,
-            face_stiffness,
-            guarded,
-            lines,
-            time_step,
-            along_columns,
-        )
 
 
 @wp.kernel

@@ -59,10 +59,10 @@ def test_lines_run_straight_and_end_at_a_crack():
         d = np.diff(flat[line], axis=0)
         np.testing.assert_allclose(np.linalg.norm(d, axis=1), 0.01, rtol=1e-9)
         assert np.allclose(d, d[:1])
-    # Five rows end at the crack, on both of its sides; one column is doubled below, and two more end at the part along a row.
+    # Five rows end at the crack, at 5 and 6 vertices. Of the row that it follows one side has 3 of its own, the other goes on through the
+    # tip; one side of the column that it follows ends at the corner, after 6, and two columns are parted into 6 and 8.
     lengths = sorted(map(len, chains(lines)))
-    assert lengths.count(5) >= 5
-    assert len(chains(lines)) > 13 + 10 + 5
+    assert lengths == [3] + [5] * 5 + [6] * (5 + 1 + 2) + [8] * 2 + [10] * 8 + [13] * 8
 
 
 def test_triangles_have_no_lines():

@@ -216,17 +216,15 @@ class Levels:
         finest = self._levels[0].state
         finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
 
-    def smooth(
-        self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False
-    ) -> FloatArray | None:
+    def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> FloatArray:
         """Some steps from rest; `evaluated` says that the forces there have just been evaluated. In a soft cloth on a lattice the last goes
-        along its lines; then it returns #P, the energy that it has led to [J]."""
+        along its lines. Returns #P, the energy that they have led to [J]."""
         state, steps = self._levels[level].state, self._levels[level].steps
         state.velocity.zero_()
         state.sweep(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
         self._count(level, steps)
         if not self._levels[level].lines:
-            return None
+            return self._objective(level)
         energy = self._step_along_lines(level)
         if each_step is not None:
             each_step()
@@ -292,7 +290,7 @@ class Levels:
         state, way = self._levels[level].state, self._levels[level].way
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
-        smoothed = self.smooth(level, each_step, evaluated=level == 0)
+        before = self.smooth(level, each_step, evaluated=level == 0)
         if level == 0:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
@@ -306,16 +304,13 @@ class Levels:
         mirrored = way.coarse.mirrored_pieces()
         self.stale = self.stale or bool(mirrored.any())
         if mirrored.all():
-            smoothed = self.smooth(level, each_step)
-            return self._objective(level) if smoothed is None else smoothed
+            return self.smooth(level, each_step)
         way.load.launch()
         self.cycle(level + 1)
-        before = self._objective(level) if smoothed is None else smoothed
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, _mark(state))
-        smoothed = self.smooth(level, each_step, evaluated=True)
-        energy = self._objective(level) if smoothed is None else smoothed
+        energy = self.smooth(level, each_step, evaluated=True)
         higher = ~(energy <= before)
         if higher.any():
             way.correction.assign(state.positions() - way.base.numpy())
