@@ -1,4 +1,4 @@
-"""Quads numbered by rows and columns: a walk over the mesh from face to face."""
+"""Quads numbered by rows and columns: a walk over the mesh from face to face, and what lies around each vertex of a grid."""
 
 import warp as wp
 
@@ -48,3 +48,79 @@ def number_faces(
                     place[g] = wp.vec3i(row, column, (side + 6 - (other - 4 * g)) % 4)
                     queue[seen] = g
                     seen += 1
+
+
+@wp.kernel
+def list_corners(
+    rows: int,
+    columns: int,
+    slot_of: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    corner: wp.array(dtype=wp.int32),
+):
+    """The faces' corners around each vertex of a grid that is numbered row by row: 4 times the face plus the corner.
+
+    slot_of: 4, a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin.
+    """
+    v = wp.tid() + first
+    i = v / columns
+    j = v - i * columns
+    at = offset[v]
+    for up in range(2):
+        for right in range(2):
+            row = i - 1 + up
+            column = j - 1 + right
+            if row >= 0 and row < rows - 1 and column >= 0 and column < columns - 1:
+                # Of a face below and to the left, the vertex is the corner above right.
+                corner[at] = 4 * (row * (columns - 1) + column) + slot_of[3 - 2 * up - right]
+                at += 1
+
+
+@wp.kernel
+def list_neighbors(
+    rows: int,
+    columns: int,
+    rising: int,
+    offset: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    spring: wp.array(dtype=wp.int32),
+    neighbor: wp.array(dtype=wp.int32),
+):
+    """The up to eight springs around each vertex of a grid that is numbered row by row, and the vertices at their far ends, in order.
+
+    Springs are the edges, sorted by their lower vertex, then of each face the diagonal of corners 0-2, then that of corners 1-3.
+
+    rising: 0 if it is the former that runs from below left to above right, else 1. offset: #V+1, where each vertex's begin.
+    """
+    v = wp.tid() + first
+    i = v / columns
+    j = v - i * columns
+    of_row = 2 * columns - 1
+    edges = rows * (columns - 1) + (rows - 1) * columns
+    faces = (rows - 1) * (columns - 1)
+    at = offset[v]
+    for up in range(-1, 2):
+        for right in range(-1, 2):
+            row = i + up
+            column = j + right
+            there = row >= 0 and row < rows and column >= 0 and column < columns
+            if there and (up != 0 or right != 0):
+                s = int(0)
+                if up == 0:
+                    step = int(2)
+                    if i == rows - 1:
+                        step = 1
+                    s = i * of_row + step * wp.min(j, column)
+                elif right == 0:
+                    s = wp.min(i, row) * of_row + wp.min(2 * j + 1, of_row - 1)
+                else:
+                    which = rising
+                    if up != right:
+                        which = 1 - rising
+                    s = edges + which * faces + wp.min(i, row) * (columns - 1) + wp.min(j, column)
+                spring[at] = s
+                neighbor[at] = row * columns + column
+                at += 1

@@ -13,6 +13,7 @@ from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.unfold import corners_around, lay_cells, quad_creases
 
@@ -120,7 +121,11 @@ def cells_of(surface: Surface) -> CellArrays:
 @once_per_faces
 def _corners_of(surface: Surface) -> ByVertex:
     """The faces' corners around each vertex, 4 times the face plus the corner."""
-    offset, entry = corners_around(surface.faces, len(surface.vertices))
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        offset, entry = numbered.corners_around()
+    else:
+        offset, entry = corners_around(surface.faces, len(surface.vertices))
     return read_only(ByVertex(offset=offset, entry=entry))
 
 

@@ -26,6 +26,7 @@ from warpflat.kernels.stiffness import (
 )
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of, order_by, rows_of, unfold_quad_diagonals
 
 __all__ = [
@@ -234,6 +235,10 @@ def _unweighed(surface: Surface) -> _Unweighed:
 @once_per_faces
 def _springs_around(surface: Surface) -> SpringsAround:
     """The springs around each vertex, edges first, then diagonals."""
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        offset, spring, neighbor = numbered.springs_around()
+        return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
     corner = rows_of(surface.faces, surface.is_quad)
     ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
     end, offset = order_by(ends[:, ::-1].T.ravel(), len(surface.vertices))

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.kernels.lattice import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of, twins_of
 
 __all__ = ["Lattice", "lattice_of", "rows_and_columns"]
@@ -89,22 +90,15 @@ def lattice_of(surface: Surface) -> Lattice | None:
 @once_per_faces
 def rows_and_columns(surface: Surface) -> IntArray | None:
     """#rows by #columns vertices of a rectangular grid of quads, else None."""
-    faces, count = surface.faces, len(surface.vertices)
-    if not surface.is_quad.all():
-        return None
-    columns = int(np.ptp(faces[0])) - 1
-    if columns >= 2 and count % columns == 0:
-        # Most grids are numbered row by row, which is seen at once.
-        grid = np.arange(count, dtype=np.int32).reshape(-1, columns)
-        corner = faces[0] - faces[0].min()
-        in_order = sorted(corner.tolist()) == [0, 1, columns, columns + 1]
-        if in_order and np.array_equal(faces, grid[:-1, :-1].reshape(-1, 1) + corner):
-            return grid
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        return numbered.vertices
     lattice = lattice_of(surface)
     if lattice is None:
         return None
     shape = int(lattice.row.max()) + 1, int(lattice.column.max()) + 1
-    if shape[0] * shape[1] != count or (shape[0] - 1) * (shape[1] - 1) != len(faces):
+    count = len(surface.vertices)
+    if shape[0] * shape[1] != count or (shape[0] - 1) * (shape[1] - 1) != len(surface.faces):
         return None
     grid = np.full(shape, -1, dtype=np.int32)
     grid[lattice.row, lattice.column] = np.arange(count, dtype=np.int32)

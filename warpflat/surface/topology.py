@@ -18,6 +18,7 @@ from warpflat.errors import InputError
 from warpflat.kernels.surface_cells import unfold_diagonals
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
+from warpflat.surface.row_by_row import row_by_row
 
 Number = TypeVar("Number", bound=np.generic)
 
@@ -150,7 +151,11 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
 @once_per_faces
 def half_edges_of(surface: Surface) -> HalfEdges:
     """The sides of the surface's faces, worked out once."""
-    return read_only(half_edges(surface.faces))
+    numbered = row_by_row(surface)
+    if numbered is None:
+        return read_only(half_edges(surface.faces))
+    edge, edges, count = numbered.edges()
+    return read_only(HalfEdges(faces=surface.faces.view(), edge=edge, edges=edges, count=count))
 
 
 def twins_of(he: HalfEdges) -> NDArray[np.int64]:

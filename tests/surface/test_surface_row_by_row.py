@@ -1,0 +1,75 @@
+"""Grids numbered row by row: what follows from the numbers is what is sorted out of the faces of any mesh."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from warpflat.surface import Surface
+from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.topology import half_edges
+from warpflat.surface.unfold import corners_around
+
+TURNS = [(turn, mirrored) for turn in range(4) for mirrored in (False, True)]
+
+
+def grid(rows: int, columns: int, turn: int = 0, *, mirrored: bool = False) -> Surface:
+    """A flat grid of 10 mm, its faces begun at one of their corners, wound one way or the other."""
+    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = np.roll(faces[:, ::-1] if mirrored else faces, turn, axis=1)
+    y, x = np.divmod(np.arange(rows * columns), columns)
+    vertices = np.column_stack([0.01 * x, 0.01 * y, 0.001 * x * y])
+    return Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=i.ravel())
+
+
+def springs_by_ends(surface: Surface) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    """Around each vertex the springs and their far ends, those sorted, from a list of all springs by their two ends."""
+    edges, faces = half_edges(surface.faces).edges, surface.faces
+    ends = np.concatenate([edges, faces[:, 0::2], faces[:, 1::2]])
+    both, number = np.concatenate([ends, ends[:, ::-1]]), np.tile(np.arange(len(ends)), 2)
+    order = np.lexsort([both[:, 1], both[:, 0]])
+    offset = np.searchsorted(both[order, 0], np.arange(len(surface.vertices) + 1))
+    return offset, number[order], both[order, 1]
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 2), (2, 3), (3, 2), (2, 7), (7, 2), (3, 3), (5, 8), (70, 41)])
+@pytest.mark.parametrize(("turn", "mirrored"), TURNS)
+def test_what_follows_from_the_numbers_is_what_is_sorted_out_of_the_faces(
+    rows: int, columns: int, turn: int, mirrored: bool
+) -> None:
+    surface = grid(rows, columns, turn, mirrored=mirrored)
+    numbered = row_by_row(surface)
+    assert numbered is not None
+    assert (numbered.rows, numbered.columns) == (rows, columns)
+    edge, edges, count = numbered.edges()
+    sorted_out = half_edges(surface.faces)
+    for ours, theirs in zip((edge, edges, count), (sorted_out.edge, sorted_out.edges, sorted_out.count), strict=True):
+        assert ours.dtype == theirs.dtype
+        np.testing.assert_array_equal(ours, theirs)
+    for ours, theirs in zip(numbered.corners_around(), corners_around(surface.faces, rows * columns), strict=True):
+        assert ours.dtype == theirs.dtype
+        np.testing.assert_array_equal(ours, theirs)
+    for ours, theirs in zip(numbered.springs_around(), springs_by_ends(surface), strict=True):
+        np.testing.assert_array_equal(ours, theirs)
+
+
+@pytest.mark.parametrize("change", ["a face fewer", "two faces swapped", "bow tie", "triangles", "a vertex more", "a face turned"])
+def test_any_other_mesh_is_not_taken_for_one(change: str) -> None:
+    surface = grid(6, 5)
+    vertices, faces = surface.vertices, surface.faces.copy()
+    if change == "a face fewer":
+        faces = faces[:-1]
+    if change == "two faces swapped":
+        faces[[3, 4]] = faces[[4, 3]]
+    if change == "bow tie":
+        faces = faces[:, [0, 2, 1, 3]]
+    if change == "triangles":
+        faces[:, 3] = -1
+    if change == "a vertex more":
+        vertices = np.vstack([vertices, [[1.0, 1.0, 1.0]]])
+    if change == "a face turned":
+        faces[7] = np.roll(faces[7], 1)
+    other = Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=np.arange(len(vertices)))
+    assert row_by_row(other) is None

@@ -1,0 +1,130 @@
+"""Rectangular grids of quads that are numbered row by row: their sides and lists follow from the numbers, without sorting.
+
+Most grids come so. What is worked out here is, entry by entry, what `topology` and `springs` sort out of the faces of any mesh.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.kernels.lattice import list_corners, list_neighbors
+from warpflat.launching import launch_each
+from warpflat.surface.mesh import Surface, once_per_faces
+
+__all__ = ["RowByRow", "row_by_row"]
+
+IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class RowByRow:
+    """A grid whose vertex in row i and column j is number i C + j, and whose face above and to the right of that i (C - 1) + j.
+
+    Attributes:
+        rows, columns: of vertices; at least two of each.
+        place: of each face's four corners which one it is: 0 below left, 1 below right, 2 above left, 3 above right.
+    """
+
+    rows: int
+    columns: int
+    place: tuple[int, int, int, int]
+
+    @cached_property
+    def vertices(self) -> IntArray:
+        """#rows by #columns, their numbers."""
+        return np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
+
+    @property
+    def _edges_of_row(self) -> int:
+        return 2 * self.columns - 1
+
+    @cached_property
+    def _across(self) -> IntArray:
+        """#rows by #columns - 1, the edge from each vertex to the next of its row. Edges are sorted by their lower vertex."""
+        step = np.full((self.rows, 1), 2, dtype=np.int32)
+        step[-1] = 1
+        begin = self._edges_of_row * np.arange(self.rows, dtype=np.int32)[:, None]
+        return begin + step * np.arange(self.columns - 1, dtype=np.int32)
+
+    @cached_property
+    def _up(self) -> IntArray:
+        """#rows - 1 by #columns, the edge from each vertex to the one above."""
+        begin = self._edges_of_row * np.arange(self.rows - 1, dtype=np.int32)[:, None]
+        return begin + np.minimum(2 * np.arange(self.columns, dtype=np.int32) + 1, self._edges_of_row - 1)
+
+    def edges(self) -> tuple[IntArray, IntArray, IntArray]:
+        """#H, the edge of every side of every face; #E by 2, the edges, lower vertex first, sorted; #E, how many faces each has."""
+        across, up = self._across, self._up
+        of_side = {(0, 1): across[:-1], (2, 3): across[1:], (0, 2): up[:, :-1], (1, 3): up[:, 1:]}
+        edge = np.empty((self.rows - 1, self.columns - 1, 4), dtype=np.int32)
+        for k in range(4):
+            edge[:, :, k] = of_side[min(self._side(k)), max(self._side(k))]
+        ends, count = np.empty((across.size + up.size, 2), dtype=np.int32), np.full(across.size + up.size, 2, np.int32)
+        vertex = self.vertices
+        ends[across, 0], ends[across, 1] = vertex[:, :-1], vertex[:, 1:]
+        ends[up, 0], ends[up, 1] = vertex[:-1], vertex[1:]
+        count[across[[0, -1]]] = 1
+        count[up[:, [0, -1]]] = 1
+        return edge.ravel(), ends, count
+
+    def _side(self, k: int) -> tuple[int, int]:
+        return self.place[k], self.place[(k + 1) % 4]
+
+    def corners_around(self) -> tuple[IntArray, IntArray]:
+        """The faces' corners around each vertex, as `unfold.corners_around` has them."""
+        rows, columns = (_there(count, 2) for count in (self.rows, self.columns))
+        slot_of = np.empty(4, dtype=np.int32)
+        slot_of[list(self.place)] = range(4)
+        offset = _begins(np.multiply.outer(rows, columns))
+        corner = np.empty(offset[-1], dtype=np.int32)
+        launch_each(list_corners, self.rows * self.columns, [self.rows, self.columns, slot_of, offset], [corner])
+        return offset, corner
+
+    def springs_around(self) -> tuple[IntArray, IntArray, IntArray]:
+        """The springs around each vertex, edges and both diagonals of each face: #V+1, where each vertex's begin, the springs' numbers,
+        edges first, then the faces' diagonals 0-2, then 1-3; and the vertices at their far ends, by which they are sorted."""
+        rows, columns = (_there(count, 3) for count in (self.rows, self.columns))
+        offset = _begins(np.multiply.outer(rows, columns) - np.int32(1))
+        spring, neighbor = (np.empty(offset[-1], dtype=np.int32) for _ in range(2))
+        # Which of a face's two diagonals runs from below left to above right.
+        rising = self.place.index(0) % 2
+        given = [self.rows, self.columns, rising, offset]
+        launch_each(list_neighbors, self.rows * self.columns, given, [spring, neighbor])
+        return offset, spring, neighbor
+
+
+def _there(count: int, most: int) -> IntArray:
+    """Of each of so many lines how many lines or strips there are beside it, itself included: `most`, and one less at both ends."""
+    there = np.full(count, most, dtype=np.int32)
+    there[0] -= 1
+    there[-1] -= 1
+    return there
+
+
+def _begins(counts: IntArray) -> IntArray:
+    offset = np.zeros(counts.size + 1, dtype=np.int32)
+    np.cumsum(counts.ravel(), out=offset[1:])
+    return offset
+
+
+@once_per_faces
+def row_by_row(surface: Surface) -> RowByRow | None:
+    """How a surface's grid is numbered; None of any other mesh, and of grids that are numbered otherwise."""
+    faces, count = surface.faces, len(surface.vertices)
+    if len(faces) == 0 or faces[0, 3] < 0:
+        return None
+    columns, corner = int(np.ptp(faces[0])) - 1, faces[0] - faces[0].min()
+    if columns < 2 or count % columns or len(faces) != (count // columns - 1) * (columns - 1):
+        return None
+    places = {0: 0, 1: 1, columns: 2, columns + 1: 3}
+    place = tuple(places.get(at, -1) for at in corner.tolist())
+    if sorted(place) != [0, 1, 2, 3] or place[0] + place[2] != 3:
+        return None
+    below_left = np.arange(count, dtype=np.int32).reshape(-1, columns)[:-1, :-1]
+    if not np.array_equal(faces, below_left.reshape(-1, 1) + corner):
+        return None
+    return RowByRow(rows=count // columns, columns=columns, place=place)
