@@ -31,7 +31,7 @@ from warpflat.network import SpringNetwork
 from warpflat.step_buffers import StepBuffers
 from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
-from warpflat.upright import Upright, held_upright, without_turning
+from warpflat.upright import Upright, hold_upright, take_out_turning
 
 __all__ = [
     "SOLVERS",
@@ -335,10 +335,13 @@ class Relaxation:
         """
         if not self.upright:
             return
-        force, weight = self.cloth_force(), self.network.spring_stiffness.numpy()
-        held = held_upright(self.upright, self.position.numpy(), self.velocity.numpy(), force, weight)
-        for array, values in zip((self.position, self.velocity, self.load), held, strict=True):
-            array.assign(values)
+        arrays = self.position, self.velocity, self.load
+        # On the CPU the buffers themselves.
+        held = [array.numpy() for array in arrays]
+        hold_upright(self.upright, *held, self.force.numpy(), self.network.spring_stiffness.numpy())
+        if not self.network.device.is_cpu:
+            for array, values in zip(arrays, held, strict=True):
+                array.assign(values)
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -364,7 +367,8 @@ class Relaxation:
         mean = _sums(self._buffers.vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
         weight = self.network.spring_stiffness.numpy()
-        force = without_turning(self.upright, self.position.numpy(), self.cloth_force(), weight)
+        force = self.cloth_force()
+        take_out_turning(self.upright, self.position.numpy(), force, weight)
         largest = np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1])
         return np.sqrt(largest) / np.maximum(mean, floor)
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.sums import dot
 
-__all__ = ["Upright", "held_upright", "without_turning"]
+__all__ = ["Upright", "hold_upright", "take_out_turning"]
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -33,64 +33,73 @@ class Upright:
     vertices: slice = field(default_factory=lambda: slice(None))
 
 
-def held_upright(
-    pieces: Sequence[Upright], position: FloatArray, velocity: FloatArray, force: FloatArray, weight: FloatArray
-) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Each piece turned about its centre so that its chord points up.
+def hold_upright(
+    pieces: Sequence[Upright],
+    position: FloatArray,
+    velocity: FloatArray,
+    load: FloatArray,
+    force: FloatArray,
+    weight: FloatArray,
+) -> None:
+    """Turn each piece about its centre so that its chord points up; the first three arrays are changed in place.
 
     Args:
         pieces: which.
-        position, velocity: #V by 2 [m], [m/s].
-        force: #V by 2, of the cloth, in the layout as it is given [N].
+        position, velocity: #V by 2 [m], [m/s]; the latter is rid of what turning there is in it.
+        load: #V by 2 [N]; is made one that is spread over a piece and balances the torque with which its cloth would turn.
+        force: #V by 2, of the cloth, with the load as it was, in the layout as it was [N].
         weight: #V, by which motion is averaged.
-
-    Returns:
-        #V by 2 each: positions; velocities without what turning there was in them; and the load [N], spread over a piece, that
-        balances the torque with which its cloth would turn.
     """
-    place, moving, pull = _complex(position).copy(), _complex(velocity).copy(), _complex(force)
-    load = np.zeros_like(place)
     for piece in pieces:
         here = piece.vertices
-        chord = place[piece.upper] - place[piece.lower]
-        length = float(np.abs(chord))
-        turn = 1j * length / chord if length > 0.0 else 1.0 + 0.0j
-        centre = place[here].mean()
-        place[here] = centre + turn * (place[here] - centre)
-        moving[here] *= turn
-        arm, weighted = _arms(place[here], weight[here])
-        inertia = max(_along(arm, weighted), 1e-300)
-        moving[here] -= (_along(weighted, moving[here]) / inertia) * arm
-        load[here] = (-_along(arm, turn * pull[here]) / inertia) * weighted
-    return _vectors(place), _vectors(moving), _vectors(load)
+        place, moving, held = (_complex(vectors[here]) for vectors in (position, velocity, load))
+        chord = complex(*(position[piece.upper] - position[piece.lower]))
+        turn = 1j * abs(chord) / chord if chord else 1.0 + 0.0j
+        centre = place.mean()
+        place -= centre
+        place *= turn
+        place += centre
+        moving *= turn
+        arm, inertia = _arm(place, weight[here])
+        spin = _moment(arm, velocity[here], weight[here]) / inertia
+        # Forces are of the layout before it was turned.
+        arm *= turn.conjugate()
+        torque = (dot(_vectors(arm), force[here]) - dot(_vectors(arm), load[here])) / inertia
+        arm *= turn
+        held[:] = arm
+        held *= weight[here]
+        held *= -torque
+        arm *= spin
+        moving -= arm
 
 
-def without_turning(
-    pieces: Sequence[Upright], position: FloatArray, force: FloatArray, weight: FloatArray
-) -> FloatArray:
-    """#V by 2, forces [N] without those parts that only turn pieces as a whole. Arguments as of `held_upright`."""
-    place, left = _complex(position), _complex(force).copy()
+def take_out_turning(pieces: Sequence[Upright], position: FloatArray, force: FloatArray, weight: FloatArray) -> None:
+    """Rid forces (#V by 2 [N]) in place of those parts that only turn pieces as a whole. Arguments as of `hold_upright`."""
     for piece in pieces:
         here = piece.vertices
-        arm, weighted = _arms(place[here], weight[here])
-        left[here] -= (_along(arm, left[here]) / max(_along(arm, weighted), 1e-300)) * weighted
-    return _vectors(left)
+        arm, inertia = _arm(_complex(position[here]), weight[here])
+        torque = dot(_vectors(arm), force[here]) / inertia
+        arm *= weight[here]
+        arm *= torque
+        _complex(force[here])[:] -= arm
+
+
+def _arm(place: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, float]:
+    """#V, velocities of a rigid turn by 1 rad/s about the weighted mean, and the moment of inertia."""
+    centre = complex(*(dot(weight, part) for part in _vectors(place).T)) / weight.sum()
+    arm = place - centre
+    arm *= 1j
+    return arm, max(_moment(arm, _vectors(arm), weight), 1e-300)
+
+
+def _moment(arm: ComplexArray, vectors: FloatArray, weight: FloatArray) -> float:
+    """The weighted sum of the scalar products of vectors."""
+    return sum(float(np.einsum("i,i,i->", weight, _vectors(arm)[:, k], vectors[:, k])) for k in range(2))
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:
     """#V by 2 as #V, x + iy; the same memory."""
-    return np.ascontiguousarray(vectors).view(np.complex128)[:, 0]
-
-
-def _along(a: ComplexArray, b: ComplexArray) -> float:
-    """The sum of the scalar products of vectors."""
-    return dot(a.view(np.float64), b.view(np.float64))
-
-
-def _arms(at: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, ComplexArray]:
-    """Velocities of a rigid turn by 1 rad/s, and the same times the weights by which motion is averaged: the stiffnesses."""
-    arm = 1j * (at - (weight * at).sum() / weight.sum())
-    return arm, weight * arm
+    return vectors.view(np.complex128)[:, 0]
 
 
 def _vectors(values: ComplexArray) -> FloatArray:

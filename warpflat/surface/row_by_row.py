@@ -38,33 +38,18 @@ class RowByRow:
         """#rows by #columns, their numbers."""
         return np.arange(self.rows * self.columns, dtype=np.int32).reshape(self.rows, self.columns)
 
-    @property
-    def _edges_of_row(self) -> int:
-        return 2 * self.columns - 1
-
-    @cached_property
-    def _across(self) -> IntArray:
-        """#rows by #columns - 1, the edge from each vertex to the next of its row. Edges are sorted by their lower vertex."""
-        step = np.full((self.rows, 1), 2, dtype=np.int32)
-        step[-1] = 1
-        begin = self._edges_of_row * np.arange(self.rows, dtype=np.int32)[:, None]
-        return begin + step * np.arange(self.columns - 1, dtype=np.int32)
-
-    @cached_property
-    def _up(self) -> IntArray:
-        """#rows - 1 by #columns, the edge from each vertex to the one above."""
-        begin = self._edges_of_row * np.arange(self.rows - 1, dtype=np.int32)[:, None]
-        return begin + np.minimum(2 * np.arange(self.columns, dtype=np.int32) + 1, self._edges_of_row - 1)
-
     def edges(self) -> tuple[IntArray, IntArray, IntArray]:
         """#H, the edge of every side of every face; #E by 2, the edges, lower vertex first, sorted; #E, how many faces each has."""
-        across, up = self._across, self._up
+        of_row, vertex = 2 * self.columns - 1, self.vertices
+        i, j = (np.arange(count, dtype=np.int32) for count in vertex.shape)
+        # From each vertex to the next of its row, and to the one above; the last row has none of these.
+        across = of_row * i[:, None] + np.where(i < self.rows - 1, 2, 1).astype(np.int32)[:, None] * j[:-1]
+        up = of_row * i[:-1, None] + np.minimum(2 * j + 1, of_row - 1)
         of_side = {(0, 1): across[:-1], (2, 3): across[1:], (0, 2): up[:, :-1], (1, 3): up[:, 1:]}
         edge = np.empty((self.rows - 1, self.columns - 1, 4), dtype=np.int32)
         for k in range(4):
             edge[:, :, k] = of_side[min(self._side(k)), max(self._side(k))]
         ends, count = np.empty((across.size + up.size, 2), dtype=np.int32), np.full(across.size + up.size, 2, np.int32)
-        vertex = self.vertices
         ends[across, 0], ends[across, 1] = vertex[:, :-1], vertex[:, 1:]
         ends[up, 0], ends[up, 1] = vertex[:-1], vertex[1:]
         count[across[[0, -1]]] = 1
