@@ -14,6 +14,16 @@ class Weights:
     weight: wp.array(dtype=wp.float64)
 
 
+@wp.struct
+class Transpose:
+    """The transpose of such a matrix: column j of it has the rows `row`, and their weights as entries number `entry`, from `offset[j]` to
+    `offset[j + 1]`."""
+
+    offset: wp.array(dtype=wp.int32)
+    row: wp.array(dtype=wp.int32)
+    entry: wp.array(dtype=wp.int32)
+
+
 @wp.func
 def weighted_sum(i: int, weights: Weights, values: wp.array(dtype=wp.vec2d)):
     """Row i of the matrix times `values`."""
@@ -31,7 +41,7 @@ def transfer(
     # outputs
     result: wp.array(dtype=wp.vec2d),
 ):
-    """result_i = sum_j w_ij values_j: a layout or a correction for the finer level, or the forces on a coarser one."""
+    """result_i = sum_j w_ij values_j: a layout or a correction for the finer level."""
     i = wp.tid() + first
     result[i] = weighted_sum(i, weights, values)
 
@@ -52,7 +62,8 @@ def coarse_difference(
 
 @wp.kernel
 def coarse_load(
-    restriction: Weights,
+    prolongation: Weights,
+    transpose: Transpose,
     residual: wp.array(dtype=wp.vec2d),
     force: wp.array(dtype=wp.vec2d),
     first: int,
@@ -60,9 +71,12 @@ def coarse_load(
     load: wp.array(dtype=wp.vec2d),
 ):
     """The load with which the coarse level has, where the finer one stands, the finer one's residual forces [N]:
-    load = R residual - force, force that of the coarse level without load (full approximation scheme)."""
+    load = P^T residual - force, force that of the coarse level without load (full approximation scheme)."""
     i = wp.tid() + first
-    load[i] = weighted_sum(i, restriction, residual) - force[i]
+    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for e in range(transpose.offset[i], transpose.offset[i + 1]):
+        total += prolongation.weight[transpose.entry[e]] * residual[transpose.row[e]]
+    load[i] = total - force[i]
 
 
 @wp.kernel

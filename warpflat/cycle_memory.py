@@ -41,21 +41,31 @@ class CycleMemory:
         self._past: list[Way] = []
 
     def begin(self, mark: Mark) -> None:
-        """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told."""
+        """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told. The mark
+        is copied."""
         if self._ways:
             self.come_to(mark)
             self._past.append(_joined(self._ways))
             del self._past[: -self._depth]
-        self._last, self._ways = mark, []
+        self._keep(mark)
+        self._ways = []
 
     def come_to(self, mark: Mark) -> None:
-        """A part of the cycle has led here: each is a way of its own."""
+        """A part of the cycle has led here: each is a way of its own. The mark is copied."""
         assert self._last is not None
         self._ways.append((_difference(mark[0], self._last[0]), _difference(self._last[1], mark[1])))
-        self._last = mark
+        self._keep(mark)
 
-    def lowest(self) -> FloatArray | None:
-        """#V by 2, the way from where the cycle has come to where the energy is least [m]; None where that cannot be told."""
+    def _keep(self, mark: Mark) -> None:
+        """In the room of the last one."""
+        if self._last is None:
+            self._last = np.array(mark[0]), np.array(mark[1])
+        else:
+            for kept, values in zip(self._last, mark, strict=True):
+                np.copyto(kept, values)
+
+    def lowest(self, room: FloatArray) -> bool:
+        """Put the way from where the cycle has come to where the energy is least there, #V by 2 [m]; whether that can be told."""
         assert self._last is not None
         parts = [way for way in (*self._past, *self._ways) if way[0].any()]
         ways, falls = ([part[k].ravel() for part in parts] for k in (0, 1))
@@ -63,15 +73,15 @@ class CycleMemory:
         curvature = 0.5 * (curvature + curvature.T)
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not len(size) or not (size > 0.0).all():
-            return None
+            return False
         left = self._last[1]
         gain = products(ways, [left.ravel()])[:, 0]
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
-        lowest = weighted_rows(share, ways).reshape(left.shape)
+        weighted_rows(share, ways, room.reshape(-1))
         self._ways = [_joined(self._ways)]
-        return lowest
+        return True
 
 
 def _difference(a: FloatArray, b: FloatArray) -> NDArray[np.float32]:

@@ -80,14 +80,15 @@ def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray, lack: NDArr
     edge = begins([s.edge_count for s in springs])
     diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
+    numbers = [a.entry for a in around]
     entry = [
-        a.entry + np.where(a.entry < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
-        for k, (s, a) in enumerate(zip(springs, around, strict=True))
+        own + np.where(own < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+        for k, (s, own) in enumerate(zip(springs, numbers, strict=True))
     ]
     return SpringArrays(
         around=SpringsAround(
-            offset=_join_offsets(around),
-            entry=np.concatenate(entry),
+            offset=_join_offsets([a.offset for a in around]),
+            numbering=np.concatenate(entry),
             neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
         ),
         listed_length=np.concatenate([s.listed_length for s in springs]),
@@ -108,12 +109,12 @@ def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArra
         first=np.concatenate([c.first + at for c, at in zip(cells, cell, strict=False)]),
         laid=np.concatenate([c.laid for c in cells]),
         around=ByVertex(
-            offset=_join_offsets(around),
+            offset=_join_offsets([a.offset for a in around]),
             entry=np.concatenate([a.entry + 4 * at for a, at in zip(around, face, strict=False)]),
         ),
     )
 
 
-def _join_offsets(lists: Sequence[ByVertex]) -> IntArray:
-    first = begins([len(each.entry) for each in lists])
-    return np.concatenate([*(each.offset[:-1] + at for each, at in zip(lists, first, strict=False)), first[-1:]])
+def _join_offsets(offsets: Sequence[IntArray]) -> IntArray:
+    first = begins([int(offset[-1]) for offset in offsets])
+    return np.concatenate([*(offset[:-1] + at for offset, at in zip(offsets, first, strict=False)), first[-1:]])

@@ -18,7 +18,7 @@ from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
 from warpflat.fabric import Fabric
 from warpflat.joined import begins, join_networks
-from warpflat.kernels.transfer import Weights, coarse_difference, coarse_load, inject, transfer
+from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
@@ -99,12 +99,35 @@ class _Level:
 
 def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
     """The matrix that has these along its diagonal."""
-    weights, matrix = Weights(), blocks[0] if len(blocks) == 1 else block_diag(blocks, format="csr")
-    # On the CPU the matrix' own arrays.
-    weights.offset = wp.array(matrix.indptr.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
-    weights.column = wp.array(matrix.indices.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+    weights, matrix = Weights(), _diagonal(blocks)
+    weights.offset, weights.column = _pattern(matrix, device)
     weights.weight = wp.array(matrix.data.astype(np.float64, copy=False), dtype=wp.float64, device=device, copy=False)
     return weights
+
+
+def _transpose(blocks: Sequence[csr_array], device: wp.Device) -> Transpose:
+    """Of the same matrix; blocks: of each the transpose, with the numbers of the entries."""
+    transpose, first = Transpose(), begins([block.nnz for block in blocks])
+    matrix = _diagonal(
+        [csr_array((b.data + at, b.indices, b.indptr), shape=b.shape) for b, at in zip(blocks, first, strict=False)]
+        if len(blocks) > 1
+        else blocks
+    )
+    transpose.offset, transpose.row = _pattern(matrix, device)
+    transpose.entry = wp.array(matrix.data, dtype=wp.int32, device=device, copy=False)
+    return transpose
+
+
+def _diagonal(blocks: Sequence[csr_array]) -> csr_array:
+    return blocks[0] if len(blocks) == 1 else csr_array(block_diag(blocks, format="csr"))
+
+
+def _pattern(matrix: csr_array, device: wp.Device) -> tuple[wp.array, wp.array]:
+    """Where rows begin, and the columns; on the CPU the matrix' own arrays."""
+    return tuple(
+        wp.array(index.astype(np.int32, copy=False), dtype=wp.int32, device=device, copy=False)
+        for index in (matrix.indptr, matrix.indices)
+    )
 
 
 class Levels:
@@ -189,14 +212,18 @@ class Levels:
         ids = np.concatenate([step.kept + at for step, at in zip(steps, first, strict=False)])
         kept = wp.array(ids, dtype=wp.int32, device=device)
         prolongation = _weights([step.prolongation for step in steps], device)
-        restriction = _weights([step.transfer.restriction for step in steps], device)
+        transpose = _transpose([step.transfer.transpose for step in steps], device)
         base, correction = wp.empty(n, dtype=wp.vec2d, device=device), fine.spare
         difference = wp.empty(c, dtype=wp.vec2d, device=device)
         return _Way(
             coarse=coarse,
             down=record(inject, dim=c, inputs=[kept, fine.position], outputs=[coarse.position], device=device),
             load=record(
-                coarse_load, dim=c, inputs=[restriction, fine.force, coarse.force], outputs=[coarse.load], device=device
+                coarse_load,
+                dim=c,
+                inputs=[prolongation, transpose, fine.force, coarse.force],
+                outputs=[coarse.load],
+                device=device,
             ),
             differ=record(
                 coarse_difference, dim=c, inputs=[kept, base, coarse.position], outputs=[difference], device=device
@@ -238,7 +265,7 @@ class Levels:
         energy = self._objective(level)
         higher = ~(energy <= before)
         if higher.any():
-            state.spare.assign(state.positions() - state.anchor.numpy())
+            state.spare.assign(state.position.numpy() - state.anchor.numpy())
             energy = np.where(higher, self._go(level, state.anchor, state.spare, before, higher, most=0.5), energy)
         return energy
 
@@ -313,7 +340,7 @@ class Levels:
         energy = self.smooth(level, each_step, evaluated=True)
         higher = ~(energy <= before)
         if higher.any():
-            way.correction.assign(state.positions() - way.base.numpy())
+            way.correction.assign(state.position.numpy() - way.base.numpy())
             energy = np.where(higher, self._go(level, way.base, way.correction, before, higher, most=0.5), energy)
         return energy
 
@@ -383,12 +410,7 @@ class Levels:
     def _leap(self, level: int, memories: Sequence[CycleMemory], energy: FloatArray) -> FloatArray:
         """The same on any level; returns #P, the energy where that leads to [J]."""
         state, between = self._levels[level].state, self._levels[level].way
-        ways = [memory.lowest() for memory in memories]
-        leapt = np.array([way is not None for way in ways])
-        by = [
-            np.zeros((own.stop - own.start, 2)) if w is None else w for w, own in zip(ways, state.vertices, strict=True)
-        ]
-        state.spare.assign(by[0] if len(by) == 1 else np.concatenate(by))
+        leapt = _put_lowest(state, memories)
         # The cycle is over, and needs its own no more.
         base = wp.empty_like(state.position) if between is None else between.base
         wp.copy(base, state.position)
@@ -482,14 +504,23 @@ def _come_to(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> 
         memory.come_to((mark[0][own], mark[1][own]))
 
 
+def _put_lowest(state: Relaxation, memories: Sequence[CycleMemory]) -> BoolArray:
+    """Put the ways to where the energy is least where there is room; #P, whether that could be told."""
+    room = state.spare.numpy()
+    told = np.array([memory.lowest(room[own]) for memory, own in zip(memories, state.vertices, strict=True)])
+    if not state.network.device.is_cpu:
+        state.spare.assign(room)
+    return told
+
+
 def _mark(state: Relaxation) -> Mark:
-    """Where it is, and the forces of the cloth there, as they have just been evaluated."""
-    return state.positions(), state.cloth_force()
+    """Where it is, and the forces of the cloth there, as they have just been evaluated; perhaps of the buffers themselves."""
+    return state.position.numpy(), state.cloth_force()
 
 
 def _all_forces(state: Relaxation) -> Mark:
     """The same with the load."""
-    return state.positions(), np.array(state.force.numpy())
+    return state.position.numpy(), state.force.numpy()
 
 
 def _watch_every(network: SpringNetwork) -> int:

@@ -181,7 +181,7 @@ class SpringNetwork:
         cells.shear = _on(device, lack, wp.vec2d)
         self.cells = cells
         self.bonds = Bonds()
-        self.bonds.offset = wp.zeros(count + 1, dtype=wp.int32, device=device)
+        self.bonds.offset = _on(device, np.broadcast_to(np.zeros(1, dtype=np.int32), count + 1), wp.int32)
         self.bonds.slot = wp.zeros(0, dtype=wp.int32, device=device)
         self.bonds.freedom = _on(device, np.broadcast_to(np.ones(2), (count, 2)), wp.vec2d)
 

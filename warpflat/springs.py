@@ -12,7 +12,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.cells import ByVertex, CellArrays, cells_of, creases_of, first_of_faces
+from warpflat.cells import CellArrays, cells_of, creases_of, first_of_faces
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.stiffness import (
     Lattice,
@@ -26,7 +26,7 @@ from warpflat.kernels.stiffness import (
 )
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_by_row import RowByRow, row_by_row
 from warpflat.surface.topology import half_edges_of, order_by, rows_of, unfold_quad_diagonals
 
 __all__ = [
@@ -54,11 +54,28 @@ _QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class SpringsAround(ByVertex):
-    """The springs around each vertex, by their numbers, mesh edges first, and for each entry the vertex at the far end, by which they
-    are sorted."""
+class SpringsAround:
+    """The springs around each vertex.
 
+    Attributes:
+        offset: #V+1, where the entries of each vertex begin.
+        neighbor: 2 #S, for each entry the vertex at the far end, by which they are sorted.
+        numbering: their numbers, or of a grid whose numbers tell them, that: they are asked for when a network is made, and seldom later.
+    """
+
+    offset: IntArray
     neighbor: IntArray
+    numbering: IntArray | RowByRow
+
+    @property
+    def entry(self) -> IntArray:
+        """2 #S, the springs' numbers, mesh edges first."""
+        return self.numbering.springs_around()[1] if isinstance(self.numbering, RowByRow) else self.numbering
+
+    @property
+    def count(self) -> int:
+        """#S."""
+        return len(self.neighbor) // 2
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,7 +111,7 @@ class SpringArrays:
     @property
     def count(self) -> int:
         """#S."""
-        return len(self.around.entry) // 2
+        return self.around.count
 
     @cached_property
     def ends(self) -> IntArray:
@@ -145,7 +162,7 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     warp, _ = grain_axes(grain_angle)
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
-    of_side, stiffness = np.empty(len(sides)), np.empty(len(own.around.entry) // 2)
+    of_side, stiffness = np.empty(len(sides)), np.empty(own.around.count)
     position, lack, aligned = np.ascontiguousarray(positions, dtype=np.float64), None, False
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
@@ -226,7 +243,7 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 def _unweighed(surface: Surface) -> _Unweighed:
     vertices, edges, around = surface.vertices, half_edges_of(surface).edges, _springs_around(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
-    rest_length = np.empty(len(around.entry) // 2)
+    rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
     launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])
     return read_only(_Unweighed(edge_count=len(edges), around=around, listed_length=np.take(rest_length, around.entry)))
@@ -237,14 +254,14 @@ def _springs_around(surface: Surface) -> SpringsAround:
     """The springs around each vertex, edges first, then diagonals."""
     numbered = row_by_row(surface)
     if numbered is not None:
-        offset, spring, neighbor = numbered.springs_around()
-        return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
+        offset, _, neighbor = numbered.springs_around()
+        return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))
     corner = rows_of(surface.faces, surface.is_quad)
     ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
     end, offset = order_by(ends[:, ::-1].T.ravel(), len(surface.vertices))
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
     launch_each(list_springs, len(surface.vertices), [offset, end, ends, len(ends)], [neighbor, spring])
-    return read_only(SpringsAround(offset=offset, entry=spring, neighbor=neighbor))
+    return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=spring))
 
 
 def shortened(

@@ -38,10 +38,8 @@ def products(a: Rows, b: Rows) -> FloatArray:
     return total
 
 
-def weighted_rows(weight: FloatArray, rows: Rows) -> FloatArray:
-    """#N, the sum of rows (#A by #N), each times its weight (#A), in double precision."""
-    total = np.empty(len(rows[0]))
+def weighted_rows(weight: FloatArray, rows: Rows, total: FloatArray) -> None:
+    """Make `total` (#N) the sum of rows (#A by #N), each times its weight (#A), in double precision."""
     for begin in range(0, len(total), _GATHERED):
         here = slice(begin, begin + _GATHERED)
         total[here] = sum(w * row[here].astype(np.float64) for w, row in zip(weight, rows, strict=True))
-    return total

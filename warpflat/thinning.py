@@ -58,9 +58,11 @@ class Transfer:
         return self._weigh()
 
     @cached_property
-    def restriction(self) -> csr_array:
-        """#C by #V, the prolongation's transpose."""
-        return csr_array(self.prolongation.T.tocsr())
+    def transpose(self) -> csr_array:
+        """#C by #V, the prolongation's transpose: its entries' numbers in that."""
+        of = self.prolongation
+        numbered = csr_array((np.arange(of.nnz, dtype=np.int32), of.indices, of.indptr), shape=of.shape)
+        return csr_array(numbered.T.tocsr())
 
 
 @dataclass(frozen=True, kw_only=True)
