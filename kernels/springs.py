@@ -62,21 +62,37 @@ def compute_spring_energy(
     first: int,
     # outputs
     energy: wp.array(dtype=wp.float64),
-    pull: wp.array(dtype=wp.float64),
 ):
-    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's; and half of
-    k |l - L| likewise, whether springs pull or are but the step's matrix.
+    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's.
 
-    position: #V [m]. energy: #V [J]. pull: #V [N].
+    position: #V [m]. energy: #V [J].
     """
     i = wp.tid() + first
     here = position[i]
     total = wp.float64(0.0)
-    pulled = wp.float64(0.0)
     for s in range(springs.offset[i], springs.offset[i + 1]):
         stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
         half = wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
-        pulled += half
         total += wp.float64(0.5) * half * wp.abs(stretch)
     energy[i] = springs.pull * total
-    pull[i] = pulled
+
+
+@wp.kernel
+def compute_spring_pull(
+    position: wp.array(dtype=wp.vec2d),
+    springs: Springs,
+    first: int,
+    # outputs
+    pull: wp.array(dtype=wp.float64),
+):
+    """Half of k |l - L| of each spring at each of its ends, whether springs pull or are but the step's matrix.
+
+    position: #V [m]. pull: #V [N].
+    """
+    i = wp.tid() + first
+    here = position[i]
+    total = wp.float64(0.0)
+    for s in range(springs.offset[i], springs.offset[i + 1]):
+        stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
+        total += wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
+    pull[i] = total

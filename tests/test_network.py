@@ -54,10 +54,10 @@ def equilateral(rings: int, side: float) -> Surface:
 
 
 def spring_energy(network: SpringNetwork, positions: NDArray[np.float64]) -> float:
-    energy, pull = (wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu") for _ in range(2))
+    energy = wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu")
     at = wp.array(positions, dtype=wp.vec2d, device="cpu")
     count = network.vertex_count
-    wp.launch(compute_spring_energy, dim=count, inputs=[at, network.springs, 0], outputs=[energy, pull], device="cpu")
+    wp.launch(compute_spring_energy, dim=count, inputs=[at, network.springs, 0], outputs=[energy], device="cpu")
     return float(energy.numpy().sum())
 
 

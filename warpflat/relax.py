@@ -337,8 +337,9 @@ class Relaxation:
             return
         arrays = self.position, self.velocity, self.load
         # On the CPU the buffers themselves.
-        held = [array.numpy() for array in arrays]
-        hold_upright(self.upright, *held, self.force.numpy(), self.network.spring_stiffness.numpy())
+        position, velocity, load = held = [array.numpy() for array in arrays]
+        weight = self.network.spring_stiffness.numpy()
+        hold_upright(self.upright, position, velocity, load, self.force.numpy(), weight)
         if not self.network.device.is_cpu:
             for array, values in zip(arrays, held, strict=True):
                 array.assign(values)
@@ -363,7 +364,7 @@ class Relaxation:
         Forces that only turn the whole piece are left out where it is held upright. The mean has a floor of 1e-9 K L, the
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
-        self._buffers.measure_springs.launch()
+        self._buffers.measure_pull.launch()
         mean = _sums(self._buffers.vertex_pull.numpy(), self._vertex_begin) / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
         weight = self.network.spring_stiffness.numpy()

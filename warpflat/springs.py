@@ -176,9 +176,11 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         given = [surface.vertices, position, quads, rows_of(first, is_quad), lattice]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
-        if short.any():
+        lacks = short.any(axis=1)
+        if lacks.any():
+            # Most have none: what is not written to takes no memory.
             lack = np.zeros((len(faces), 2))
-            lack[is_quad] = short
+            lack[np.flatnonzero(is_quad)[lacks]] = short[lacks]
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpflat.joined import begins
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
-from warpflat.kernels.springs import compute_spring_energy
+from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 from warpflat.kernels.thread_lines import go_along_lines, solve_lines
 from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
@@ -39,12 +39,12 @@ class StepBuffers:
             forces [N].
         guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
-        vertex_energy, face_energy: #V and #F, as last measured [J]; the former where `power` is: each is read as soon as it is
-            written. vertex_pull: #V, half of what each spring around pulls with [N].
+        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, half of what each spring around pulls with [N].
+            Those of vertices are where `power` is: each is read as soon as it is written.
         evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
             none. advance: the places after them. along_lines: the places after a step along the lines of a lattice, once forces have been
             evaluated; its ways take the place of `first_guess` and `driving_force`. stop: of each piece, the velocities. measure,
-            measure_springs, measure_motion: energies.
+            measure_motion: energies. measure_pull: what springs pull with.
     """
 
     def __init__(self, network: SpringNetwork, time_step: float, start: FloatArray) -> None:
@@ -72,8 +72,7 @@ class StepBuffers:
         self.seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
-        self.vertex_energy = self.power
-        self.vertex_pull = wp.zeros(n, dtype=wp.float64, device=device)
+        self.vertex_energy = self.vertex_pull = self.power
         self.face_energy = wp.zeros(f, dtype=wp.float64, device=device)
         self._views: dict[int, NDArray[Any]] = {}
 
@@ -250,18 +249,25 @@ class StepBuffers:
         ]
 
     @cached_property
-    def measure_springs(self) -> Launch:
+    def measure_pull(self) -> Launch:
         return record(
-            compute_spring_energy,
+            compute_spring_pull,
             dim=self.network.vertex_count,
             inputs=[self.position, self.network.springs],
-            outputs=[self.vertex_energy, self.vertex_pull],
+            outputs=[self.vertex_pull],
             device=self.network.device,
         )
 
     @cached_property
     def measure(self) -> LaunchSequence:
         net = self.network
+        springs = record(
+            compute_spring_energy,
+            dim=net.vertex_count,
+            inputs=[self.position, net.springs],
+            outputs=[self.vertex_energy],
+            device=net.device,
+        )
         _, kernel, parameters = net.cell_model
         cells = record(
             kernel,
@@ -270,7 +276,7 @@ class StepBuffers:
             outputs=[self.face_energy],
             device=net.device,
         )
-        return LaunchSequence([self.measure_springs, cells])
+        return LaunchSequence([springs, cells])
 
     @cached_property
     def measure_motion(self) -> Launch:

@@ -10,7 +10,7 @@ import warp as wp
 from numpy.typing import NDArray
 from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
-from warpflat.kernels.springs import compute_spring_energy
+from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 
 from warpflat.fabric import Fabric
 from warpflat.network import SpringNetwork
@@ -136,6 +136,10 @@ class Launched:
     def spring_energy(self) -> NDArray[np.float64]:
         self._launch(compute_spring_energy, self.network.vertex_count)
         return self["energy"]
+
+    def spring_pull(self) -> NDArray[np.float64]:
+        self._launch(compute_spring_pull, self.network.vertex_count)
+        return self["pull"]
 
     def kinetic_energy(self) -> NDArray[np.float64]:
         self._launch(compute_kinetic_energy, self.network.vertex_count)

@@ -55,7 +55,9 @@ def test_what_follows_from_the_numbers_is_what_is_sorted_out_of_the_faces(
         np.testing.assert_array_equal(ours, theirs)
 
 
-@pytest.mark.parametrize("change", ["a face fewer", "two faces swapped", "bow tie", "triangles", "a vertex more", "a face turned"])
+@pytest.mark.parametrize(
+    "change", ["a face fewer", "two faces swapped", "bow tie", "triangles", "a vertex more", "a face turned"]
+)
 def test_any_other_mesh_is_not_taken_for_one(change: str) -> None:
     surface = grid(6, 5)
     vertices, faces = surface.vertices, surface.faces.copy()

@@ -106,10 +106,10 @@ def row_by_row(surface: Surface) -> RowByRow | None:
     if columns < 2 or count % columns or len(faces) != (count // columns - 1) * (columns - 1):
         return None
     places = {0: 0, 1: 1, columns: 2, columns + 1: 3}
-    place = tuple(places.get(at, -1) for at in corner.tolist())
-    if sorted(place) != [0, 1, 2, 3] or place[0] + place[2] != 3:
+    a, b, c, d = (places.get(at, -1) for at in corner.tolist())
+    if sorted((a, b, c, d)) != [0, 1, 2, 3] or a + c != 3:
         return None
     below_left = np.arange(count, dtype=np.int32).reshape(-1, columns)[:-1, :-1]
     if not np.array_equal(faces, below_left.reshape(-1, 1) + corner):
         return None
-    return RowByRow(rows=count // columns, columns=columns, place=place)
+    return RowByRow(rows=count // columns, columns=columns, place=(a, b, c, d))
