@@ -8,6 +8,9 @@ import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
+# So many vertices in a row are counted together.
+CROWD = wp.constant(64)
+
 
 @wp.kernel
 def see_sides(
@@ -84,6 +87,7 @@ def find_ways(
     # outputs
     distance: wp.array(dtype=wp.float64),
     waiting: wp.array(dtype=wp.int32),
+    crowd: wp.array(dtype=wp.int32),
     first: wp.array(dtype=wp.int32),
     second: wp.array(dtype=wp.int32),
     share: wp.array(dtype=wp.float64),
@@ -97,22 +101,26 @@ def find_ways(
 
     offset: #V+1, where each vertex's entries in `ends` and `seen` begin, which are those of `see_sides`. tolerance: [m], less
     is not shorter. distance: #V [m], upper bounds before and after, 0 or more; lowered. waiting: #V, 1 where a way is to be
-    found, 2 where ways end. first, second: #V, the side over which the way out of a vertex leads; share: #V, how much of that
+    found, 2 where ways end. crowd: #V / CROWD, rounded up, how many of so many vertices in a row wait: where none does, all are passed
+    over at once. first, second: #V, the side over which the way out of a vertex leads; share: #V, how much of that
     lies before the place where the way passes; leg: #V, how far the place is [m]; all of those that were waiting.
     shortened: 1, how many ways have become shorter is added to it.
     """
     v = int(0)
     while v < distance.shape[0]:
         follow = v + 1
-        if waiting[v] == 1:
+        if crowd[v / CROWD] == 0:
+            follow = (v / CROWD + 1) * CROWD
+        elif waiting[v] == 1:
             waiting[v] = 0
+            crowd[v / CROWD] = crowd[v / CROWD] - 1
             best = wp.float64(wp.inf)
             over = offset[v]
             for r in range(offset[v], offset[v + 1]):
                 da = distance[ends[r][0]]
                 db = distance[ends[r][1]]
-                # Ways are longer than the distance that they lead to.
-                if wp.min(da, db) < best and wp.max(da, db) < wp.inf:
+                # Ways are no shorter than the distance that they lead to and the height.
+                if wp.min(da, db) + seen[r][2] < best and wp.max(da, db) < wp.inf:
                     length = length_over(seen[r], da, db)
                     if length < best:
                         best = length
@@ -133,6 +141,7 @@ def find_ways(
                         near = ends[r][i]
                         if waiting[near] == 0 and wp.min(best, distance[ends[r][1 - i]]) < distance[near]:
                             waiting[near] = 1
+                            crowd[near / CROWD] = crowd[near / CROWD] + 1
                             if near >= v - reach:
                                 follow = wp.min(follow, near)
         v = follow

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from numpy.typing import NDArray
-from warpflat.kernels.geodesic import carry_along, find_ways, see_sides
+from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, see_sides
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -50,6 +50,7 @@ def ways_from(start: FloatArray, ends_at: list[int], *, reach: int = 100) -> tup
     count = len(VERTICES)
     distance, waiting = start.copy(), np.ones(count, dtype=np.int32)
     waiting[ends_at] = 2
+    crowd = np.array([np.count_nonzero(waiting[at : at + CROWD] == 1) for at in range(0, count, CROWD)], dtype=np.int32)
     index = np.arange(count, dtype=np.int32)
     ways = [index.copy(), index.copy(), np.zeros(count), np.zeros(count)]
     shortened, launches = np.ones(1, dtype=np.int32), 0
@@ -60,7 +61,7 @@ def ways_from(start: FloatArray, ends_at: list[int], *, reach: int = 100) -> tup
             find_ways,
             dim=1,
             inputs=[offset, *sides(), reach, 1e-14],
-            outputs=[distance, waiting, *ways, shortened],
+            outputs=[distance, waiting, crowd, *ways, shortened],
             device="cpu",
         )
     return distance, ways, launches

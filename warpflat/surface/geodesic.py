@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.kernels.geodesic import carry_along, find_ways, see_sides
+from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, see_sides
 from warpflat.surface.lines import line_from_curve
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
@@ -185,6 +185,7 @@ class _Ways:
         ends, seen = np.empty((corner.size, 2), dtype=np.int32), np.empty((corner.size, 3))
         launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
         waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
+        crowd = np.add.reduceat(1 - self._on_line, self._here[::CROWD], dtype=np.int32)
         self._ways = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
         for _ in range(_MOST_ROUNDS):
             shortened[0] = 0
@@ -192,7 +193,7 @@ class _Ways:
                 find_ways,
                 dim=1,
                 inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
-                outputs=[distance, waiting, *self._ways, shortened],
+                outputs=[distance, waiting, crowd, *self._ways, shortened],
                 device="cpu",
             )
             if shortened[0] == 0:
