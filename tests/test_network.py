@@ -12,6 +12,8 @@ from warpflat.kernels.springs import compute_spring_energy
 
 from warpflat.cells import cells_of
 from warpflat.fabric import Fabric, grain_axes
+from warpflat.flattening import flatten
+from warpflat.membrane import Model
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.shapes import make_shape
@@ -167,6 +169,30 @@ def test_long_cells_store_what_the_fabric_does_but_for_less_that_couples_its_thr
     # The strain of the body, which the cloth follows: the other way round in the plane.
     state = Relaxation(network, RelaxOptions(), start=positions @ np.linalg.inv(np.eye(2) + e))
     assert state.energies().potential == pytest.approx(density * 9 * hx * hy, rel=1e-3)
+
+
+def test_stiffnesses_of_quads_have_no_jump_at_any_angle_to_the_grain():
+    fabric = cloth(warp=1000.0, weft=700.0, shear=20.0)
+    angles = np.deg2rad(np.arange(-200.0, 200.0, 0.05))
+    law = np.array([quad_stiffness(fabric, angle) for angle in angles])
+    # Which pair of edges lies nearer to the warp is not the law's matter: it changes at 45 degrees.
+    assert np.abs(np.diff(law, axis=0)).max() < 0.01 * np.ptp(law)
+    off = np.abs(angles - np.round(angles / (np.pi / 2)) * np.pi / 2)
+    s2, c2 = np.sin(angles) ** 2, np.cos(angles) ** 2
+    np.testing.assert_allclose(law[off < np.deg2rad(7.4), 2], 20.0)
+    rotated = (1000.0 + 700.0 - 40.0) * s2 * c2 + 20.0 * (c2 - s2) ** 2
+    beyond = off > np.deg2rad(15.1)
+    np.testing.assert_allclose(law[beyond, 2], rotated[beyond])
+
+
+@pytest.mark.parametrize(
+    ("grain_angle", "model", "noted"), [(5, "springs", 0), (30, "springs", 1), (30, "membrane", 0)]
+)
+def test_quads_across_the_grain_are_noted(grain_angle: float, model: Model, noted: int):
+    flat = flatten(
+        make_shape("dome", resolution=9), fabric="denim", datum="centre", grain_angle=grain_angle, model=model
+    )
+    assert sum("times as stiff in shear as denim" in note for note in flat.notes) == noted
 
 
 def test_rest_lengths_are_those_in_space_and_diagonals_go_over_the_unfolded_quad():

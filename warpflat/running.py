@@ -33,6 +33,8 @@ IntArray = NDArray[np.int32]
 
 # A first round only turns and shapes the layout, since directions are measured again after it: tolerances are so many times the others.
 _FIRST_ROUND = 30.0
+# Quads across the grain are worth a note where they are so many times as stiff in shear as the cloth.
+_MUCH_EXCESS = 3.0
 # With levels it is over once a cycle takes no more than this share of the energy away.
 _FIRST_GAIN = 3e-3
 
@@ -73,8 +75,7 @@ class Run:
     def network_at(self, positions: FloatArray) -> SpringNetwork:
         """The piece's network, with directions measured in a layout."""
         stretch, notes = self._meant(positions)
-        self.notes += [note for note in notes if note not in self.notes]
-        return SpringNetwork.build(
+        network = SpringNetwork.build(
             self.surface,
             self.fabric,
             positions,
@@ -83,6 +84,8 @@ class Run:
             model=self.model,
             stretch=stretch,
         )
+        self.notes += [note for note in (*notes, *_off_grain(network)) if note not in self.notes]
+        return network
 
     def directions_matter(self) -> bool:
         """Whether another layout gives other springs: in a cloth that is not the same in all directions, between triangles."""
@@ -133,6 +136,17 @@ class Relaxed:
     positions: FloatArray
     begin: Energies
     outcome: Outcome
+
+
+def _off_grain(network: SpringNetwork) -> list[str]:
+    """What is to be said of quads whose edges lie across the threads."""
+    excess = network.spring_arrays.shear_excess
+    if network.model != "springs" or excess < _MUCH_EXCESS:
+        return []
+    return [
+        f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
+        f'{network.fabric.name}; model = "membrane" measures that exactly'
+    ]
 
 
 def relax_runs(

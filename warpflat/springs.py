@@ -48,8 +48,10 @@ _LEAST_STRUCTURAL_SHARE = 0.05
 # Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
 # guard begins at this share of it.
 _HOLD_SHARE = 0.75
-# Quad cells that lie within this angle of the grain carry the threads along their edges.
-_ALIGNED = np.deg2rad(15.0)
+# Edges of quads within the first of these angles of the grain are taken for the threads, beyond the second for what they are, and between
+# the two for more and more of it, so that sizes of one pattern that lie on both sides are of one cloth. Up to the second a step may
+# go along them.
+_ALIGNED, _OFF_GRAIN = np.deg2rad([7.5, 15.0])
 _QUARTER = np.pi / 2
 
 
@@ -97,6 +99,7 @@ class SpringArrays:
         edge_count: #E; the first springs are the mesh edges.
         lack: #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None where there are none.
         aligned: whether there are quads, and their edges carry the threads.
+        shear_excess: how many times as stiff in shear as the cloth the quads are whose edges lie across its threads; 1 without quads.
     """
 
     around: SpringsAround
@@ -105,6 +108,7 @@ class SpringArrays:
     edge_count: int
     lack: FloatArray | None = None
     aligned: bool = False
+    shear_excess: float = 1.0
 
     # Once each: lists are all that a relaxation needs, so these are made when they are asked for.
 
@@ -163,7 +167,8 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
     of_side, stiffness = np.empty(len(sides)), np.empty(own.around.count)
-    position, lack, aligned = np.ascontiguousarray(positions, dtype=np.float64), None, False
+    position, lack = np.ascontiguousarray(positions, dtype=np.float64), None
+    aligned, shear_excess = False, 1.0
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
         given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
@@ -172,7 +177,8 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         quads = rows_of(faces, is_quad)
         diagonal, short = np.empty(len(quads)), np.empty((len(quads), 2))
         lattice = _lattice(fabric, quads, position, warp)
-        aligned = _off_threads(lattice.angle) <= _ALIGNED
+        aligned = _off_threads(lattice.angle) <= _OFF_GRAIN
+        shear_excess = lattice.shear / fabric.shear_stiffness
         given = [surface.vertices, position, quads, rows_of(first, is_quad), lattice]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
@@ -189,21 +195,26 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         edge_count=own.edge_count,
         lack=lack,
         aligned=aligned,
+        shear_excess=shear_excess,
     )
 
 
 def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
     """K along a quad's first edges, along its second ones, and G [N/m], for first edges at `angle` [rad] from the warp.
 
-    Within 15 degrees of warp or weft the edges are the threads. Further off, the crossed lattice gets the rotated
+    Within 7.5 degrees of warp or weft the edges are the threads. From 15 degrees on the crossed lattice gets the rotated
     elasticity; a crossed lattice has C12 = C66 = G, and no coupling of shear with tension, so there it is an
-    approximation.
+    approximation. Between the two it is rotated by a growing share of the angle.
     """
-    if _off_threads(angle) <= _ALIGNED:
+    nearest = np.round(angle / _QUARTER) * _QUARTER
+    off = _off_threads(angle)
+    share = np.clip((off - _ALIGNED) / (_OFF_GRAIN - _ALIGNED), 0.0, 1.0)
+    if share == 0.0:
         if int(np.round(angle / _QUARTER)) % 2:
             return fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness
         return fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
-    c, s = np.cos(angle), np.sin(angle)
+    turned_by = nearest + share**2 * (3.0 - 2.0 * share) * (angle - nearest)
+    c, s = np.cos(turned_by), np.sin(turned_by)
     warp, weft, shear = fabric.stiffness_warp, fabric.stiffness_weft, fabric.shear_stiffness
     both = 6.0 * shear * s**2 * c**2
     along = warp * c**4 + weft * s**4 + both
