@@ -25,7 +25,8 @@ from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.strain import strain_energy
 from warpflat.surface.cut import Cut, Seam, cut_along_many
 from warpflat.surface.dart import dart_measure
-from warpflat.surface.mesh import Surface
+from warpflat.surface.grid import cut_lattice, lattice_of
+from warpflat.surface.mesh import Surface, known_of_faces
 from warpflat.surface.paths import path_length
 from warpflat.surface.pieces import Piece, apply_cut, split_pieces
 from warpflat.surface.split import split_faces_along
@@ -175,6 +176,9 @@ def _make(surface: Surface, plans: Sequence[CutPlan]) -> _Made:
     ]
     # What the cut has had to know of the new faces, the relaxation asks for again.
     cut_surface = replace(apply_cut(surface, topology), of_faces=topology.of_faces)
+    if topology.component_count == 1:
+        lattice = cut_lattice(cut_surface, surface, topology.vertex_origin)
+        topology.of_faces.update(known_of_faces(topology.faces, {lattice_of: lattice}))
     return _Made(surface=cut_surface, cuts=tuple(applied), cut=topology)
 
 

@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
-from warpflat.surface.mesh import Surface, once_per_faces
+from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, read_only
 
 __all__ = ["Spread", "Thinned", "Transfer", "spread_of", "thinned_of"]
 
@@ -75,6 +75,7 @@ class Thinned:
         face_of: #G, for each of them one of the finer level's that lies in it.
         transfer: linear by index.
         carry: of the finer level's vertices (#V by 3 [m]), what carries layouts up by cubics.
+        of_faces: what is worked out of the faces (`warpflat.surface.mesh.once_per_faces`), for all surfaces that have them.
     """
 
     kept: IntArray
@@ -82,11 +83,7 @@ class Thinned:
     face_of: IntArray
     transfer: Transfer
     carry: Callable[[FloatArray], GridCarry | LatticeCarry]
-
-    @cached_property
-    def of_faces(self) -> dict[str, Any]:
-        """Room for what is worked out of the faces (`warpflat.surface.mesh.once_per_faces`), for all surfaces that have them."""
-        return {"faces": self.faces}
+    of_faces: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -141,7 +138,7 @@ def _quads(shape: tuple[int, ...]) -> list[int]:
 @lru_cache(maxsize=16)
 def _known_of_grid(rows: int, columns: int) -> dict[str, Any]:
     """What has been worked out of the faces of a small grid: pieces that are about as long for their width have the same."""
-    return {"faces": _faces_of(rows, columns)}
+    return known_of_faces(_faces_of(rows, columns))
 
 
 def _faces_of(rows: int, columns: int) -> IntArray:
@@ -197,12 +194,14 @@ def _every_second(surface: Surface, *, rows: bool, columns: bool) -> Thinned:
         for count, thin in zip(grid.shape, (rows, columns), strict=True)
     )
     kept = grid[np.ix_(*keep)]
+    faces = _faces_of(*kept.shape)
     return Thinned(
         kept=kept.ravel(),
-        faces=_faces_of(*kept.shape),
+        faces=faces,
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
         carry=lambda vertices: GridCarry(vertices, grid, keep),
+        of_faces=known_of_faces(faces),
     )
 
 
@@ -270,12 +269,21 @@ def _every_other(lattice: Lattice) -> Thinned | None:
     number = np.full(count, -1, dtype=np.int32)
     number[kept] = np.arange(len(kept), dtype=np.int32)
     faces = number[corners]
+    row, column = (
+        np.searchsorted(lines, line[kept]).astype(np.int32)
+        for lines, line in zip(keep, (lattice.row, lattice.column), strict=True)
+    )
+    face_row, face_column = (at.astype(np.int32) for at in np.divmod(blocks, width))
+    coarse = Lattice(
+        row=row, column=column, face_row=face_row, face_column=face_column, corner=faces, bends=lattice.bends[kept]
+    )
     return Thinned(
         kept=kept,
         faces=faces,
         face_of=at_corner[0],
         transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
         carry=lambda vertices: LatticeCarry(vertices, lattice, keep),
+        of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
     )
 
 

@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import fields, replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import numbered_grid as grid
 
 from warpflat.carry import LatticeCarry
 from warpflat.coarsen import coarser, coarser_surfaces
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
-from warpflat.surface.grid import lattice_of, rows_and_columns
+from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_columns
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import border_loops, components, euler_characteristic, non_manifold_edges
 
 BoolArray = NDArray[np.bool_]
@@ -219,3 +223,51 @@ def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level()
         assert lattice is not None
         for line in (lattice.row, lattice.column):
             assert np.diff(np.unique(line[lattice.bends])).min() >= 2
+
+
+def walked(surface: Surface, monkeypatch: pytest.MonkeyPatch) -> Lattice | None:
+    """The lattice found by a walk over the faces, whatever is known of them."""
+    with monkeypatch.context() as blind:
+        blind.setattr("warpflat.surface.grid.row_by_row", lambda _: None)
+        return lattice_of(replace(surface, of_faces={}))
+
+
+def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
+    assert ours is not None
+    assert theirs is not None
+    for field in fields(Lattice):
+        assert getattr(ours, field.name).dtype == getattr(theirs, field.name).dtype, field.name
+        np.testing.assert_array_equal(getattr(ours, field.name), getattr(theirs, field.name), err_msg=field.name)
+
+
+@pytest.mark.parametrize("name", PIECES)
+def test_coarser_lattices_are_known_from_the_finer_ones(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    steps = coarser_surfaces(PIECES[name])
+    lattices = [step for step in steps if step.surface.is_quad.all()]
+    assert len(lattices) > 0
+    for step in lattices:
+        assert_same(lattice_of(step.surface), walked(step.surface, monkeypatch))
+
+
+@pytest.mark.parametrize(("turn", "mirrored"), [(turn, mirrored) for turn in range(4) for mirrored in (False, True)])
+def test_the_lattice_of_a_grid_numbered_row_by_row_is_that_of_a_walk(
+    turn: int, mirrored: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    surface = grid(6, 9, turn, mirrored=mirrored)
+    assert row_by_row(surface) is not None
+    assert_same(lattice_of(surface), walked(surface, monkeypatch))
+
+
+@pytest.mark.parametrize("name", ["rectangle", "L", "hole", "numbered"])
+def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = grid(12, 15, 1) if name == "numbered" else PIECES[name]
+    lattice = lattice_of(whole)
+    assert lattice is not None
+    at = {(int(i), int(j)): v for v, (i, j) in enumerate(zip(lattice.row, lattice.column, strict=True))}
+    made = cut_along(whole.faces, [at[row, 4] for row in range(6)], vertex_count=len(whole.vertices))
+    assert made.component_count == 1
+    surface = make_surface(whole.vertices[made.vertex_origin], made.faces)
+    ours = cut_lattice(surface, whole, made.vertex_origin)
+    assert ours is not None
+    assert ours.bends.sum() > lattice.bends.sum()
+    assert_same(ours, walked(surface, monkeypatch))

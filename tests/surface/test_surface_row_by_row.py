@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from surface_meshes import numbered_grid as grid
 
 from warpflat.surface import Surface
 from warpflat.surface.row_by_row import row_by_row
@@ -12,16 +13,6 @@ from warpflat.surface.topology import half_edges
 from warpflat.surface.unfold import corners_around
 
 TURNS = [(turn, mirrored) for turn in range(4) for mirrored in (False, True)]
-
-
-def grid(rows: int, columns: int, turn: int = 0, *, mirrored: bool = False) -> Surface:
-    """A flat grid of 10 mm, its faces begun at one of their corners, wound one way or the other."""
-    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
-    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
-    faces = np.roll(faces[:, ::-1] if mirrored else faces, turn, axis=1)
-    y, x = np.divmod(np.arange(rows * columns), columns)
-    vertices = np.column_stack([0.01 * x, 0.01 * y, 0.001 * x * y])
-    return Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=i.ravel())
 
 
 def springs_by_ends(surface: Surface) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from warpflat.kernels.lattice import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_by_row import RowByRow, row_by_row
 from warpflat.surface.topology import half_edges_of, twins_of
 
-__all__ = ["Lattice", "lattice_of", "rows_and_columns"]
+__all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
 
 BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int32]
@@ -44,10 +44,13 @@ class Lattice:
 @once_per_faces
 def lattice_of(surface: Surface) -> Lattice | None:
     """Rows and columns of a mesh, None where it has none: triangles, inner vertices of three or five faces, tubes, or a piece that
-    overlaps itself on the lattice."""
+    overlaps itself on the lattice. Along its first face's first side columns count up, along the second rows."""
     faces, count = surface.faces, len(surface.vertices)
     if not surface.is_quad.all():
         return None
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        return _of_numbers(faces, numbered)
     he = half_edges_of(surface)
     twin = twins_of(he).astype(np.int32)
     place, queue = (
@@ -72,9 +75,6 @@ def lattice_of(surface: Surface) -> Lattice | None:
     for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
         if (row[corner[:, k]] != face_row + up).any() or (column[corner[:, k]] != face_column + right).any():
             return None
-    around = np.bincount(faces.ravel(), minlength=count)
-    on_border = np.zeros(count, dtype=bool)
-    on_border[he.tail[twin < 0]] = True
     return read_only(
         Lattice(
             row=row,
@@ -82,9 +82,56 @@ def lattice_of(surface: Surface) -> Lattice | None:
             face_row=face_row,
             face_column=face_column,
             corner=corner,
-            bends=on_border & (around != 2),
+            bends=_bends(surface),
         )
     )
+
+
+def _of_numbers(faces: IntArray, numbered: RowByRow) -> Lattice:
+    """Of a grid that is numbered row by row, without a walk over it."""
+    place = np.array([divmod(at, 2) for at in numbered.place])
+    to_right, up = place[1] - place[0], place[2] - place[1]
+    i, j = np.divmod(numbered.vertices.ravel(), np.int32(numbered.columns))
+    row, column = ((way[0] * i + way[1] * j).astype(np.int32) for way in (up, to_right))
+    row -= row.min()
+    column -= column.min()
+    ends = [np.isin(line, (0, line.max())) for line in (row, column)]
+    first = faces[:, 0]
+    return read_only(
+        Lattice(
+            row=row,
+            column=column,
+            face_row=row[first],
+            face_column=column[first],
+            corner=faces,
+            bends=ends[0] & ends[1],
+        )
+    )
+
+
+def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice | None:
+    """`lattice_of` a surface that a cut has made of another and left in one piece: no vertex or face has moved.
+
+    Args:
+        surface: with the faces of `whole`, in their order.
+        whole: uncut.
+        origin: #V, the vertex of `whole` at the place of each.
+    """
+    lattice = lattice_of(whole)
+    if lattice is None:
+        return None
+    slot = np.argmax(whole.faces == lattice.corner[:, :1], axis=1)
+    corner = np.take_along_axis(surface.faces, (slot[:, None] + np.arange(4)) % 4, axis=1)
+    row, column = lattice.row[origin], lattice.column[origin]
+    return read_only(replace(lattice, row=row, column=column, corner=corner, bends=_bends(surface)))
+
+
+def _bends(surface: Surface) -> BoolArray:
+    """#V, where the border turns."""
+    he, count = half_edges_of(surface), len(surface.vertices)
+    on_border = np.zeros(count, dtype=bool)
+    on_border[he.edges[he.count == 1]] = True
+    return on_border & (np.bincount(surface.faces.ravel(), minlength=count) != 2)
 
 
 @once_per_faces

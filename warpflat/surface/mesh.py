@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "once_per_faces", "once_per_surface", "read_only"]
+__all__ = ["Surface", "known_of_faces", "once_per_faces", "once_per_surface", "read_only"]
 
 Result = TypeVar("Result")
 
@@ -68,13 +68,13 @@ def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface]
 def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
     """The same of what the places of the vertices do not change: a surface that was made from another by `dataclasses.replace`, with the
     same array of faces, has its results too."""
-    name = f"{measure.__module__}.{measure.__qualname__}"
+    name = _name(measure)
 
     @wraps(measure)
     def remembered(surface: Surface) -> Result:
         known = surface.of_faces
         if known.get("faces") is not surface.faces:
-            known = {"faces": surface.faces}
+            known = known_of_faces(surface.faces)
             object.__setattr__(surface, "of_faces", known)
         if name not in known:
             known[name] = measure(surface)
@@ -82,6 +82,17 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
         return result
 
     return remembered
+
+
+def known_of_faces(
+    faces: NDArray[np.int32], results: Mapping[Callable[[Surface], Any], Any] | None = None
+) -> dict[str, Any]:
+    """`Surface.of_faces` for surfaces that have these faces (#F by 4): what functions `once_per_faces` would find out of them."""
+    return {"faces": faces} | {_name(measure): result for measure, result in (results or {}).items()}
+
+
+def _name(measure: Callable[..., Any]) -> str:
+    return f"{measure.__module__}.{measure.__qualname__}"
 
 
 def read_only(arrays: Result) -> Result:
