@@ -79,8 +79,7 @@ def main() -> None:
     wp.config.quiet = True
     for name in chosen.fabrics:
         fabric = find_fabric(name)
-        softness = max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
-        print(f"{name}, K/G {softness:.0f}")
+        print(f"{name}, K/G {fabric.softness:.0f}")
         print(
             f"{'':42s} {'1 %':>7s} {'ms':>8s} {'0.1 %':>7s} {'ms':>8s} {'rest':>7s} {'ms':>8s}   {'energy J':>11s}  flips"
         )

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from warpflat import flatten_all, levels
+from warpflat import flatten_all, network
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
@@ -334,8 +334,8 @@ def test_steps_along_lines_bring_soft_cloth_to_the_same_minimum_in_less_work(kin
     surface, datum = make_shape("bodice" if kind == "bodice" else "dome", resolution=41), "centre"
     exact = RelaxOptions(residual_tolerance=1e-4, energy_tolerance=1e-8)
     done = []
-    for softest in (levels._SOFT, math.inf):
-        monkeypatch.setattr(levels, "_SOFT", softest)
+    for softest in (network._SOFT, math.inf):
+        monkeypatch.setattr(network, "_SOFT", softest)
         piece = flatten(surface, fabric=cloth(1000.0 / 80.0), datum=datum, device="cpu", relax=exact)
         if kind == "crack":
             path = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:21, 12]

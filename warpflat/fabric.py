@@ -150,6 +150,11 @@ class Fabric:
         for key in ("curve_warp", "curve_weft"):
             _check_curve(self.name, key, getattr(self, key))
 
+    @property
+    def softness(self) -> float:
+        """K/G: how much stiffer it is along its threads than in shear."""
+        return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
+
     def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> NDArray[np.float64]:
         """Tension at given strains along one direction, by the curve where there is one.
 

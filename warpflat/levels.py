@@ -16,7 +16,6 @@ from scipy.sparse import block_diag, csr_array
 
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
-from warpflat.fabric import Fabric
 from warpflat.joined import begins, join_networks
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
@@ -26,7 +25,7 @@ from warpflat.rungs import Rung, rungs_of, stay
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 
-__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels", "softness"]
+__all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels"]
 
 FloatArray = NDArray[np.float64]
 BoolArray = NDArray[np.bool_]
@@ -53,8 +52,6 @@ _LEAST_OF_LEAP = 0.2
 # that in between cells would come far beyond, and raise the energy.
 _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
-# K/G from which two of the steps on a lattice are one along its lines.
-_SOFT = 12.0
 _CYCLES_ALONG_LINES = 2
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
@@ -183,7 +180,7 @@ class Levels:
             if fine.way is None:
                 fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
             self._levels.append(coarse)
-        if finest.network.model == "springs" and softness(finest.network.fabric) >= _SOFT:
+        if finest.network.goes_along_lines:
             for level in self._levels:
                 _smooth_along_lines(level)
         self.follow()
@@ -524,9 +521,4 @@ def _all_forces(state: Relaxation) -> Mark:
 
 
 def _watch_every(network: SpringNetwork) -> int:
-    return int(min(max(_WATCH_SOFT / math.sqrt(softness(network.fabric)), 1.0), _WATCH_EVERY))
-
-
-def softness(fabric: Fabric) -> float:
-    """K/G: how much stiffer the fabric is along its threads than in shear."""
-    return max(fabric.stiffness_warp, fabric.stiffness_weft) / fabric.shear_stiffness
+    return int(min(max(_WATCH_SOFT / math.sqrt(network.fabric.softness), 1.0), _WATCH_EVERY))

@@ -31,7 +31,7 @@ from numpy.typing import NDArray
 
 from warpflat.cycle_memory import CycleMemory
 from warpflat.large_start import carry_up
-from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels, softness
+from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, Watch, relax
@@ -106,7 +106,7 @@ def levels_pay(network: SpringNetwork) -> bool:
     """Whether cycles take less work than plain steps: always but for a soft cloth on a small mesh of triangles."""
     if network.surface.is_quad.all():
         return True
-    return network.vertex_count > _FEW or softness(network.fabric) < _SOFT
+    return network.vertex_count > _FEW or network.fabric.softness < _SOFT
 
 
 def relax_multilevel(

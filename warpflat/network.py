@@ -59,6 +59,8 @@ IntArray = NDArray[np.int32]
 # outweighs all others move against each other (the short side of a needle) without any correction; this share of the
 # stiffest spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
 _PAIR_SHARE = 0.5
+# K/G from which two of the steps on a lattice are one along its lines.
+_SOFT = 12.0
 
 
 @dataclass(kw_only=True)
@@ -222,6 +224,11 @@ class SpringNetwork:
     def pieces(self) -> Sequence[SpringNetwork]:
         """Of each piece that is relaxed on its own its network: the parts of a joined one, otherwise this one."""
         return self.parts or (self,)
+
+    @property
+    def goes_along_lines(self) -> bool:
+        """Whether some of the steps go along the lines of its lattices, if it has any."""
+        return self.model == "springs" and self.fabric.softness >= _SOFT
 
     @property
     def vertex_count(self) -> int:

@@ -15,6 +15,7 @@ from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, sp
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.launching import launch_each
 from warpflat.network import SpringNetwork
+from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 from warpflat.thinning import Transfer
@@ -26,6 +27,8 @@ IntArray = NDArray[np.int32]
 
 # A cell pressed to less than this share of its area is mended as if it were mirrored.
 _LEAST_AREA = 1e-6
+# Vertices of such a grid.
+_LOWEST_GRID = 240
 # By so much springs of coarser levels may be made weaker or stronger, to store what the finer ones do.
 _WEIGHTS = (0.1, 10.0)
 
@@ -77,7 +80,7 @@ def rungs_of(
     rungs: list[Rung] = []
     # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
     ready = iter(coarser_surfaces(network.surface))
-    while not is_coarsest(network.surface):
+    while not _is_lowest(network):
         step = next(ready, None)
         rung = known.get(step.surface) if known and step is not None else None
         rung = rung or _rung(network, layout, step, mend=mend)
@@ -89,6 +92,13 @@ def rungs_of(
         rungs.append(rung)
         network, layout = rung.network, rung.layout
     return rungs
+
+
+def _is_lowest(network: SpringNetwork) -> bool:
+    """Whether a level is relaxed by steps. On a grid of a stiff cloth these take less time than another level below it would; in a soft
+    one, or beside a crack that opens, they would be too many."""
+    few = network.vertex_count <= _LOWEST_GRID and network.model == "springs" and not network.goes_along_lines
+    return (few and rows_and_columns(network.surface) is not None) or is_coarsest(network.surface)
 
 
 @dataclass(frozen=True, kw_only=True)
