@@ -50,6 +50,33 @@ def test_a_scene_cuts_along_lines_points_and_planes(tmp_path: Path):
     assert json.loads((tmp_path / "metrics.json").read_text())["pieces"]["trial"]["cuts"][0]["name"] == "bust"
 
 
+def test_a_fish_eye_cut_that_overlaps_gives_a_note_and_no_pattern(tmp_path: Path):
+    cuts = [{"name": "w", "line": "centre", "part": [0.4, 0.9]}]
+    result = run_scene(scene(cuts=cuts, **QUIET), tmp_path)
+    (seam,) = result.metrics["pieces"]["trial"]["cuts"][0]["seams"]
+    assert seam["kind"] == "fish-eye"
+    assert seam["angle_deg"] < 0
+    assert seam["intake_m"] == -seam["opening_m"] < 0
+    assert "overlaps" in seam["drawn"]["not_drawn"]
+    assert any("no pattern was drawn" in note and "dart 'w' overlaps" in note for note in result.notes)
+    assert not (tmp_path / "trial.svg").exists()
+
+
+@pytest.mark.parametrize(
+    "path",
+    [
+        {"from": [0.131, 0.45, 0.073], "to": [0.11, 0.28, 0.136]},
+        {"plane": {"point": [-0.11, 0.28, 0.13], "normal": [1.0, 0.0, 0.0], "towards": [0.0, 1.0, 0.0]}},
+    ],
+)
+def test_the_paths_of_the_documentation_open_as_darts(path: dict[str, object], tmp_path: Path):
+    result = run_scene(scene(cuts=[{"name": "slant", **path}], **QUIET), tmp_path)
+    (seam,) = result.metrics["pieces"]["trial"]["cuts"][0]["seams"]
+    assert seam["kind"] == "dart"
+    assert seam["intake_m"] > 0.1
+    assert (tmp_path / "trial.svg").exists()
+
+
 def test_one_film_tells_the_whole_story(tmp_path: Path):
     from pxr import Usd, UsdGeom
 

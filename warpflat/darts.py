@@ -79,7 +79,7 @@ def _measure_seam(
     elif kind == "fish-eye":
         eye = fish_eye_measure(positions, seam.left, seam.right)
         found |= {
-            "opening_m": eye.intake,
+            "opening_m": abs(eye.intake),
             "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
             "intake_m": eye.intake,
             "tip_to_tip_m": eye.length,

@@ -215,7 +215,7 @@ def _widest(result: Flattening) -> tuple[float, float]:
             found.append((dart.opening, dart.angle))
         elif kind == "fish-eye":
             eye = fish_eye_measure(result.positions, seam.left, seam.right)
-            found.append((eye.intake, min(eye.first_angle, eye.last_angle)))
+            found.append((abs(eye.intake), min(eye.first_angle, eye.last_angle)))
         else:
             gap = np.linalg.norm(result.positions[seam.left] - result.positions[seam.right], axis=1)
             found.append((float(gap.max()), math.nan))

@@ -265,6 +265,29 @@ def test_a_fisheye_dart_is_marked_not_cut():
     assert np.allclose(tips, [(0.1, 0.05), (0.1, 0.25)])
 
 
+@pytest.mark.parametrize(
+    ("points", "message"),
+    [
+        ([(0.09, 0.15), (0.1, 0.25), (0.11, 0.15), (0.1, 0.05)], "dart 'waist' overlaps by 1"),
+        (
+            [(0.1, 0.05), (0.105, 0.08), (0.095, 0.15), (0.1, 0.25), (0.105, 0.15), (0.095, 0.08)],
+            "dart 'waist' overlaps",
+        ),
+    ],
+)
+def test_a_fisheye_dart_that_overlaps_is_no_dart(points, message):
+    with pytest.raises(InputError, match=message):
+        square(holes=[Hole(name="waist", kind="dart", points=np.array(points))])
+    with pytest.raises(InputError, match="around hole 'pocket' lies on itself"):
+        square(holes=[Hole(name="pocket", points=np.array(points))])
+
+
+def test_sides_of_a_fisheye_dart_may_touch():
+    points = [(0.1, 0.05), (0.1002, 0.08), (0.102, 0.15), (0.1, 0.25), (0.098, 0.15), (0.1003, 0.08)]
+    piece = draft_piece(square(holes=[Hole(name="waist", kind="dart", points=np.array(points))]))
+    assert set(piece.fisheyes) == {"waist"}
+
+
 def test_the_grain_points_up_and_nothing_is_scaled():
     grain = np.array([(0.05, 0.05), (0.15, 0.15)])
     piece = draft_piece(square(grain=grain))

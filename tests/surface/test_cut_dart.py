@@ -138,6 +138,17 @@ def fish_eye_layout(gap: float):
     return positions, cut
 
 
+def test_a_fish_eye_that_gapes_in_the_middle_and_overlaps_at_its_tips_is_no_dart():
+    positions, cut = fish_eye_layout(0.04)
+    sides = cut.left[[1, -2]], cut.right[[1, -2]]
+    positions[sides[0], 0], positions[sides[1], 0] = 0.51, 0.49
+    measure = fish_eye_measure(positions, cut.left, cut.right)
+    assert measure.intake == pytest.approx(0.04)
+    assert 0.005 < measure.overlap < 0.02
+    with pytest.raises(InputError, match="overlaps by"):
+        shape_fish_eye(positions, cut.left, cut.right)
+
+
 def test_fish_eye():
     positions, cut = fish_eye_layout(0.04)
     assert cut.kind == "slit"
@@ -154,8 +165,12 @@ def test_fish_eye():
     np.testing.assert_allclose(drawn.right_point, [0.52, 0.5])
     assert drawn.first_leg == pytest.approx(np.hypot(0.25, 0.02))
     assert drawn.last_leg == pytest.approx(drawn.first_leg)
+    assert measure.overlap == 0
     positions, cut = fish_eye_layout(-0.04)
-    assert fish_eye_measure(positions, cut.left, cut.right).first_angle < 0
+    measure = fish_eye_measure(positions, cut.left, cut.right)
+    assert measure.first_angle < 0
+    assert measure.intake == pytest.approx(-0.04)
+    assert measure.overlap == pytest.approx(0.04, rel=0.1)
     with pytest.raises(InputError, match="overlaps"):
         shape_fish_eye(positions, cut.left, cut.right)
 

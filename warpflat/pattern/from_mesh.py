@@ -34,6 +34,7 @@ def piece_from_mesh(
     kinds: Mapping[str, str] | None = None,
     allowances: Mapping[str, float] | None = None,
     darts: Mapping[str, tuple[int, int, int]] | None = None,
+    eyes: Mapping[str, ArrayLike] | None = None,
     grain_line: str | None = None,
     corner_angle: float = np.radians(35.0),
     size: str = "",
@@ -45,8 +46,8 @@ def piece_from_mesh(
 
     The border is split at its corners, at the ends of darts and wherever a feature line begins or ends to run along
     it. An edge is named by the line along it ("side"; a second stretch is "side_2"), others "edge_1", "edge_2" ...;
-    the legs of a dart "NAME.left" and "NAME.right". Border loops inside become cutouts, feature lines inside internal
-    lines.
+    the legs of a dart "NAME.left" and "NAME.right". Border loops inside become cutouts and fish-eye darts, feature lines
+    inside internal lines.
 
     Args:
         faces: #F by 4, -1 in the last column of a triangle, consistently wound.
@@ -57,13 +58,14 @@ def piece_from_mesh(
         allowances: allowance [m] by edge name.
         darts: by name, the vertices (left mouth, tip, right mouth) in border order, counter-clockwise. Other cracks are
             found where the border turns back sharply between two equally long legs that end in corners.
+        eyes: by name, the vertices on both sides of a crack inside: a fish-eye dart. Other border loops inside are cutouts.
         grain_line: the feature line whose direction, from its first vertex to its last, is the grain; None takes y.
         corner_angle: [rad], a border vertex that turns by more is a corner.
         size, fabric, quantity, paired: as in :class:`Piece`.
 
     Raises:
-        InputError: unknown names, a mesh without a border, dart vertices that are not on it, or a border that crosses
-            itself.
+        InputError: unknown names, a mesh without a border, dart vertices that are not on it, a border that crosses
+            itself, or a crack or hole around which the cloth lies on itself.
     """
     flat = np.asarray(positions, dtype=np.float64)
     if flat.ndim != 2 or flat.shape[1] != 2 or not np.isfinite(flat).all():
@@ -102,8 +104,19 @@ def piece_from_mesh(
         darts=[Dart(name=key, left=f"{key}.left", right=f"{key}.right") for key in named],
         internal_lines=_internal(flat, faces, loops, curves),
         grain=grain,
-        holes=[Hole(name=f"hole_{i + 1}", points=flat[hole[::-1]]) for i, hole in enumerate(holes)],
+        holes=_holes(flat, holes, eyes or {}),
     )
+
+
+def _holes(flat: Vector, loops: Sequence[NDArray[np.int32]], eyes: Mapping[str, ArrayLike]) -> list[Hole]:
+    """The border loops inside, counter-clockwise: those of cracks by their names, the others numbered."""
+    cracks = {name: np.unique(np.asarray(vertices)) for name, vertices in eyes.items()}
+    holes = []
+    for number, loop in enumerate(loops, start=1):
+        eye = next((name for name, crack in cracks.items() if np.array_equal(crack, np.sort(loop))), None)
+        name, kind = (f"hole_{number}", "cutout") if eye is None else (eye, "dart")
+        holes.append(Hole(name=name, points=flat[loop[::-1]], kind=kind))
+    return holes
 
 
 def _area(ring: Vector) -> float:

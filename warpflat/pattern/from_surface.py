@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -13,7 +13,7 @@ from warpflat.darts import seam_kind
 from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
 from warpflat.pattern.from_mesh import piece_from_mesh
-from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
 from warpflat.surface.topology import border_loops
 
 if TYPE_CHECKING:
@@ -57,7 +57,8 @@ def pattern_of_surface(
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, a border crosses itself, or a named seam's side is no edge.
+        InputError: the rules name an edge that does not exist, a border crosses itself, a crack overlaps, or a named
+            seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
@@ -69,14 +70,14 @@ def pattern_of_surface(
 
 def _piece(result: Flattening, size: str) -> Piece:
     darts: dict[str, tuple[int, int, int]] = {}
-    eyes: dict[str, Vector] = {}
+    eyes: dict[str, Ids] = {}
     loops = border_loops(result.faces)
     for cut in result.cuts:
         for number, seam in enumerate(cut.seams, start=1):
             title = cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}"
             kind = seam_kind(seam)
             if kind == "fish-eye":
-                eyes[title] = result.positions[np.union1d(seam.left, seam.right)]
+                eyes[title] = np.union1d(seam.left, seam.right)
             elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
                 darts[title] = places
     piece = piece_from_mesh(
@@ -85,15 +86,15 @@ def _piece(result: Flattening, size: str) -> Piece:
         name=result.surface.name,
         lines=result.network.surface.lines,
         darts=darts,
+        eyes=eyes,
         size=size,
         fabric=result.fabric.name,
     )
-    holes = [_as_fish_eye(hole, eyes) for hole in piece.holes]
     drawn = [replace(dart, cut=_bent(piece, dart)) for dart in piece.darts]
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
     grain = _beside(grain_of(piece.outline, result, datum), piece)
-    return replace(piece, holes=holes, darts=drawn, grain=grain)
+    return replace(piece, darts=drawn, grain=grain)
 
 
 def _beside(grain: Vector, piece: Piece) -> Vector:
@@ -134,14 +135,6 @@ def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:
             first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
             return first, tip, second
     return None
-
-
-def _as_fish_eye(hole: Hole, eyes: Mapping[str, Vector]) -> Hole:
-    """A hole that a cut has opened is a dart of the cut's name, any other one stays what it is."""
-    for name, points in eyes.items():
-        if len(points) == len(hole.points) and np.allclose(np.sort(points, axis=0), np.sort(hole.points, axis=0)):
-            return replace(hole, name=name, kind="dart")
-    return hole
 
 
 def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:

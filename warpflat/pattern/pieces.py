@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 __all__ = ["DEFAULT_ALLOWANCE", "EDGE_KINDS", "Dart", "Edge", "Garment", "Hole", "Piece", "Seam", "SeamSide"]
 
@@ -93,7 +94,7 @@ class Hole:
 
     Attributes:
         name: unique in its piece.
-        points: #P by 2 [m], the first not repeated.
+        points: #P by 2 [m], counter-clockwise, the first not repeated.
         kind: "cutout" (cut away) or "dart" (a fish-eye dart: sewn shut, not cut; drill holes at its two ends).
     """
 
@@ -157,6 +158,7 @@ class Piece:
         _check_names(self, where)
         _check_outline(self, where)
         _check_darts(self, where)
+        _check_holes(self, where)
 
     @property
     def on_fold(self) -> bool:
@@ -383,3 +385,16 @@ def _check_darts(piece: Piece, where: str) -> None:
             raise InputError(
                 f"{where}: edge {edge.name!r} is of kind 'dart' but belongs to {legs.count(edge.name)} darts, not 1"
             )
+
+
+def _check_holes(piece: Piece, where: str) -> None:
+    for hole in piece.holes:
+        width = overlap_width(hole.points)
+        if width <= OVERLAP:
+            continue
+        if hole.kind == "dart":
+            raise InputError(f"{where}: dart {hole.name!r} {overlapping(width)}")
+        raise InputError(
+            f"{where}: the cloth around hole {hole.name!r} lies on itself by {width * 1000:.1f} mm; a hole runs "
+            "counter-clockwise and does not cross itself"
+        )

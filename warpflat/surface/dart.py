@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 __all__ = [
     "DartMeasure",
@@ -61,14 +62,16 @@ class FishEyeMeasure:
 
     Attributes:
         length: from tip to tip [m].
-        intake: its widest gap between matching points [m].
-        station: which of the matching points that is, counted along the cut.
+        intake: its widest gap between matching points [m]; negative for an overlap.
+        overlap: width of the widest place in which its two sides lie over each other [m]; 0 if it gapes all along.
+        station: which of the matching points are the widest, counted along the cut.
         first_angle, last_angle: at the two tips, between the lines to the widest points [rad]; negative for an overlap.
         left_seam, right_seam: lengths along the edges [m].
     """
 
     length: float
     intake: float
+    overlap: float
     station: int
     first_angle: float
     last_angle: float
@@ -219,10 +222,7 @@ def shape_dart(
 
 def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float | None, fold: str) -> None:
     if measure.angle <= 0:
-        raise InputError(
-            f"the cut at vertex {mouth} overlaps by {measure.opening * 1e3:.1f} mm instead of gaping: there is no dart "
-            "to sew; it needs more cloth there, not less"
-        )
+        raise InputError(f"the cut at vertex {mouth} {overlapping(measure.opening)}")
     room = min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2))
     if not (np.isfinite(tip_back) and 0 <= tip_back < room):
         raise InputError(
@@ -293,9 +293,14 @@ def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) ->
     gap = np.linalg.norm(x[a] - x[b], axis=1)
     station = int(np.argmax(gap))
     wide = x[a[station]], x[b[station]]
+    # The middle of the crack and the way along it there: the axis is another way where a crack is bent.
+    middle = 0.5 * (x[a] + x[b])
+    along = middle[station + 1] - middle[station - 1]
+    across = wide[0] - wide[1]
     return FishEyeMeasure(
         length=length,
-        intake=float(gap[station]),
+        intake=float(np.copysign(gap[station], along[0] * across[1] - along[1] * across[0])),
+        overlap=overlap_width(np.concatenate([x[b[:-1]], x[a[:0:-1]]])),
         station=station,
         first_angle=_angle(wide[1] - x[a[0]], wide[0] - x[a[0]]),
         last_angle=_angle(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
@@ -320,8 +325,8 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
     axis = _unit(last - first)
     middle = 0.5 * (x[a[measure.station]] + x[b[measure.station]])
     along = float((middle - first) @ axis)
-    if measure.first_angle <= 0 or measure.last_angle <= 0:
-        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} overlaps instead of gaping: no dart to sew")
+    if measure.first_angle <= 0 or measure.last_angle <= 0 or measure.overlap > OVERLAP:
+        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} {overlapping(measure.overlap)}")
     room = min(along, measure.length - along)
     if not (np.isfinite(tip_back) and 0 <= tip_back < room):
         raise InputError(

@@ -1,0 +1,41 @@
+"""Where the cloth around a crack or a hole of a layout lies on itself."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+__all__ = ["OVERLAP", "overlap_width", "overlapping"]
+
+#: Sides that lie over each other by no more than this [m] are drawn and sewn as if they met.
+OVERLAP = 5e-4
+
+
+def overlap_width(ring: NDArray[np.float64]) -> float:
+    """Width [m] of the widest place in which the cloth around a hole lies on itself; 0 if it does so nowhere.
+
+    Args:
+        ring: #P by 2 [m], the border of the hole, closed, the first point not repeated, counter-clockwise.
+    """
+    import shapely
+
+    # Round a place that two sides reach across, the line runs the other way.
+    cells = shapely.get_parts(shapely.polygonize([shapely.node(shapely.LinearRing(ring))]))
+    twice = [cell for cell in cells if _turns_around(ring, np.asarray(cell.representative_point().coords[0])) < 0]
+    return max((2.0 * float(shapely.maximum_inscribed_circle(cell).length) for cell in twice), default=0.0)
+
+
+def overlapping(width: float) -> str:
+    """What is said of a cut whose sides lie over each other by so much [m]."""
+    return (
+        f"overlaps by {width * 1e3:.1f} mm instead of gaping: there is no dart to sew; it needs more cloth there, "
+        "not less"
+    )
+
+
+def _turns_around(ring: NDArray[np.float64], point: NDArray[np.float64]) -> int:
+    """How often a closed line runs round a point, counter-clockwise."""
+    spoke = ring - point
+    ahead = np.roll(spoke, -1, axis=0)
+    cross = spoke[:, 0] * ahead[:, 1] - spoke[:, 1] * ahead[:, 0]
+    return round(float(np.arctan2(cross, np.einsum("ij,ij->i", spoke, ahead)).sum()) / (2 * np.pi))
