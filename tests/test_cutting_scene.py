@@ -77,6 +77,48 @@ def test_the_paths_of_the_documentation_open_as_darts(path: dict[str, object], t
     assert (tmp_path / "trial.svg").exists()
 
 
+@pytest.mark.parametrize(
+    ("shape", "table", "curved"),
+    [
+        ("bodice", {"line": "bust", "part": [0.0, 0.27]}, False),
+        ("bodice", {"from": [-0.0823, 0.0, 0.0908], "to": [-0.1117, 0.28, 0.1357]}, True),
+        ("saddle", {"line": "centre", "part": [0.2, 0.8]}, None),
+    ],
+    ids=["folded", "cut away", "fish-eye"],
+)
+def test_the_pattern_draws_darts_as_they_are_measured_with_their_tips_moved_back(
+    shape: str, table: dict[str, object], curved: bool | None, tmp_path: Path
+):
+    back = 0.02
+    surface = {"shape": shape, "resolution": 33}
+    made = scene(surface=surface, cuts=[{"name": "d", "tip_back": back, **table}], **QUIET)
+    (seam,) = run_scene(made, tmp_path).metrics["pieces"]["trial"]["cuts"][0]["seams"]
+    (piece,) = json.loads((tmp_path / "pattern.json").read_text())["sizes"][""].values()
+    drawn, measured = [np.array(hole["at"]) for hole in piece["drill_holes"]], seam["drawn"]
+    assert measured["tip_back_m"] == back
+    if curved is None:
+        assert np.linalg.norm(drawn[1] - drawn[0]) == pytest.approx(seam["tip_to_tip_m"] - 2 * back, abs=5e-4)
+        (sides,) = piece["fisheye_darts"].values()
+        assert np.ptp(np.array(sides), axis=0)[0] == pytest.approx(measured["intake_m"], rel=0.05)
+        return
+    (dart,) = piece["darts"]
+    assert measured["curved"] is curved
+    assert (dart["fold"] is None) is curved
+    assert dart["length_mm"] == pytest.approx([1e3 * measured["leg_m"]] * 2, abs=1.0)
+    assert abs(dart["length_mm"][0] - dart["length_mm"][1]) < 0.5
+    assert dart["opening"] == pytest.approx(measured["intake_m"], abs=1e-3)
+    # By the distances from the leg's end: the pattern lies in a frame of its own.
+    mouth = np.array(next(edge["line"][0] for edge in piece["edges"] if edge["name"] == "d.left"))
+    points = np.array(measured["points_m"])
+    assert np.linalg.norm(drawn[0] - mouth) == pytest.approx(np.linalg.norm(points[1] - points[0]), abs=3e-3)
+
+
+def test_a_tip_moved_back_too_far_is_a_note(tmp_path: Path):
+    cuts = [{"name": "d", "line": "bust", "part": [0.0, 0.27], "tip_back": 0.2}]
+    result = run_scene(scene(cuts=cuts, **QUIET), tmp_path)
+    assert any("dart 'd': tip_back is 200.0 mm; it must be 0 or more and less than" in note for note in result.notes)
+
+
 def test_one_film_tells_the_whole_story(tmp_path: Path):
     from pxr import Usd, UsdGeom
 

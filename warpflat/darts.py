@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError
 from warpflat.surface.cut import Seam
-from warpflat.surface.dart import dart_measure, fish_eye_measure, shape_dart, shape_fish_eye
+from warpflat.surface.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
+from warpflat.surface.drawn_legs import are_curved, pull_back
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import border_loops
 
@@ -98,7 +99,7 @@ def _measure_seam(
 def _drawn(
     positions: NDArray[np.float64], seam: Seam, kind: str, tip_back: float, loops: list[NDArray[np.int32]]
 ) -> dict[str, Any]:
-    """The dart as it is drawn: tip moved back, legs made equal; what stands in the way where it cannot be."""
+    """The dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run; else why it is not."""
     try:
         if kind == "fish-eye":
             eye = shape_fish_eye(positions, seam.left, seam.right, tip_back=tip_back)
@@ -108,15 +109,32 @@ def _drawn(
                 "intake_m": eye.intake,
                 "points_m": [p.tolist() for p in (eye.first_tip, eye.left_point, eye.last_tip, eye.right_point)],
             }
-        mouth = seam.left[0] if seam.left[0] != seam.right[0] else seam.left[-1]
-        outline = next(loop for loop in loops if mouth in loop)
+        x, left, right = mouth_first(positions, seam.left, seam.right)
+        outline = next(loop for loop in loops if left[0] in loop)
         dart = shape_dart(positions, seam.left, seam.right, outline, tip_back=tip_back)
+        legs = pull_back(x[left], x[right], tip_back)
     except InputError as reason:
         return {"not_drawn": str(reason)}
+    if are_curved(*legs):
+        return {"tip_back_m": tip_back, "curved": True, **_curved(*legs)}
     return {
         "tip_back_m": tip_back,
+        "curved": False,
         "leg_m": dart.leg_length,
         "angle_deg": math.degrees(dart.angle),
         "intake_m": dart.intake,
         "points_m": [p.tolist() for p in (dart.left_end, dart.tip, dart.right_end, dart.fold_point)],
+    }
+
+
+def _curved(left: NDArray[np.float64], right: NDArray[np.float64]) -> dict[str, Any]:
+    """A dart that is cut away along its curved legs, both from the border to the tip."""
+    tip = left[-1]
+    to_left, to_right = left[0] - tip, right[0] - tip
+    lengths = [float(np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()) for leg in (left, right)]
+    return {
+        "leg_m": sum(lengths) / 2,
+        "angle_deg": math.degrees(np.arctan2(abs(np.linalg.det([to_left, to_right])), to_left @ to_right)),
+        "intake_m": float(np.linalg.norm(to_left - to_right)),
+        "points_m": [p.tolist() for p in (left[0], tip, right[0])],
     }

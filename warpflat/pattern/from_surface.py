@@ -13,7 +13,9 @@ from warpflat.darts import seam_kind
 from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
 from warpflat.pattern.from_mesh import piece_from_mesh
-from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.surface.dart import fish_eye_measure
+from warpflat.surface.drawn_legs import are_curved, pull_back, pull_back_eye
 from warpflat.surface.topology import border_loops
 
 if TYPE_CHECKING:
@@ -26,8 +28,6 @@ __all__ = ["pattern_of_surface"]
 Vector = NDArray[np.float64]
 Ids = NDArray[np.int32]
 
-#: The legs of a dart that is folded stray from straight by no more than this [m], or this share of their length.
-FOLDED, FOLDED_SHARE = 2e-3, 0.04
 #: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
@@ -42,8 +42,8 @@ def pattern_of_surface(
 ) -> tuple[Garment, tuple[str, ...]]:
     """The pattern of one flattened surface, or of the pieces that cuts have left of it.
 
-    Cuts with a tip inside become darts of their names, those with two fish-eye darts; what parted the surface is a seam
-    between the two pieces.
+    Cuts with a tip inside become darts of their names, those with two fish-eye darts, their tips moved back as the cut
+    asks for; what parted the surface is a seam between the two pieces.
 
     Args:
         results: pieces of different names.
@@ -57,8 +57,8 @@ def pattern_of_surface(
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, a border crosses itself, a crack overlaps, or a named
-            seam's side is no edge.
+        InputError: the rules name an edge that does not exist, a border crosses itself, a crack overlaps, its tip
+            is moved back too far, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
@@ -70,14 +70,16 @@ def pattern_of_surface(
 
 def _piece(result: Flattening, size: str) -> Piece:
     darts: dict[str, tuple[int, int, int]] = {}
-    eyes: dict[str, Ids] = {}
+    eyes: dict[str, Cut] = {}
+    tip_back: dict[str, float] = {}
     loops = border_loops(result.faces)
     for cut in result.cuts:
         for number, seam in enumerate(cut.seams, start=1):
             title = cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}"
+            tip_back[title] = cut.tip_back
             kind = seam_kind(seam)
             if kind == "fish-eye":
-                eyes[title] = np.union1d(seam.left, seam.right)
+                eyes[title] = seam
             elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
                 darts[title] = places
     piece = piece_from_mesh(
@@ -86,11 +88,22 @@ def _piece(result: Flattening, size: str) -> Piece:
         name=result.surface.name,
         lines=result.network.surface.lines,
         darts=darts,
-        eyes=eyes,
+        eyes={title: np.union1d(seam.left, seam.right) for title, seam in eyes.items()},
         size=size,
         fabric=result.fabric.name,
     )
-    drawn = [replace(dart, cut=_bent(piece, dart)) for dart in piece.darts]
+    for title in [title for title in (*darts, *eyes) if tip_back[title] > 0]:
+        try:
+            if title in darts:
+                piece = _drawn_back(piece, title, tip_back[title])
+            else:
+                piece = _eye_drawn_back(piece, title, eyes[title], result.positions, tip_back[title])
+        except InputError as reason:
+            raise InputError(f"piece {piece.name!r}: dart {title!r}: {reason}") from None
+    drawn = [
+        replace(dart, cut=are_curved(piece.edge(dart.left).points, piece.edge(dart.right).points))
+        for dart in piece.darts
+    ]
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
     grain = _beside(grain_of(piece.outline, result, datum), piece)
@@ -112,16 +125,21 @@ def _beside(grain: Vector, piece: Piece) -> Vector:
     return grain
 
 
-def _bent(piece: Piece, dart: Dart) -> bool:
-    """Whether a leg leaves its chord so far that the wedge cannot be folded: it is cut out, with allowances."""
-    import shapely
+def _drawn_back(piece: Piece, title: str, tip_back: float) -> Piece:
+    """The piece with a dart whose legs meet so far [m] short of the end of the cut, as the cut asks for."""
+    left, right = piece.edge(f"{title}.left"), piece.edge(f"{title}.right")
+    legs = pull_back(left.points, right.points[::-1], tip_back)
+    moved = {left.name: legs[0], right.name: legs[1][::-1]}
+    edges = [replace(edge, points=moved.get(edge.name, edge.points)) for edge in piece.edges]
+    return replace(piece, edges=edges)
 
-    legs = [piece.edge(name).points for name in (dart.left, dart.right)]
-    for leg in legs:
-        chord = shapely.LineString(leg[[0, -1]])
-        if shapely.distance(chord, shapely.points(leg)).max() > max(FOLDED, FOLDED_SHARE * chord.length):
-            return True
-    return False
+
+def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: Vector, tip_back: float) -> Piece:
+    """Likewise with both ends of a fish-eye dart."""
+    station = fish_eye_measure(positions, seam.left, seam.right).station
+    left, right = pull_back_eye(positions[seam.left], positions[seam.right], station, tip_back)
+    ring = np.concatenate([right[:-1], left[:0:-1]])
+    return replace(piece, holes=[replace(h, points=ring) if h.name == title else h for h in piece.holes])
 
 
 def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:

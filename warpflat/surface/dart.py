@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.surface.drawn_legs import check_tip_back
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 __all__ = [
@@ -25,6 +26,7 @@ __all__ = [
     "dart_measure",
     "draw_outline",
     "fish_eye_measure",
+    "mouth_first",
     "shape_dart",
     "shape_fish_eye",
 ]
@@ -140,7 +142,7 @@ def dart_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> Dar
     Raises:
         InputError: if the cut has no tip (it parts the cloth) or two (a fish-eye dart), or a leg has no length.
     """
-    x, a, b = _mouth_first(positions, left, right)
+    x, a, b = mouth_first(positions, left, right)
     tip = x[a[-1]]
     to_left, to_right = x[a[0]] - tip, x[b[0]] - tip
     legs = float(np.linalg.norm(to_left)), float(np.linalg.norm(to_right))
@@ -187,7 +189,7 @@ def shape_dart(
         InputError: as :func:`dart_measure`; if the crack overlaps instead of gaping; if `tip_back` is negative or
             leaves no dart; if the crack's ends are not on the outline.
     """
-    x, a, b = _mouth_first(positions, left, right)
+    x, a, b = mouth_first(positions, left, right)
     _check_shape(dart_measure(positions, left, right), int(a[0]), tip_back, blend, fold)
     crack_tip = x[a[-1]]
     tip = crack_tip + tip_back * _unit(_unit(x[a[0]] - crack_tip) + _unit(x[b[0]] - crack_tip))
@@ -223,12 +225,7 @@ def shape_dart(
 def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float | None, fold: str) -> None:
     if measure.angle <= 0:
         raise InputError(f"the cut at vertex {mouth} {overlapping(measure.opening)}")
-    room = min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2))
-    if not (np.isfinite(tip_back) and 0 <= tip_back < room):
-        raise InputError(
-            f"tip_back is {tip_back * 1e3:.1f} mm; it must be 0 or more and less than the dart's length, "
-            f"{room * 1e3:.1f} mm"
-        )
+    check_tip_back(tip_back, min(measure.left_leg, measure.right_leg) * float(np.cos(measure.angle / 2)))
     if blend is not None and not (np.isfinite(blend) and blend >= 0):
         raise InputError(f"blend is a length in metres, 0 or more, got {blend!r}")
     if fold not in ("left", "right"):
@@ -327,12 +324,7 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
     along = float((middle - first) @ axis)
     if measure.first_angle <= 0 or measure.last_angle <= 0 or measure.overlap > OVERLAP:
         raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} {overlapping(measure.overlap)}")
-    room = min(along, measure.length - along)
-    if not (np.isfinite(tip_back) and 0 <= tip_back < room):
-        raise InputError(
-            f"tip_back is {tip_back * 1e3:.1f} mm; it must be 0 or more and less than the shorter half, "
-            f"{room * 1e3:.1f} mm"
-        )
+    check_tip_back(tip_back, min(along, measure.length - along), "shorter half")
     across = np.array([-axis[1], axis[0]]) * 0.5 * measure.intake
     centre = first + along * axis
     tips = first + tip_back * axis, last - tip_back * axis
@@ -345,6 +337,22 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
         first_leg=float(np.linalg.norm(centre + across - tips[0])),
         last_leg=float(np.linalg.norm(centre + across - tips[1])),
     )
+
+
+def mouth_first(
+    positions: ArrayLike, left: ArrayLike, right: ArrayLike
+) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
+    """The layout and both sides running from the border to the tip; turned round, left and right change places.
+
+    Args and errors are those of :func:`dart_measure`.
+    """
+    x, a, b = _sides(positions, left, right)
+    starts, ends = a[0] == b[0], a[-1] == b[-1]
+    if starts and ends:
+        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has two tips: measure it as a fish-eye dart")
+    if not (starts or ends):
+        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has no tip: it parts the cloth")
+    return (x, b[::-1], a[::-1]) if starts else (x, a, b)
 
 
 def _sides(
@@ -361,19 +369,6 @@ def _sides(
     if len(outside):
         raise InputError(f"a side of the cut names vertex {int(outside[0])}; the layout has 0 to {len(x) - 1}")
     return x, a, b
-
-
-def _mouth_first(
-    positions: ArrayLike, left: ArrayLike, right: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
-    """Both sides running from the border to the tip; turned round, left and right change places."""
-    x, a, b = _sides(positions, left, right)
-    starts, ends = a[0] == b[0], a[-1] == b[-1]
-    if starts and ends:
-        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has two tips: measure it as a fish-eye dart")
-    if not (starts or ends):
-        raise InputError(f"the cut from vertex {int(a[0])} to {int(a[-1])} has no tip: it parts the cloth")
-    return (x, b[::-1], a[::-1]) if starts else (x, a, b)
 
 
 def _outwards(outline: ArrayLike, side: NDArray[np.int32]) -> NDArray[np.int32]:
