@@ -18,14 +18,17 @@ from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_json
 from warpflat.export.svg import write_svg
 from warpflat.flattening import flatten
-from warpflat.pattern import Dart, Edge, Piece, draft_garment, draft_piece
+from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, draft_garment, draft_piece
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.from_garment import EdgeRules
+from warpflat.pattern.from_surface import pattern_of_surface
 from warpflat.pattern.read_json import pattern_from_json, read_pattern_json
 from warpflat.pattern.sample import sample_dress
 from warpflat.pattern_files import PatternOptions, export_pattern, surface_files
 from warpflat.scene import load_scene, run_scene
 from warpflat.shapes import make_shape
+from warpflat.surface import make_surface
 
 NEST = """
 name = "skirt"
@@ -181,6 +184,46 @@ def test_two_ragged_sides_of_a_dart_are_smoothed_alike_and_stay_equally_long():
     assert max(len(first.curve.bezier), len(second.curve.bezier)) <= 12 < len(fit_curve(left).bezier)
     assert max(first.fit_error, second.fit_error) < 0.004
     assert [note for note in piece.notes if "legs differ" in note] == []
+
+
+def test_holes_have_both_lines_in_every_file(tmp_path: Path):
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
+    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
+    vent = Hole(name="vent", points=0.1 + 0.05 * corners[:4])
+    garment = Garment(name="p", pieces={"": [Piece(name="p", edges=border, holes=[vent])]})
+    drafted = draft_garment(garment)
+    read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
+    assert pattern_json(read) == pattern_json(drafted)
+    for pattern in (drafted, read):
+        write_svg(pattern, tmp_path / "p.svg")
+        write_dxf(pattern, tmp_path / "p.dxf")
+        text = (tmp_path / "p.svg").read_text()
+        assert 'vent"' in text
+        assert 'vent.sew"' in text
+        (block,) = [b for b in ezdxf.readfile(tmp_path / "p.dxf").blocks if b.name == "P"]
+        rings = {
+            line.dxf.layer: shapely.Polygon([v.dxf.location.vec2 for v in line.vertices]).area
+            for line in block.query("POLYLINE")
+            if line.is_closed and line.dxf.layer in ("11", "14")
+        }
+        assert rings == {"11": pytest.approx(30.0**2), "14": pytest.approx(50.0**2)}
+
+
+def test_rules_name_holes():
+    dome = make_shape("dome", resolution=17)
+    around = np.linalg.norm(dome.vertices[dome.faces].mean(axis=1)[:, :2], axis=1) > 0.06
+    flat = flatten(make_surface(dome.vertices, dome.faces[around], name="ring"), fabric="woven")
+    for rules, width in (
+        (EdgeRules(), 0.010),
+        (EdgeRules(seam=0.006), 0.006),
+        (EdgeRules(allowances={"hole_1": 0.004}), 0.004),
+        (EdgeRules(kinds={"hole_1": "cut"}), 0.0),
+    ):
+        pattern, _ = pattern_of_surface([flat], name="p", rules=rules)
+        ((piece,),) = draft_garment(pattern).pieces.values()
+        assert piece.cutouts["hole_1"].width == width
+    with pytest.raises(InputError, match=r"kinds\.hole_1: a hole cannot be of kind 'fold'"):
+        pattern_of_surface([flat], name="p", rules=EdgeRules(kinds={"hole_1": "fold"}))
 
 
 # --- once more, from pattern.json

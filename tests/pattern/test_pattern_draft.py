@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 from warpflat.errors import InputError
 from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment, draft_piece
 from warpflat.pattern.curves import arc_lengths, fit_curve, turning_angles
+from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40", "42", "44")
@@ -263,6 +264,30 @@ def test_a_fisheye_dart_is_marked_not_cut():
     assert set(piece.cutouts) == {"pocket"}
     tips = sorted((hole.at - piece.frame[:, 2]).tolist() for hole in piece.drill_holes)
     assert np.allclose(tips, [(0.1, 0.05), (0.1, 0.25)])
+
+
+def test_a_hole_gets_its_allowance_inwards_or_a_note():
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0)])
+    holes = [
+        Hole(name="vent", points=0.05 + 0.05 * corners),
+        Hole(name="eyelet", points=[0.15, 0.15] + 0.015 * corners),
+        Hole(name="raw", points=[0.15, 0.05] + 0.015 * corners, allowance=0.0),
+    ]
+    piece = draft_piece(square(holes=holes))
+    vent, eyelet, raw = (piece.cutouts[name] for name in ("vent", "eyelet", "raw"))
+    assert vent.width == 0.010
+    assert shapely.Polygon(vent.sew_line).area == pytest.approx(0.05**2)
+    assert shapely.Polygon(vent.cut_line).area == pytest.approx(0.03**2)
+    assert shapely.Polygon(vent.sew_line).contains(shapely.Polygon(vent.cut_line))
+    for hole in (eyelet, raw):
+        assert hole.width == 0
+        assert np.array_equal(hole.cut_line, hole.sew_line)
+    assert piece.notes == ("eyelet is too small for an allowance of 10 mm: it is cut on its sewing line",)
+    roles = {stroke.name: stroke.role for stroke in draw_piece(piece).strokes}
+    assert (roles["vent"], roles["vent.sew"]) == ("cutout", "sew")
+    assert "eyelet.sew" not in roles
+    with pytest.raises(InputError, match="between 0 and"):
+        Hole(name="vent", points=corners, allowance=-0.01)
 
 
 @pytest.mark.parametrize(

@@ -148,8 +148,10 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, valid
     for name, line in piece.fisheyes.items():
         _polyline(block, line, scale, "8", closed=True)
         _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
-    for line in piece.cutouts.values():
-        _polyline(block, line, scale, "11", closed=True)
+    for cutout in piece.cutouts.values():
+        _polyline(block, cutout.cut_line, scale, "11", closed=True)
+        if cutout.width > 0:
+            _polyline(block, cutout.sew_line, scale, "14", closed=True)
     for hole in piece.drill_holes:
         _point(block, hole.at, scale, "13")
     if validation:

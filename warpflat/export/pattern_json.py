@@ -122,7 +122,9 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         ],
         "drill_holes": [{"name": hole.name, "at": hole.at.tolist()} for hole in piece.drill_holes],
         "internal_lines": _lists(piece.internal_lines),
-        "cutouts": _lists(piece.cutouts),
+        "cutouts": _lists({name: cutout.cut_line for name, cutout in piece.cutouts.items()}),
+        "cutout_sew_lines": _lists({name: cutout.sew_line for name, cutout in piece.cutouts.items()}),
+        "cutout_allowances": {name: cutout.width for name, cutout in piece.cutouts.items()},
         "fisheye_darts": _lists(piece.fisheyes),
         "grain": piece.grain.tolist(),
         "label": {

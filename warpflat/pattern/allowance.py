@@ -18,7 +18,7 @@ from warpflat.errors import InputError
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["CutOutline", "Side", "Wedge", "cut_outline"]
+__all__ = ["CutOutline", "Side", "Wedge", "cut_hole", "cut_outline"]
 
 Vector = NDArray[np.float64]
 
@@ -125,6 +125,26 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
     points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
     return CutOutline(points=points, notes=tuple(notes))
+
+
+def cut_hole(ring: Vector, width: float) -> Vector | None:
+    """The line along which a hole is cut, its allowance inwards of the sewing line.
+
+    Args:
+        ring: #P by 2 [m], the sewing line, closed, the first point not repeated.
+        width: of the allowance [m].
+
+    Returns:
+        #Q by 2 [m], counter-clockwise, closed likewise; None where the hole is too small or too narrow for one.
+    """
+    import shapely
+
+    if width <= 0:
+        return ring
+    inner = shapely.Polygon(ring).buffer(0).buffer(-width, join_style="mitre", mitre_limit=MITRE_REACH)
+    if inner.geom_type != "Polygon" or inner.area <= LOST:
+        return None
+    return np.asarray(shapely.orient_polygons(shapely.simplify(inner, 2e-6)).exterior.coords)[:-1]
 
 
 def _leading(side: Side | Wedge) -> Vector:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_outline
+from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
 from warpflat.pattern.fitting import fit_edges
 from warpflat.pattern.label import Label, default_grain, place_label
@@ -24,9 +24,10 @@ from warpflat.pattern.notches import (
     seam_notches,
     seam_reports,
 )
-from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Piece, Seam
+from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Hole, Piece, Seam
 
 __all__ = [
+    "DraftedCutout",
     "DraftedDart",
     "DraftedEdge",
     "DraftedGarment",
@@ -91,6 +92,15 @@ class DraftedDart:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedCutout:
+    """A hole that is cut out: its sewing and its cutting line (#P by 2 [m], closed), one if its allowance is 0 [m]."""
+
+    sew_line: Vector
+    cut_line: Vector
+    width: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class DrillHole:
     """A point [m] marked through the cloth."""
 
@@ -108,7 +118,8 @@ class DraftedPiece:
         edges: the sewing line in order, dart legs included.
         cut_line: #P by 2 [m], closed, counter-clockwise, first point not repeated.
         darts, drill_holes, notches: see their classes.
-        internal_lines, cutouts, fisheyes: #P by 2 [m] by name; the latter two closed.
+        internal_lines, fisheyes: #P by 2 [m] by name; the latter closed.
+        cutouts: by name.
         grain: 2 by 2 [m], from and to, upwards.
         label: what is written on it, and where.
         notes: what the cutter should know, one sentence each.
@@ -122,7 +133,7 @@ class DraftedPiece:
     drill_holes: tuple[DrillHole, ...]
     notches: tuple[Notch, ...]
     internal_lines: Mapping[str, Vector]
-    cutouts: Mapping[str, Vector]
+    cutouts: Mapping[str, DraftedCutout]
     fisheyes: Mapping[str, Vector]
     grain: Vector
     label: Label
@@ -221,8 +232,14 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
                 f"dart {dart.name} is cut away, not folded: {_why_cut(dart, left, right)}; sew its legs as a seam"
             )
     drafted_darts = tuple(_dart_lines(dart, wedges, edges, cut.points) for dart in piece.darts)
-    holes = {hole.name: (hole.kind, _moved(hole.points, frame)) for hole in piece.holes}
-    fisheyes = {name: _fisheye(points, tolerance) for name, (kind, points) in holes.items() if kind == "dart"}
+    holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
+    fisheyes = {hole.name: _fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
+    cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
+    notes += [
+        f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
+        for hole in piece.holes
+        if hole.name in cutouts and cutouts[hole.name].width < hole.width
+    ]
     for name, line in fisheyes.items():
         apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in eye_legs(line)))))
         if apart > SEAM_TOLERANCE:
@@ -234,7 +251,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     grain = default_grain(sew_line) if piece.grain is None else _moved(piece.grain, frame)
     obstacles = [grain, *internal.values()]
     obstacles += [np.concatenate([_line(edges, d.left), _line(edges, d.right)]) for d in piece.darts]
-    obstacles += [np.concatenate([p, p[:1]]) for _, p in holes.values()]
+    obstacles += [np.concatenate([p, p[:1]]) for p in holes.values()]
     folds = [edge.line for edge in edges if edge.kind == "fold"]
     return DraftedPiece(
         piece=piece,
@@ -245,7 +262,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         drill_holes=tuple(drills),
         notches=dart_notches(piece, wedges, cut.points),
         internal_lines=internal,
-        cutouts={name: points for name, (kind, points) in holes.items() if kind == "cutout"},
+        cutouts=cutouts,
         fisheyes=fisheyes,
         grain=grain,
         label=place_label(piece, garment, sew_line, obstacles, folds),
@@ -392,6 +409,13 @@ def eye_legs(line: Vector) -> tuple[Vector, Vector]:
     if tuple(first[0, ::-1]) > tuple(first[-1, ::-1]):
         return second, first[::-1]
     return first, second[::-1]
+
+
+def _cutout(hole: Hole, points: Vector) -> DraftedCutout:
+    line = cut_hole(points, hole.width)
+    if line is None:
+        return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
+    return DraftedCutout(sew_line=points, cut_line=line, width=hole.width)
 
 
 def _fisheye(points: Vector, tolerance: float | None) -> Vector:

@@ -76,6 +76,7 @@ def draw_piece(piece: DraftedPiece) -> Drawing:
     strokes = [
         _cut(piece),
         *(_edge(edge) for edge in piece.edges),
+        *_around_cutouts(piece),
         *_details(piece),
         *grain_strokes(piece.grain),
         *_internal(piece),
@@ -102,6 +103,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
         strokes = [
             _cut(piece),
             *(replace(_edge(e), hidden=e.kind not in ("dart", "fold")) for e in piece.edges),
+            *(replace(line, hidden=True) for line in _around_cutouts(piece)),
             *_details(piece),
         ]
         words: list[Words] = []
@@ -127,6 +129,15 @@ def _edge(edge: DraftedEdge) -> Stroke:
     return Stroke(role=role, name=edge.name, points=edge.line, curve=edge.curve)
 
 
+def _around_cutouts(piece: DraftedPiece) -> list[Stroke]:
+    """The sewing lines of holes that have an allowance."""
+    return [
+        Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
+        for name, cutout in piece.cutouts.items()
+        if cutout.width > 0
+    ]
+
+
 def _details(piece: DraftedPiece) -> list[Stroke]:
     strokes = [
         Stroke(role="dart_fold", name=f"{dart.dart.name}.fold", points=dart.fold)
@@ -142,7 +153,9 @@ def _details(piece: DraftedPiece) -> list[Stroke]:
         for axis in np.eye(2):
             cross = np.stack([hole.at - 1.5 * DRILL * axis, hole.at + 1.5 * DRILL * axis])
             strokes.append(Stroke(role="drill", name="", points=cross))
-    strokes += [Stroke(role="cutout", name=name, points=line, closed=True) for name, line in piece.cutouts.items()]
+    strokes += [
+        Stroke(role="cutout", name=name, points=cutout.cut_line, closed=True) for name, cutout in piece.cutouts.items()
+    ]
     for name, line in piece.fisheyes.items():
         left, right = eye_legs(line)
         strokes += [

@@ -13,7 +13,7 @@ from warpflat.darts import seam_kind
 from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
 from warpflat.pattern.from_mesh import piece_from_mesh
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.surface.dart import fish_eye_measure
 from warpflat.surface.drawn_legs import are_curved, pull_back, pull_back_eye
 from warpflat.surface.topology import border_loops
@@ -48,7 +48,7 @@ def pattern_of_surface(
     Args:
         results: pieces of different names.
         name: of the pattern.
-        rules: kinds and allowances of edges; an edge along a feature line has the line's name, others are called
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are called
             "edge_1" and so on, counter-clockwise.
         size: for the label.
         seams: of the border, by the lines that are sewn to each other.
@@ -63,8 +63,15 @@ def pattern_of_surface(
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
     named = [_named(seam, results, pieces) for seam in seams]
-    rules.check({piece.name: [edge.name for edge in piece.edges] for piece in pieces})
-    pieces = [replace(piece, edges=[_ruled(piece.name, edge, rules) for edge in piece.edges]) for piece in pieces]
+    rules.check({p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces})
+    pieces = [
+        replace(
+            piece,
+            edges=[_ruled(piece.name, edge, rules) for edge in piece.edges],
+            holes=[_ruled_hole(piece.name, hole, rules) for hole in piece.holes],
+        )
+        for piece in pieces
+    ]
     return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules, named)), ()
 
 
@@ -160,6 +167,16 @@ def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
         return edge
     kind = rules.kind(piece, edge.name, edge.kind)
     return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
+
+
+def _ruled_hole(piece: str, hole: Hole, rules: EdgeRules) -> Hole:
+    if hole.kind == "dart":
+        return hole
+    kind = rules.kind(piece, hole.name, "seam")
+    if kind not in ("seam", "hem", "cut"):
+        raise InputError(f"kinds.{hole.name}: a hole cannot be of kind {kind!r}; give it 'seam', 'hem' or 'cut'")
+    width = rules.allowance(piece, hole.name, kind)
+    return replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
 
 
 def _named(seam: NamedSeam, results: Sequence[Flattening], pieces: Sequence[Piece]) -> Seam:

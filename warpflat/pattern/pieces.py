@@ -96,21 +96,32 @@ class Hole:
         name: unique in its piece.
         points: #P by 2 [m], counter-clockwise, the first not repeated.
         kind: "cutout" (cut away) or "dart" (a fish-eye dart: sewn shut, not cut; drill holes at its two ends).
+        allowance: [m] of a cutout, inwards from its points; None for that of a seam.
     """
 
     name: str
     points: NDArray[np.float64]
     kind: str = "cutout"
+    allowance: float | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in ("cutout", "dart"):
             raise InputError(
                 f"hole {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, ('cutout', 'dart'))}"
             )
+        if self.allowance is not None and not 0 <= self.allowance <= 0.5:
+            raise InputError(f"hole {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
         points = _points(self.points, f"hole {self.name!r}", at_least=3)
         if np.linalg.norm(points[0] - points[-1]) < SAME_POINT:
             points = points[:-1]
         object.__setattr__(self, "points", points)
+
+    @property
+    def width(self) -> float:
+        """The allowance [m] that is left inside a cutout."""
+        if self.kind == "dart":
+            return 0.0
+        return DEFAULT_ALLOWANCE["seam"] if self.allowance is None else float(self.allowance)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

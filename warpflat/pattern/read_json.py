@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpflat.errors import InputError
 from warpflat.export.pattern_json import SCHEMA
 from warpflat.pattern.curves import Curve
-from warpflat.pattern.draft import DraftedDart, DraftedEdge, DraftedGarment, DraftedPiece, DrillHole
+from warpflat.pattern.draft import DraftedCutout, DraftedDart, DraftedEdge, DraftedGarment, DraftedPiece, DrillHole
 from warpflat.pattern.label import Label
 from warpflat.pattern.notches import Notch, SeamReport
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
@@ -108,10 +108,12 @@ def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
     darts = [
         Dart(name=d["name"], left=d["left"], right=d["right"], fold_to=d["fold_to"] or None) for d in data["darts"]
     ]
+    cutouts = {key: _cutout(data, key) for key in data["cutouts"]}
     holes = [
-        Hole(name=key, points=_back(_points(line), frame), kind=kind)
-        for group, kind in (("cutouts", "cutout"), ("fisheye_darts", "dart"))
-        for key, line in data[group].items()
+        Hole(name=key, points=_back(cutout.sew_line, frame), allowance=cutout.width) for key, cutout in cutouts.items()
+    ]
+    holes += [
+        Hole(name=key, points=_back(_points(line), frame), kind="dart") for key, line in data["fisheye_darts"].items()
     ]
     piece = Piece(
         name=name,
@@ -146,11 +148,19 @@ def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
         drill_holes=tuple(DrillHole(name=hole["name"], at=np.array(hole["at"])) for hole in data["drill_holes"]),
         notches=tuple(_notch(notch) for notch in data["notches"]),
         internal_lines={key: _points(line) for key, line in data["internal_lines"].items()},
-        cutouts={key: _points(line) for key, line in data["cutouts"].items()},
+        cutouts=cutouts,
         fisheyes={key: _points(line) for key, line in data["fisheye_darts"].items()},
         grain=_points(data["grain"]),
         label=Label(at=np.array(label["at"]), lines=tuple(zip(label["lines"], label["heights"], strict=True))),
         notes=tuple(data["notes"]),
+    )
+
+
+def _cutout(data: Mapping[str, Any], name: str) -> DraftedCutout:
+    return DraftedCutout(
+        sew_line=_points(data["cutout_sew_lines"][name]),
+        cut_line=_points(data["cutouts"][name]),
+        width=data["cutout_allowances"][name],
     )
 
 
