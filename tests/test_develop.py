@@ -12,6 +12,7 @@ from warpflat.errors import InputError
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, line_from_indices, make_surface, mesh_edges, triangulate
+from warpflat.surface.band import line_along_band
 from warpflat.surface.cut import cut_along
 from warpflat.surface.untangle import untangle
 
@@ -352,6 +353,96 @@ def test_the_choice_does_not_depend_on_the_numbering_or_the_place():
     faces = np.where(surface.faces >= 0, place[surface.faces], -1)
     shuffled = make_surface(surface.vertices[order] + [0.3, -2.0, 1.0], faces)
     np.testing.assert_array_equal(order[choose_datum(shuffled)], line)
+
+
+def band(
+    inner: float,
+    outer: float,
+    turn: float,
+    *,
+    rows: int,
+    height: float = 0.0,
+    columns: int = 60,
+    triangles: bool = False,
+) -> Surface:
+    """A band around the y axis through an angle, the outer border so much lower; vertex `rows + 1` times column plus row."""
+    angle, share = np.meshgrid(np.linspace(0, turn, columns + 1), np.linspace(0, 1, rows + 1), indexing="ij")
+    radius = inner + (outer - inner) * share
+    points = np.stack([radius * np.cos(angle), -height * share, radius * np.sin(angle)], axis=-1).reshape(-1, 3)
+    i = np.arange(len(points)).reshape(columns + 1, rows + 1)
+    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    return make_surface(points, quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3) if triangles else quads)
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+@pytest.mark.parametrize("turn", [240, 300, 355])
+@pytest.mark.parametrize(("inner", "height"), [(0.12, 0.05), (0.10, 0.0)], ids=["waistband", "neck facing"])
+def test_the_datum_of_a_curled_band_runs_through_its_middle_from_end_to_end(inner, height, turn, triangles):
+    surface = band(inner, 0.14, np.radians(turn), rows=4, height=height, triangles=triangles)
+    line = choose_datum(surface)
+    middle = np.arange(61) * 5 + 2
+    assert np.array_equal(line, middle) or np.array_equal(line, middle[::-1])
+    development = develop(surface, line)
+    assert development.method == ("geodesic" if triangles else "profiles")
+    assert development.notes == ()
+
+
+def test_the_datum_of_a_strip_one_face_wide_runs_along_one_side():
+    """It has no middle, and a line from corner to corner would cross it somewhere."""
+    surface = band(0.1, 0.105, np.radians(340), rows=1)
+    line = choose_datum(surface)
+    assert len(line) == 61
+    assert len(set((line % 2).tolist())) == 1
+    assert develop(surface, line).method == "profiles"
+
+
+def test_the_datum_of_a_band_of_any_triangles_and_with_holes_ends_at_its_ends():
+    whole = band(0.10, 0.14, np.radians(320), rows=6, columns=120)
+    for surface in (
+        make_surface(whole.vertices, np.delete(whole.faces, [6 * 10 + 2, 6 * 60 + 3], axis=0)),
+        scattered_band(0.10, 0.14, np.radians(320), seed=2),
+    ):
+        line = surface.vertices[choose_datum(surface)]
+        angle = np.sort(np.arctan2(line[[0, -1], 2], line[[0, -1], 0]) % (2 * np.pi))
+        np.testing.assert_allclose(angle, [0.0, np.radians(320)], atol=1e-9)
+        radius = np.hypot(line[:, 0], line[:, 2])
+        assert radius.min() > 0.105
+        assert radius.max() < 0.135
+
+
+def scattered_band(inner: float, outer: float, turn: float, *, seed: int) -> Surface:
+    """A flat band of random triangles."""
+    from scipy.spatial import Delaunay
+
+    length, width = turn * (inner + outer) / 2, outer - inner
+    rng = np.random.default_rng(seed)
+    edges = np.linspace(0, 1, 81), np.linspace(0, 1, 6)
+    sides = [np.column_stack([edges[0], np.full(81, row)]) for row in (0.0, 1.0)]
+    ends = [np.column_stack([np.full(4, column), edges[1][1:-1]]) for column in (0.0, 1.0)]
+    share = np.concatenate([rng.uniform(0.03, 0.97, (500, 2)), *sides, *ends])
+    radius, angle = inner + width * share[:, 1], turn * share[:, 0]
+    points = np.column_stack([radius * np.cos(angle), np.zeros(len(share)), radius * np.sin(angle)])
+    return make_surface(points, Delaunay(share * [length, width]).simplices)
+
+
+@pytest.mark.parametrize(("strap", "height"), [(3, 35), (2, 45)], ids=["front", "bib"])
+def test_a_front_with_a_deep_neckline_keeps_its_short_centre_line(strap: int, height: int):
+    """No band, however long the way from strap to strap."""
+    cells = [(i, j) for i in range(24) for j in range(height) if j < 12 or i < strap or i >= 24 - strap]
+    number: dict[tuple[int, int], int] = {}
+    faces = [
+        [number.setdefault(at, len(number)) for at in ((i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1))]
+        for i, j in cells
+    ]
+    surface = make_surface(np.array([(0.02 * i, 0.02 * j, 0.0) for i, j in number]), np.array(faces))
+    line = surface.vertices[choose_datum(surface)]
+    np.testing.assert_allclose(line[:, 0], 0.24, atol=1e-12)
+    assert len(line) == 13
+
+
+def test_a_ring_has_no_ends_and_no_such_line():
+    surface = ring(0.18, 0.2, around=48, across=3)
+    assert line_along_band(surface, np.array([0, 48, 96], dtype=np.int32)) is None
 
 
 @pytest.mark.parametrize("seed", range(4))

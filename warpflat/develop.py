@@ -17,6 +17,7 @@ from warpflat.cells import CellArrays, cells_of
 from warpflat.coarsen import Coarser, coarser_surfaces
 from warpflat.errors import InputError
 from warpflat.strain import signed_cell_areas
+from warpflat.surface.band import line_along_band
 from warpflat.surface.geodesic import signed_distance_and_station
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.lines import line_between, line_on_plane
@@ -75,7 +76,7 @@ def choose_datum(surface: Surface) -> IntArray:
 
     The long axis is the first principal axis of the surface; where length and width are within a fifth of each other, and
     one is nearer to the vertical (+y), that one. The line follows the section by the plane of that axis and the mean
-    normal.
+    normal. Of a band that this cuts crosswise, since it curls, the line runs through the middle from end to end instead.
     """
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
@@ -101,8 +102,10 @@ def choose_datum(surface: Surface) -> IntArray:
     if len(line) < 2 or line[0] == line[-1]:
         along = (surface.vertices - centre) @ long_axis
         line = line_between(surface, int(along.argmin()), int(along.argmax()))
+    band = line_along_band(surface, line)
+    line = line if band is None else band
     rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
-    leading = int(np.abs(long_axis).argmax())
+    leading = int(np.abs(long_axis if band is None else rising).argmax())
     upwards = rising[1] if abs(rising[1]) > 1e-6 * np.linalg.norm(rising) else rising[leading]
     return np.ascontiguousarray(line if upwards >= 0 else line[::-1], dtype=np.int32)
 
