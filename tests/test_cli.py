@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import io
 import json
+import math
 import os
 import re
 import subprocess
@@ -14,7 +15,7 @@ import pytest
 
 from warpflat._version import __version__
 from warpflat.cli import main
-from warpflat.console import ProgressBar
+from warpflat.console import ProgressBar, warnings_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -90,6 +91,23 @@ def test_a_run_that_does_not_converge_exits_with_1_and_says_so(warpflat: Run):
     assert re.fullmatch(r"warpflat: cap did not converge within 2 steps .*max_steps\n", err)
     code, out, err = warpflat("run", "cap.toml")
     assert re.search(r"^cap +81 .* NO$", out, re.MULTILINE)
+
+
+def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(warpflat: Run):
+    """Of which the steps on the piece's own mesh, less than max_steps, are a part."""
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 33\n[relax]\nmax_steps = 10\n" + BARE)
+    code, out, err = warpflat("run", "cap.toml", "--json")
+    last = json.loads(out)["pieces"]["cap"]["stages"][-1]
+    assert code == 1
+    assert last["steps"] < 10 <= last["work_units"]
+    assert f"cap did not converge within {last['work_units']:.0f} work units (residual " in err
+
+
+def test_a_residual_that_is_no_number_is_not_printed():
+    last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "spring_energy_j": 2e-3, "converged": False}
+    for residual in (math.inf, None):
+        lines = warnings_of({"pieces": {"front": {"stages": [{**last, "residual": residual}], "flipped_faces": 0}}})
+        assert lines == ["front did not converge within 9 steps (2 mJ left); the pattern is not final: raise max_steps"]
 
 
 def test_mended_input_is_noted(warpflat: Run):

@@ -18,7 +18,7 @@ from warpflat.compare import laid_upon
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, Progress, flatten
-from warpflat.relax import RelaxOptions
+from warpflat.relax import RelaxOptions, Solver
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, border_edges, make_surface, mesh_edges
 
@@ -258,6 +258,21 @@ def test_a_step_limit_is_reported_not_hidden():
     assert piece.measures["stages"][-1]["converged"] is False
     assert piece.measures["stages"][-1]["steps"] == 12
     assert piece.captions()["converged"] == "NO"
+
+
+@pytest.mark.parametrize("solver", ["plain", "multilevel"])
+def test_a_limit_that_the_first_of_two_rounds_reaches_leaves_a_residual_too(solver: Solver):
+    piece = flatten(
+        make_shape("dome", resolution=17, triangles=True),
+        fabric="woven",
+        datum="centre",
+        device="cpu",
+        relax=RelaxOptions(max_steps=2, solver=solver),
+    )
+    residual = piece.stages[-1].residual
+    assert residual is not None
+    assert 5e-3 < residual < np.inf
+    assert not piece.converged
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

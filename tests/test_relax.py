@@ -290,6 +290,37 @@ def test_a_layout_without_strain_is_at_rest_at_once():
     np.testing.assert_allclose(state.positions(), start, atol=1e-9)
 
 
+def test_a_layout_whose_energy_is_negligible_is_at_rest_whatever_rounding_leaves_of_the_forces():
+    network, start = developed(make_shape("cylinder", resolution=9), 200.0)
+    state = Relaxation(network, RelaxOptions(residual_tolerance=1e-12, max_steps=100), start=start)
+    outcome = relax(state)
+    assert outcome.converged
+    assert outcome.steps == state.options.check_every
+    assert outcome.residual > 1e-12
+
+
+def test_but_not_while_a_seam_pulls_at_it():
+    network, start = developed(make_shape("cylinder", resolution=9), 200.0)
+    edges = network.spring_arrays.ends[:2]
+    network.sew(edges.reshape(1, 4), np.array([1.1]), np.array([1e-6]))
+    state = Relaxation(network, RelaxOptions(residual_tolerance=1e-12, max_steps=10), start=start)
+    outcome = relax(state)
+    assert outcome.energies.potential < state.negligible_energy.sum()
+    assert not outcome.converged
+
+
+def test_a_state_without_a_step_left_says_what_its_forces_are():
+    network, start = developed(make_shape("dome", resolution=9), 200.0)
+    state = Relaxation(network, RelaxOptions(max_steps=10), start=start)
+    relax(state)
+    outcome = relax(state)
+    assert outcome.steps == 0
+    assert not outcome.converged
+    state.evaluate_at_rest()
+    assert outcome.residual == state.residual()
+    assert math.isfinite(outcome.residual)
+
+
 def test_the_middle_of_mass_stays_and_the_piece_does_not_run_away():
     network, start = developed(make_shape("dome", resolution=17), 200.0)
     state = Relaxation(network, RelaxOptions(kinetic_damping=False), start=start)

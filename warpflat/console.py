@@ -137,7 +137,7 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         last = piece["stages"][-1]
         if not _converged(piece):
             lines.append(
-                f"{name} did not converge within {last['steps']:,} steps (residual {last['residual']:.1e}); "
+                f"{name} did not converge within {_work(last)} ({_left(last)}); "
                 "the pattern is not final: raise max_steps"
             )
         if piece["flipped_faces"]:
@@ -268,6 +268,20 @@ def fabric_data(fabric: Fabric) -> dict[str, Any]:
 
 def _converged(piece: Mapping[str, Any]) -> bool:
     return all(stage["converged"] for stage in piece["stages"][-1:])
+
+
+def _work(stage: Mapping[str, Any]) -> str:
+    """What `max_steps` counts; with levels that is not the steps of the piece's own mesh alone."""
+    steps, units = stage["steps"], stage["work_units"]
+    return f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
+
+
+def _left(stage: Mapping[str, Any]) -> str:
+    """How far from rest a stage has ended: by the residual, unless forces are infinite, as of crushed faces."""
+    residual = stage["residual"]
+    if residual is None or not math.isfinite(residual):
+        return f"{1e3 * stage['spring_energy_j']:.3g} mJ left"
+    return f"residual {residual:.1e}"
 
 
 def _mark(fabric: Fabric, key: str) -> str:

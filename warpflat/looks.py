@@ -42,7 +42,7 @@ class Look:
         residual: #P, largest force on a vertex over the mean force of the springs; infinite before it is known.
         gain: #P, what the springs' and the guard's energy has lost since the look before [J].
         change: #P, eq. (11), that over the energy and the steps in between.
-        at_rest: #P, whether change and residual are within the tolerances.
+        at_rest: #P, whether change and residual are within the tolerances, or the piece is free of strain.
         steps, work_units: #P, what it has taken so far.
     """
 

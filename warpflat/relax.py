@@ -13,7 +13,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import InitVar, dataclass
+from dataclasses import InitVar, dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Literal
@@ -146,7 +146,7 @@ class Relaxation:
 
     @cached_property
     def negligible_energy(self) -> FloatArray:
-        """#P [J], what a strain of 1e-9 everywhere stores: below it a layout counts as free of strain."""
+        """#P [J], what a strain of 1e-9 everywhere stores: below it a layout counts as free of strain, and at rest."""
         springs = (net.spring_arrays for net in self.network.pieces)
         # Each spring is listed twice.
         return 0.25e-18 * np.array(
@@ -267,7 +267,12 @@ class Relaxation:
             gain = before - now
             change = np.where(strained, np.abs(gain) / (work * np.where(strained, now, 1.0)), 0.0)
         at_rest = (change <= self.options.energy_tolerance) & (residual <= self.options.residual_tolerance)
+        at_rest |= self._without_strain(now)
         return self._say(energies, residual=residual, gain=gain, change=change, at_rest=at_rest)
+
+    def _without_strain(self, potential: FloatArray) -> BoolArray:
+        """#P, whether nothing is left to release: what a vertex is pulled by then is rounding, unless by a seam."""
+        return np.asarray((potential <= self.negligible_energy) & (self.network.seams is None))
 
     def _say(
         self, energies: FloatArray, *, residual: FloatArray, gain: FloatArray, change: FloatArray, at_rest: BoolArray
@@ -376,6 +381,11 @@ class Relaxation:
     def outcome(self, steps: int, work_units: float, *, begun: float) -> Outcome:
         """How it has ended, by the last look; it began with so many steps and so much work behind it, when the clock
         (`time.perf_counter`) stood so."""
+        if np.isinf(self.last.residual).any():
+            # There was no step left to take before a look.
+            self.evaluate_at_rest()
+            at_rest = self._without_strain(self.last.potential)
+            self.last = replace(self.last, residual=self.residuals(), at_rest=at_rest)
         look = self.last
         return Outcome(
             converged=bool(look.at_rest.all()),
