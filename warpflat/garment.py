@@ -146,7 +146,8 @@ class Garment:
         Raises:
             InputError: the folder cannot be written.
         """
-        from warpflat.export import prepare_folder, write_json, write_picture
+        from warpflat.export import prepare_folder, write_picture
+        from warpflat.leftovers import write_metrics
 
         to = prepare_folder(folder)
         files = [piece.write_obj(to) for piece in self.pieces.values()]
@@ -154,7 +155,7 @@ class Garment:
             files.append("picture.png")
             write_picture(to / files[-1], [piece.picture_piece() for piece in self.pieces.values()])
         files.append("metrics.json")
-        write_json(to / files[-1], self.metrics())
+        write_metrics(to, self.metrics())
         return files
 
 

@@ -22,7 +22,6 @@ __all__ = [
     "FORMATS",
     "PatternOptions",
     "WrittenPattern",
-    "add_metrics",
     "export_pattern",
     "garment_files",
     "pattern_options",
@@ -159,12 +158,15 @@ def export_pattern(
     Raises:
         InputError: there is no pattern, an unknown format, dialect, paper or size, or the folder cannot be written.
     """
+    from warpflat.leftovers import note_file
     from warpflat.pattern.read_json import read_pattern_json
 
     if format not in FORMATS:
         raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
     drafted = read_pattern_json(folder / "pattern.json")
-    return _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+    file = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+    note_file(folder, drafted.name, file)
+    return file
 
 
 def _drawn(
@@ -198,16 +200,6 @@ def _drawn(
         if plan:
             metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
-
-
-def add_metrics(folder: Path, written: WrittenPattern, metrics: Mapping[str, Any]) -> dict[str, Any]:
-    """The metrics of a run with those of its pattern, in its `metrics.json` too."""
-    from warpflat.export import write_json
-
-    together = {**metrics, **written.metrics}
-    if written.metrics:
-        write_json(folder / "metrics.json", together)
-    return together
 
 
 def _measures(drafted: DraftedGarment) -> dict[str, Any]:

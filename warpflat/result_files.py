@@ -52,7 +52,8 @@ def write_results(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.export import prepare_folder, write_json, write_picture
+    from warpflat.export import prepare_folder, write_picture
+    from warpflat.leftovers import write_metrics
 
     to = prepare_folder(folder)
     files = []
@@ -65,7 +66,7 @@ def write_results(
         files.append("picture.png")
         write_picture(to / files[-1], [result.picture_piece() for result in results])
     files.append("metrics.json")
-    write_json(to / files[-1], metrics_of(results, more))
+    write_metrics(to, metrics_of(results, more))
     return files
 
 

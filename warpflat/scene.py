@@ -213,7 +213,8 @@ def run_scene(
 ) -> SceneResult:
     """Flatten the scene's surface, or the pieces of its form, and write the result.
 
-    Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see `warpflat.pattern_files`).
+    Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see `warpflat.pattern_files`). What an
+    earlier run has left there and this one does not make is removed at the end (see `warpflat.leftovers`).
 
     Args:
         scene: what to do.
@@ -228,7 +229,8 @@ def run_scene(
     from warpflat.cutting import cut, separate
     from warpflat.export import FrameWriter, prepare_folder
     from warpflat.film import Film
-    from warpflat.pattern_files import add_metrics, pattern_options, surface_files
+    from warpflat.leftovers import settle
+    from warpflat.pattern_files import pattern_options, surface_files
     from warpflat.result_files import metrics_of, write_results
     from warpflat.scene_seams import scene_constraints, scene_surface_seams
     from warpflat.sew_surface import sew_surface
@@ -279,8 +281,14 @@ def run_scene(
     if wanted:
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
-    notes = (*result.notes, *story.notes, *pattern.notes)
-    metrics = add_metrics(folder, pattern, metrics_of(pieces, told))
+    metrics, settled = settle(
+        folder,
+        {**metrics_of(pieces, told), **pattern.metrics},
+        name=scene.name,
+        files=(*files, *pattern.files),
+        sources=scene_sources(scene),
+    )
+    notes = (*result.notes, *story.notes, *pattern.notes, *settled)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 
@@ -468,6 +476,15 @@ def expand_variables(text: str) -> str:
         return os.environ[name]
 
     return _VARIABLE.sub(value, text)
+
+
+def scene_sources(scene: Scene) -> list[Path]:
+    """The mesh files from which a scene is made."""
+    surface, mannequin = scene.settings.surface, scene.settings.mannequin
+    named = [surface.file] if isinstance(surface, FileSurface) else []
+    if mannequin is not None and mannequin.scan is not None:
+        named.append(mannequin.scan)
+    return [scene.folder / expand_variables(file) for file in named]
 
 
 class FrameSchedule:

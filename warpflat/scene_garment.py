@@ -10,10 +10,11 @@ from typing import Any
 
 from warpflat.flattening import Progress
 from warpflat.garment import Garment, flatten_form
+from warpflat.leftovers import settle
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.pattern.from_garment import plan_form
-from warpflat.pattern_files import add_metrics, garment_files, pattern_options
+from warpflat.pattern_files import garment_files, pattern_options
 from warpflat.scene import (
     FrameSchedule,
     Scene,
@@ -21,6 +22,7 @@ from warpflat.scene import (
     expand_variables,
     scene_fabric,
     scene_relax_options,
+    scene_sources,
     scene_wear,
     told_by,
 )
@@ -142,10 +144,15 @@ def run_garment(
         for name, piece in other.pieces.items()
         if not piece.converged
     ]
-    return SceneResult(
-        metrics=add_metrics(out, pattern, garment.metrics()),
+    metrics, settled = settle(
+        out,
+        {**garment.metrics(), **pattern.metrics},
+        name=scene.name,
         files=(*files, *pattern.files),
-        notes=(*garment.notes, *odd, *pattern.notes),
+        sources=scene_sources(scene),
+    )
+    return SceneResult(
+        metrics=metrics, files=(*files, *pattern.files), notes=(*garment.notes, *odd, *pattern.notes, *settled)
     )
 
 

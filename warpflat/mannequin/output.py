@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
 from warpflat.export.atomic import atomic_path, prepare_folder
-from warpflat.export.metrics import write_json
+from warpflat.leftovers import write_metrics
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 
@@ -39,7 +39,7 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
     write_mannequin_usd(mannequin, files["usd"])
     write_mannequin_obj(mannequin, files["obj"])
     write_mannequin_picture(mannequin, files["picture"])
-    write_json(files["metrics"], {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
+    write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
     return files
 
 
