@@ -112,6 +112,67 @@ def test_a_surface_is_a_pattern_of_one_piece_and_formats_are_chosen(tmp_path: Pa
     assert "centre" in piece["internal_lines"]
 
 
+PARTED = """
+datum = "centre"
+[surface]
+shape = "bodice"
+resolution = 17
+[[cuts]]
+name = "across"
+plane = { point = [0.0, 0.1, 0.092], normal = [0.0, 1.0, 0.0] }
+[[cuts]]
+line = "bust"
+part = [0.0, 0.3]
+[relax]
+residual_tolerance = 0.03
+energy_tolerance = 1e-5
+[output]
+frames = 0
+picture = false
+[pattern]
+formats = ["json"]
+"""
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("allowances_mm = { botom = 20 }", r"allowances_mm: no piece has an edge 'botom'; did you mean 'bottom'\?"),
+        ("kinds = { 'trial.lower.tpo' = 'hem' }", r"kinds: no piece has an edge 'trial\.lower\.tpo'"),
+        # The cut leaves the top to the upper piece.
+        ("kinds = { 'trial.lower.top' = 'hem' }", r"kinds: no piece has an edge 'trial\.lower\.top'"),
+    ],
+)
+def test_a_misspelt_edge_of_a_surface_is_told_before_anything_is_flattened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, text: str, message: str
+):
+    def too_late(*_: object, **__: object) -> None:
+        raise AssertionError("it was flattened first")
+
+    monkeypatch.setattr("warpflat.flattening.flatten", too_late)
+    (tmp_path / "trial.toml").write_text(PARTED + text)
+    with pytest.raises(InputError, match=rf"trial\.toml: pattern: {message}"):
+        run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")
+    assert main(["run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "out")]) == 2
+
+
+def test_every_edge_that_a_cut_surface_has_may_be_named(tmp_path: Path):
+    (tmp_path / "trial.toml").write_text(PARTED)
+    run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")
+    (pieces,) = json.loads((tmp_path / "out" / "pattern.json").read_text())["sizes"].values()
+    names = [f"{name}.{edge['name']}" for name, piece in pieces.items() for edge in piece["edges"]]
+    assert len(pieces) == 2
+    assert any("bust.left" in name for name in names), "a dart"
+    (tmp_path / "trial.toml").write_text(
+        PARTED + "[pattern.allowances_mm]\n" + "".join(f"'{name}' = 7\n" for name in names)
+    )
+    ruled = run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")
+    assert not [note for note in ruled.notes if "no pattern" in note]
+    (pieces,) = json.loads((tmp_path / "out" / "pattern.json").read_text())["sizes"].values()
+    plain = {edge["allowance"] for piece in pieces.values() for edge in piece["edges"] if edge["kind"] == "seam"}
+    assert plain == {0.007}
+
+
 def test_a_marker_is_made_when_asked_for(tmp_path: Path):
     (tmp_path / "cap.toml").write_text(
         "[surface]\nshape = 'dome'\nresolution = 9\n[pattern]\nformats = []\n"

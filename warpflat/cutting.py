@@ -390,11 +390,26 @@ def separate(result: Flattening) -> tuple[Flattening, ...]:
     it those of the whole.
     """
     made = _make(result.surface, [replace_paths(one, one.paths) for one in result.cuts])
+    return tuple(_part(result, piece) for piece in _parted(result.surface, made)) or (result,)
+
+
+def cut_surfaces(surface: Surface, plans: Sequence[CutPlan]) -> tuple[Surface, ...]:
+    """What all cuts will leave of a surface, names and lines included, without flattening anything.
+
+    Raises:
+        InputError: as :func:`cut`.
+    """
+    made = _make(surface, plans)
+    return tuple(piece.surface for piece in _parted(surface, made)) or (made.surface,)
+
+
+def _parted(surface: Surface, made: _Made) -> tuple[Piece, ...]:
+    """The pieces that cuts leave; none where it is still one."""
     if made.cut is None or made.cut.component_count == made.cut.components_before == 1:
-        return (result,)
+        return ()
     # A cut by several paths that parts the cloth is named by place like any other.
     kind = "split" if made.cut.kind == "network" else made.cut.kind
-    return tuple(_part(result, piece) for piece in split_pieces(result.surface, replace(made.cut, kind=kind)))
+    return split_pieces(surface, replace(made.cut, kind=kind))
 
 
 def _part(result: Flattening, piece: Piece) -> Flattening:

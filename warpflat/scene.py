@@ -52,6 +52,7 @@ from warpflat.toml_file import Table, check_table, read_toml
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening, Progress
     from warpflat.ledger import Ledger
+    from warpflat.pattern.from_garment import EdgeRules
     from warpflat.tightness import Wear
 
 __all__ = [
@@ -246,6 +247,7 @@ def run_scene(
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
     story = cuts or scene_cuts(scene, device=device)
+    _check_edges(scene, story, drawing.rules)
     wanted = FrameSchedule(settings.output).wanted
     with ExitStack() as stack:
         writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
@@ -290,6 +292,23 @@ def run_scene(
     )
     notes = (*result.notes, *story.notes, *pattern.notes, *settled)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+
+
+def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
+    """See that the pattern's kinds and allowances are of edges, whichever of the automatic cuts will be made.
+
+    Raises:
+        InputError: a name that no piece can have, or a cut that cannot be made.
+    """
+    from warpflat.cutting import cut_surfaces
+    from warpflat.pattern.from_surface import check_edge_names
+
+    if not (rules.kinds or rules.allowances):
+        return
+    with told_by(scene.where):
+        surfaces = [piece for count in story.counts for piece in cut_surfaces(story.surface, list(story.plans[:count]))]
+    with told_by(f"{scene.where}: pattern"):
+        check_edge_names(surfaces, rules, cuts=[plan.name for plan in story.plans])
 
 
 def _flatten(

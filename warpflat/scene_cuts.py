@@ -94,6 +94,11 @@ class CutStory:
     first_auto: int = 0
     notes: tuple[str, ...] = ()
 
+    @property
+    def counts(self) -> range:
+        """How many of the cuts may be made in the end."""
+        return range(len(self.plans) if self.auto is None else self.first_auto, len(self.plans) + 1)
+
     def goes_on(self, result: Flattening, number: int) -> bool:
         """Whether the cut of that number is made on the piece as it is by then."""
         return self.auto is None or number < self.first_auto or not self.auto.is_enough(result)

@@ -13,7 +13,7 @@ from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
 from warpflat.surface.topology import border_loops
 
-__all__ = ["piece_from_mesh"]
+__all__ = ["line_labels", "piece_from_mesh"]
 
 Vector = NDArray[np.float64]
 
@@ -79,7 +79,7 @@ def piece_from_mesh(
     if areas[outer] < 0:
         flat = flat * [-1.0, 1.0]
     loop, holes = loops[outer], [hole for i, hole in enumerate(loops) if i != outer]
-    labels = _labels(loop, curves)
+    labels = line_labels(loop, curves)
     corners = _corners(flat[loop], corner_angle)
     named = _dart_places(loop, darts or {}, name)
     corners |= {place for places in named.values() for place in places}
@@ -153,7 +153,7 @@ def _corners(ring: Vector, angle: float) -> set[int]:
     return set(corners)
 
 
-def _labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]) -> list[str]:
+def line_labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]) -> list[str]:
     """For each border edge, from loop[i] to loop[i + 1], the feature line along it, or ""."""
     label: dict[tuple[int, int], str] = {}
     for key, curve in curves.items():

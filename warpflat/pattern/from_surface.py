@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from numpy.typing import NDArray
 from warpflat.darts import seam_kind
 from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
-from warpflat.pattern.from_mesh import piece_from_mesh
+from warpflat.pattern.from_mesh import line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.surface.dart import fish_eye_measure
 from warpflat.surface.drawn_legs import are_curved, pull_back, pull_back_eye
@@ -20,16 +21,43 @@ from warpflat.surface.topology import border_loops
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
+    from warpflat.surface import Surface
     from warpflat.surface.cut import Seam as Cut
     from warpflat.surface_seams import NamedSeam
 
-__all__ = ["pattern_of_surface"]
+__all__ = ["check_edge_names", "pattern_of_surface"]
 
 Vector = NDArray[np.float64]
 Ids = NDArray[np.int32]
 
 #: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+
+
+def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
+    """See that every name in the rules can be an edge's, before anything is flattened.
+
+    Lines along the border name the edges. Where its corners part them, and what lies between, shows in the plane only:
+    "bottom_2" and "edge_7" pass if there is a bottom, and a stretch of border without a line.
+
+    Args:
+        surfaces: with their lines, cut as they are going to be.
+        rules: as of :func:`pattern_of_surface`.
+        cuts: names of the cuts, for the legs of their darts.
+
+    Raises:
+        InputError: a name that no piece can have (gives the nearest).
+    """
+    legs = "|".join(map(re.escape, ["dart", *cuts]))
+    edges: dict[str, list[str]] = {}
+    for surface in surfaces:
+        lines = {label for loop in border_loops(surface.faces) for label in line_labels(loop, surface.lines)}
+        names = {line or "edge" for line in lines}
+        later = re.compile(rf"({'|'.join(map(re.escape, sorted(names)))})_\d+|({legs})(_\d+)?\.(left|right)")
+        asked = {name.removeprefix(f"{surface.name}.") for name in (*rules.kinds, *rules.allowances)}
+        known = {line or "edge_1" for line in lines} | {name for name in asked if later.fullmatch(name)}
+        edges.setdefault(surface.name, []).extend(sorted(known))
+    rules.check(edges)
 
 
 def pattern_of_surface(
