@@ -152,3 +152,17 @@ def test_a_wrong_line_is_told_before_anything_is_flattened(tmp_path: Path):
         InputError, match=r"seams: seam 'side left': 'frnt' is not one of its sides; did you mean 'front'"
     ):
         run_scene(scene(SKIRT, seams=[{"name": "side left", "ease": 0.1, "longer": "frnt"}]), tmp_path)
+
+
+def test_an_oblique_grain_on_the_fold_is_told_before_anything_is_flattened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    def too_late(*_: object, **__: object) -> None:
+        raise AssertionError("it was flattened first")
+
+    monkeypatch.setattr("warpflat.scene_garment.flatten_form", too_late)
+    with pytest.raises(InputError, match=r"trial.toml: grain_angle: front, back on the fold, with the grain at 30 deg"):
+        run_scene(scene(SKIRT, half=True, grain_angle=30.0), tmp_path)
+    for sound in ({"half": True, "grain_angle": 90.0}, {"grain_angle": 30.0}):
+        with pytest.raises(AssertionError, match="flattened"):
+            run_scene(scene(SKIRT, **sound), tmp_path)

@@ -13,7 +13,7 @@ from warpflat.garment import Garment, flatten_form
 from warpflat.leftovers import settle
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.pattern.from_garment import plan_form
+from warpflat.pattern.from_garment import check_fold_grain, folds_of, plan_form
 from warpflat.pattern_files import garment_files, pattern_options
 from warpflat.scene import (
     FrameSchedule,
@@ -69,7 +69,9 @@ def run_garment(
     mannequin, form = scene_form(scene)
     with told_by(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
-        plan_form(form, drawing.rules)
+        plan = plan_form(form, drawing.rules)
+    with told_by(f"{scene.where}: grain_angle"):
+        check_fold_grain(folds_of(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with told_by(f"{scene.where}: seams"):
         drawing = replace(drawing, rules=replace(drawing.rules, ease=wished_seams(form, wishes).ease))

@@ -168,6 +168,35 @@ def test_the_grain_turns_with_the_bias(shirt: Garment):
         assert np.degrees(np.arctan2(along[1], along[0])) == pytest.approx(135.0)
 
 
+@pytest.fixture(scope="module")
+def half_skirt(mannequins: dict[str, Mannequin]) -> Garment:
+    body = mannequins["EU 38"]
+    return flatten_form(body, body.form("a_line_skirt", half=True), fabric="denim")
+
+
+def turned(garment: Garment, angle: float) -> Garment:
+    return replace(garment, pieces={n: replace(p, grain_angle=angle) for n, p in garment.pieces.items()})
+
+
+@pytest.mark.parametrize("angle", [30.0, 45.0, -0.5, 135.0])
+def test_a_half_on_the_fold_has_no_oblique_grain(half_skirt: Garment, angle: float):
+    tilted = turned(half_skirt, angle)
+    with pytest.raises(InputError, match=r"front, back on the fold, with the grain at .*half = false.* = \"seam\""):
+        pattern_of_garment({"EU 38": tilted}, name="skirt")
+    # Sewn there, one half is cut twice, the second mirrored: that is the cloth that is flattened.
+    rules = EdgeRules(kinds={"centre front": "seam", "centre back": "seam"})
+    pattern, _ = pattern_of_garment({"EU 38": tilted}, name="skirt", rules=rules)
+    assert {(piece.name, piece.quantity, piece.on_fold) for piece in pattern} == {
+        ("front", 2, False), ("back", 2, False)
+    }  # fmt: skip
+
+
+@pytest.mark.parametrize("angle", [0.0, 90.0, -90.0, 180.0, 270.0, -360.0])
+def test_a_half_on_the_fold_has_its_grain_along_or_across_it(half_skirt: Garment, angle: float):
+    pattern, _ = pattern_of_garment({"EU 38": turned(half_skirt, angle)}, name="skirt")
+    assert all(piece.on_fold and piece.quantity == 1 for piece in pattern)
+
+
 @pytest.mark.parametrize("half", [False, True], ids=["whole", "half"])
 @pytest.mark.parametrize("form", FORMS)
 def test_every_form_can_be_cut_and_sewn(form: str, half: bool, mannequins: dict[str, Mannequin]):

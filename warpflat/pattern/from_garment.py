@@ -25,7 +25,18 @@ if TYPE_CHECKING:
     from warpflat.mannequin import FormResult
     from warpflat.mannequin.pieces import FormPiece
 
-__all__ = ["EdgePlan", "EdgeRules", "FormPlan", "grain_of", "inner_lines", "pattern_of_garment", "plan_form", "unused"]
+__all__ = [
+    "EdgePlan",
+    "EdgeRules",
+    "FormPlan",
+    "check_fold_grain",
+    "folds_of",
+    "grain_of",
+    "inner_lines",
+    "pattern_of_garment",
+    "plan_form",
+    "unused",
+]
 
 Vector = NDArray[np.float64]
 Ids = NDArray[np.int32]
@@ -176,6 +187,38 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
     return FormPlan(edges=edges, seams=seams, quantities=quantities)
 
 
+def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
+    """See that pieces on the fold have their grain along or across it.
+
+    A half is flattened as if the other one were its mirror image, grain and all. Cloth on the fold, unfolded, has its grain running
+    on straight: at any other angle that is another piece.
+
+    Args:
+        folds: by piece, its edge on the fold, to which the datum is parallel.
+        grain_angle: of the warp against the datum [degrees].
+
+    Raises:
+        InputError: the grain is oblique to a fold.
+    """
+    if not folds or grain_angle % 90.0 == 0.0:
+        return
+    sewn = ", ".join(f'"{edge}" = "seam"' for edge in dict.fromkeys(folds.values()))
+    raise InputError(
+        f"{', '.join(folds)} on the fold, with the grain at {grain_angle:g} degrees to it: unfolded, the other half is not the mirror "
+        f"image that is flattened; cut whole pieces (half = false), lay the grain along or across the fold, or sew there "
+        f"(kinds = {{ {sewn} }})"
+    )
+
+
+def folds_of(form: FormResult, plan: FormPlan) -> dict[str, str]:
+    """By half piece, its edge on the fold; without those for which the rules ask another kind of that edge."""
+    return {
+        name: piece.fold
+        for name, piece in form.pieces.items()
+        if piece.fold and any(part.kind == "fold" for part in plan.edges[name])
+    }
+
+
 def pattern_of_garment(
     garments: Mapping[str, FlatGarment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
 ) -> tuple[Garment, tuple[str, ...]]:
@@ -195,18 +238,17 @@ def pattern_of_garment(
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, a piece's outline crosses itself, or the sizes differ
-            in their edges.
+        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline crosses itself,
+            or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     bent = _bent_folds(garments)
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
-    opened = {
-        name: piece.fold
-        for name, piece in form.pieces.items()
-        if piece.fold and (name in bent or not any(part.kind == "fold" for part in plan.edges[name]))
-    }
+    folds = {name: edge for name, edge in folds_of(form, plan).items() if name not in bent}
+    opened = {name: piece.fold for name, piece in form.pieces.items() if piece.fold and name not in folds}
+    for flat in (garment.pieces[name] for garment in garments.values() for name in folds):
+        check_fold_grain(folds, flat.grain_angle)
     pieces = {
         size: tuple(
             _piece(
