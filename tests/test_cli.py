@@ -200,7 +200,8 @@ def test_units_are_asked_for_and_checked(warpflat: Run):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (["--fabric", "demin"], "unknown fabric 'demin': did you mean 'denim'"),
+        (["--fabric", "demin"], "^command line: fabric: unknown fabric 'demin': did you mean 'denim'"),
+        (["--stretch-warp", "5"], "^command line: wear: stretch_warp = 5"),
         (["--datum", "0,77"], "77"),
         (["--datum", "0,0"], "."),
         (["--datum", "botom"], "bottom"),

@@ -537,8 +537,9 @@ class FrameSchedule:
 
 @contextmanager
 def told_by(where: str) -> Iterator[None]:
-    """Begin the messages of mistakes inside with `where`."""
+    """Begin the messages of mistakes inside with `where`, once: what is called there may have said so itself."""
     try:
         yield
     except InputError as error:
-        raise InputError(f"{where}: {error}") from None
+        told = str(error)
+        raise InputError(told if told.startswith(f"{where}: ") else f"{where}: {told}") from None

@@ -395,6 +395,25 @@ def test_curves_beside_and_below_become_feature_lines(tmp_path):
     assert any("'elsewhere'" in note for note in surface.notes)
 
 
+def test_a_film_is_read_with_the_lines_of_the_mesh_that_is_chosen(tmp_path):
+    from warpflat.export import FrameWriter
+    from warpflat.shapes import make_shape
+
+    shape = make_shape("bodice", resolution=9)
+    with FrameWriter(tmp_path / "frames.usdc") as film:
+        film.add_piece("front", shape)
+        # The pattern lies so near to the surface that its lines could be drawn on either.
+        flat = shape.vertices[:, :2] * [1.0, 1.01]
+        film.write("front", positions=flat, face_energy_density=np.zeros(len(shape.faces)))
+    surface = read_surface(tmp_path / "frames.usdc", prim="/World/front/surface")
+    assert {name: line.tolist() for name, line in surface.lines.items()} == {
+        name: line.tolist() for name, line in shape.lines.items()
+    }
+    assert surface.notes == ()
+    pattern = read_surface(tmp_path / "frames.usdc", prim="/World/front/pattern")
+    assert set(pattern.lines) == set(shape.lines)
+
+
 def test_broken_usd_meshes_are_refused(tmp_path):
     vertices, quads = grid(3, 3)
     for number, (faces, counts, words) in enumerate(

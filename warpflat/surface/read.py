@@ -59,7 +59,7 @@ def read_surface(
     OBJ keeps its quads, and USD too; PLY, STL, OFF, GLB and glTF are read with trimesh, which cuts polygons into
     triangles. GLB and glTF are in metres and Y up by their standard, USD says its unit and its up axis (Z up is turned
     to Y up); all other axes are taken as they are. Line elements of OBJ and linear BasisCurves beside or below a USD
-    mesh become feature lines.
+    mesh, or in the group MESH_lines beside it, become feature lines.
 
     Args:
         path: the file.

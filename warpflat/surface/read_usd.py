@@ -22,8 +22,8 @@ class UsdMesh:
         name: the prim's name.
         vertices: #V by 3 [m], Y up.
         polygons: one row of vertex indices per face, filled up with -1.
-        curves: linear BasisCurves beside or below the mesh, by name, #P by 3 [m]; a periodic one repeats its first
-            point.
+        curves: linear BasisCurves beside or below the mesh, or in the group MESH_lines beside it (as in a film of ours), by
+            name, #P by 3 [m]; a periodic one repeats its first point.
         notes: what could not be taken over, one sentence each.
     """
 
@@ -142,10 +142,14 @@ def _turned(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
 def _curve_prims(mesh: Any) -> list[Any]:
     from pxr import Usd, UsdGeom
 
-    parent = mesh.GetParent()
-    beside = list(parent.GetFilteredChildren(Usd.TraverseInstanceProxies())) if parent else []
+    def children(prim: Any) -> list[Any]:
+        return list(prim.GetFilteredChildren(Usd.TraverseInstanceProxies())) if prim else []
+
+    beside = children(mesh.GetParent())
     below = list(Usd.PrimRange(mesh, Usd.TraverseInstanceProxies()))
-    return [p for p in beside + below if p.IsA(UsdGeom.BasisCurves)]
+    # The curves of other groups are drawn on other meshes: a film has those of the pattern beside those of the surface.
+    group = next((p for p in beside if p.GetName() == f"{mesh.GetName()}_lines"), None)
+    return [p for p in beside + below + children(group) if p.IsA(UsdGeom.BasisCurves)]
 
 
 def _add_curves(out: UsdMesh, curves: Any, to_metres: Any) -> None:
