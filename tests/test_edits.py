@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -80,6 +82,70 @@ def test_a_moved_surface_gives_what_flattening_it_afresh_gives(triangles: bool, 
     assert half_edges_of(after.network.surface) is half_edges_of(first.network.surface)
     assert first.surface is surface
     assert first.network.surface.vertices is not after.network.surface.vertices
+
+
+@pytest.fixture(scope="module")
+def dome() -> Flattening:
+    return flatten(make_shape("dome", resolution=9), datum="centre", device="cpu")
+
+
+def test_moved_vertices_alone_are_the_same_mesh(dome: Flattening):
+    vertices = dome.surface.vertices * [1.0, 1.05, 1.0]
+    after = change_surface(dome, vertices)
+    whole = change_surface(dome, replace(dome.surface, vertices=vertices, input_vertices=vertices))
+    np.testing.assert_array_equal(after.positions, whole.positions)
+    np.testing.assert_array_equal(after.surface.vertices, vertices)
+    np.testing.assert_array_equal(after.surface.input_vertices, vertices)
+    assert after.stages[-1].name == "surface:dome"
+    np.testing.assert_array_equal(change_surface(dome, vertices.tolist()).positions, whole.positions)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        (lambda v: v[:-1], r"piece 'dome' has 81 vertices, not 80: give them all"),
+        (
+            lambda v: v[:, :2],
+            r"must be #V by 3, got an array of shape \(81, 2\); give a Surface, or its 81 vertices by 3",
+        ),
+        (lambda v: np.where(np.arange(81)[:, None] == 7, np.nan, v), r"vertex 7 .* not finite"),
+        (lambda v: "dome.obj", r"vertices must be numbers"),
+        (lambda v: None, r"#V by 3"),
+    ],
+)
+def test_what_is_no_surface_is_told(dome: Flattening, given: Callable[[np.ndarray], Any], message: str):
+    with pytest.raises(InputError, match=message):
+        change_surface(dome, given(dome.surface.vertices))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("as_surface", [False, True], ids=["vertices", "surface"])
+@pytest.mark.parametrize(
+    ("collapse", "message"),
+    [
+        (
+            lambda v, faces: v * 0.0,
+            r"face 0 \(vertices 0, .*\) has collapsed to a line or a point \(and 63 more like it\)",
+        ),
+        (lambda v, faces: v * [1.0, 0.0, 0.0], r"face 0 .* has collapsed"),
+        (
+            lambda v, faces: np.where(np.isin(np.arange(len(v)), faces[20])[:, None], v[faces[20, 0]], v),
+            r"face 12 \(vertices 13, 14, 23, 22\) has collapsed to a line or a point \(and 4 more like it\)",
+        ),
+    ],
+)
+def test_collapsed_faces_are_refused_by_name(dome: Flattening, collapse: Any, message: str, as_surface: bool):
+    vertices = collapse(dome.surface.vertices, dome.surface.faces)
+    with pytest.raises(InputError, match=message):
+        change_surface(dome, replace(dome.surface, vertices=vertices) if as_surface else vertices)
+
+
+@pytest.mark.parametrize("fabric", [3, None, ["denim"]])
+def test_what_is_no_fabric_is_told(dome: Flattening, fabric: Any):
+    with pytest.raises(InputError, match="is neither a Fabric nor the name of one"):
+        change_fabric(dome, fabric)
+    with pytest.raises(InputError, match="is neither a Fabric nor the name of one"):
+        flatten(dome.surface, fabric=fabric)
 
 
 def test_another_mesh_is_refused():

@@ -312,6 +312,8 @@ def dome9() -> Surface:
         ({"device": "cuda:99"}, r"device 'cuda:99' is not available"),
         ({"device": "gpu"}, r"device 'gpu' is not available"),
         ({"grain_angle": float("nan")}, "grain_angle"),
+        ({"grain_angle": "x"}, "grain_angle = 'x' is not a number of degrees"),
+        ({"grain_angle": [0.0, 45.0]}, "grain_angle = .* is not a number of degrees"),
         ({"fabric": "wowen"}, r"unknown fabric 'wowen'.*woven"),
         ({"relax": RelaxOptions(time_step=-1.0)}, "time_step"),
     ],

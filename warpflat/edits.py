@@ -10,23 +10,27 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
 from warpflat.errors import InputError
-from warpflat.fabric import Fabric, find_fabric
+from warpflat.fabric import Fabric, as_fabric
 from warpflat.flattening import Flattening
 from warpflat.progress import Progress
 from warpflat.relax import RelaxOptions
 from warpflat.running import Run, relax_runs
-from warpflat.surface import Surface
+from warpflat.surface import Surface, degenerate_faces
+from warpflat.surface.mend import checked_positions
 from warpflat.surface.paths import path_length
 from warpflat.surface.topology import components_of
 
 __all__ = ["change_fabric", "change_surface", "relax_cut"]
 
 FloatArray = NDArray[np.float64]
+
+#: A face whose width is no more than this share of the edges around it has no area to be measured by.
+_COLLAPSED = 1e-6
 
 
 def change_fabric(
@@ -47,14 +51,14 @@ def change_fabric(
     Raises:
         InputError: an unknown fabric or an option out of its bounds.
     """
-    cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
+    cloth = as_fabric(fabric)
     run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", relax or RelaxOptions(), callback)
     return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
 
 
 def change_surface(
     result: Flattening,
-    surface: Surface,
+    surface: Surface | ArrayLike,
     *,
     relax: RelaxOptions | None = None,
     callback: Callable[[Progress], None] | None = None,
@@ -63,7 +67,8 @@ def change_surface(
 
     Args:
         result: the piece, with the cuts it has; it stays as it is.
-        surface: the same mesh, uncut, faces and all in the same order; its vertices may lie anywhere.
+        surface: the same mesh, uncut, faces and all in the same order; its vertices may lie anywhere. Or these vertices only, #V by 3
+            [m], in the order of `result.surface.vertices`.
         relax: options of the relaxation.
         callback: called with a `Progress` before the first step and after every step; the stage is "surface:NAME".
 
@@ -71,16 +76,11 @@ def change_surface(
         The piece on that surface, with the same cuts. Its development stays that of the surface before.
 
     Raises:
-        InputError: the mesh is another one, or an option out of its bounds.
+        InputError: the mesh is another one, a vertex is not finite, a face has collapsed, or an option out of its bounds.
     """
     before = result.surface
-    if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
-        raise InputError(
-            f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
-            f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
-        )
     # What the faces tell is known of the ones before.
-    surface = replace(surface, faces=before.faces, of_faces=before.of_faces)
+    surface = replace(_moved(before, surface), faces=before.faces, of_faces=before.of_faces)
     cut = result.network.surface
     origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
     origin[cut.faces[used]] = before.faces[used]
@@ -98,6 +98,44 @@ def change_surface(
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     gone_on = _gone_on(result, run, result.positions, measure_again=run.directions_matter())
     return replace(gone_on, surface=surface, cuts=cuts)
+
+
+def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
+    """The surface that is meant, once it is known to be the one before with its vertices elsewhere."""
+    if isinstance(given, Surface):
+        surface = given
+        if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
+            raise InputError(
+                f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
+                f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
+            )
+    else:
+        surface = _with_vertices(before, given)
+    collapsed = degenerate_faces(checked_positions(surface.vertices), surface.faces, _COLLAPSED)
+    if len(collapsed):
+        corners = ", ".join(str(v) for v in surface.faces[collapsed[0]].tolist() if v >= 0)
+        more = f" (and {len(collapsed) - 1:,} more like it)" if len(collapsed) > 1 else ""
+        raise InputError(
+            f"piece {surface.name!r}: face {collapsed[0]} (vertices {corners}) has collapsed to a line or a point{more}; faces need an area"
+        )
+    return surface
+
+
+def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
+    try:
+        vertices = checked_positions(given)
+    except InputError as error:
+        raise InputError(
+            f"piece {before.name!r}: {error}; give a Surface, or its {len(before.vertices):,} vertices by 3 [m]"
+        ) from None
+    if len(vertices) != len(before.vertices):
+        raise InputError(
+            f"piece {before.name!r} has {len(before.vertices):,} vertices, not {len(vertices):,}: give them all, in the order of its "
+            "surface.vertices, or flatten another mesh afresh"
+        )
+    as_read = before.input_vertices.copy()
+    as_read[before.input_index] = vertices
+    return replace(before, vertices=vertices, input_vertices=as_read)
 
 
 def relax_cut(

@@ -19,6 +19,7 @@ __all__ = [
     "Curve",
     "Fabric",
     "Provenance",
+    "as_fabric",
     "find_fabric",
     "grain_axes",
     "load_library",
@@ -219,6 +220,19 @@ def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabri
             return fabric
     names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
     raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
+
+
+def as_fabric(fabric: Fabric | str) -> Fabric:
+    """A fabric, or the one of the library of that name.
+
+    Raises:
+        InputError: there is none of that name, or it is neither.
+    """
+    if isinstance(fabric, Fabric):
+        return fabric
+    if not isinstance(fabric, str):
+        raise InputError(f"fabric {fabric!r} is neither a Fabric nor the name of one, such as {DEFAULT_FABRIC!r}")
+    return find_fabric(fabric)
 
 
 def grain_axes(grain_angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:

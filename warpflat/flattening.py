@@ -18,7 +18,7 @@ from warpflat.coarsen import levels_meanwhile
 from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, choose_datum, develop
 from warpflat.errors import InputError, nearest
-from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric
+from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
@@ -259,11 +259,12 @@ def check_settings(
     Raises:
         InputError: an unknown name, or a number out of its bounds.
     """
-    cloth = find_fabric(fabric) if isinstance(fabric, str) else fabric
+    cloth = as_fabric(fabric)
     options = relax or RelaxOptions()
     options.validate()
-    if not np.isfinite(grain_angle):
-        raise InputError(f"grain_angle = {grain_angle} is not a number of degrees")
+    angle = np.asarray(grain_angle)
+    if angle.ndim or angle.dtype.kind not in "iuf" or not np.isfinite(angle):
+        raise InputError(f"grain_angle = {grain_angle!r} is not a number of degrees")
     check_model(model)
     return Settings(
         fabric=cloth, grain_angle=grain_angle, model=model, wear=wear, options=options, device=_device(device)

@@ -36,7 +36,7 @@ from warpflat.surface.topology import (
 )
 from warpflat.surface.weld import welding
 
-__all__ = ["make_surface"]
+__all__ = ["checked_positions", "make_surface"]
 
 
 @dataclass
@@ -110,7 +110,7 @@ def _make(
     split_corners: bool,
     tolerance: float,
 ) -> Surface:
-    positions = _checked_positions(vertices)
+    positions = checked_positions(vertices)
     mesh = _checked_faces(positions, polygons)
     paths = {key: _checked_line(key, line, len(positions)) for key, line in lines.items()}
     place = _weld(mesh, weld, split_corners, component is not None)
@@ -131,7 +131,12 @@ def _count(number: int, what: str) -> str:
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
-def _checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
+def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
+    """Vertices as #V by 3 numbers.
+
+    Raises:
+        InputError: of another shape, or not finite; names the vertex.
+    """
     try:
         positions = np.array(vertices, dtype=np.float64)
     except (TypeError, ValueError) as error:
