@@ -187,6 +187,8 @@ def test_a_marker_is_made_when_asked_for(tmp_path: Path):
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert metrics["marker"] == {key: marker[key] for key in metrics["marker"]}
     assert metrics["marker"]["pieces"] == 1
+    assert [note for note in result.notes if note.startswith("marker: ") and note.endswith(" used by 1 piece")]
+    assert ">1 piece<" in (tmp_path / "out" / "cap.marker.svg").read_text()
     assert metrics["pattern"]["fit_error_mm"] < 0.5
     assert result.metrics["marker"] == metrics["marker"]
     assert any(note.startswith("marker: 0.") and "0.90 m wide" in note for note in result.notes)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.from_garment import EdgeRules
+from warpflat.words import counted
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
@@ -296,6 +297,6 @@ def _marker(
     write_json(folder / files[1], {"schema": 1, **measures, "placements": placements})
     told = (
         f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
-        f"{len(placements)} pieces"
+        f"{counted(len(placements), 'piece')}"
     )
     return files, (told,), measures

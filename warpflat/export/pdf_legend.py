@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpflat.export.svg import STYLE
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.layout import Sheet
+from warpflat.words import counted
 
 if TYPE_CHECKING:
     from warpflat.export.pdf import Tiling
@@ -87,7 +88,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 and not noted else 0.0)
     lines = [
         "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
-        f"the half diamonds meet, and glue. {len(tiling.tiles)} sheets; empty ones are left out.",
+        f"the half diamonds meet, and glue. {counted(len(tiling.tiles), 'sheet')}; empty ones are left out.",
     ]
     for line in lines:
         _text(canvas, float(low[0]), y, line, 7.5)

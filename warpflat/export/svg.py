@@ -17,6 +17,7 @@ from warpflat.pattern.drawing import Drawing, Stroke, Words, draw_nest, grain_st
 from warpflat.pattern.label import LEADING, LETTER
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Copy, Marker
+from warpflat.words import counted
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
@@ -83,7 +84,7 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     """
     name = f"{marker.name.replace('_', ' ')} marker {marker.fabric}".strip()
     sizes = list(dict.fromkeys(copy.piece.size for copy in marker.placements if copy.piece.size))
-    cut = f"{len(marker.placements)} pieces" + (f", size {', '.join(sizes)}" if sizes else "")
+    cut = counted(len(marker.placements), "piece") + (f", size {', '.join(sizes)}" if sizes else "")
     cloth = f"{marker.length:.3f} m of cloth {marker.width:.3f} m wide, {marker.utilisation:.1%} used"
     rows = [name, cut, cloth]
     height = min(0.014, marker.length / (LETTER * max(map(len, rows))))

@@ -35,6 +35,7 @@ from warpflat.surface.topology import (
     orient,
 )
 from warpflat.surface.weld import welding
+from warpflat.words import counted
 
 __all__ = ["checked_positions", "make_surface"]
 
@@ -119,16 +120,12 @@ def _make(
     _refuse_crowded_edges(mesh)
     mesh.faces, turned = orient(mesh.faces)
     if turned:
-        mesh.notes.append(f"the winding of {_count(turned, 'face')} was turned to agree with the others")
+        mesh.notes.append(f"the winding of {counted(turned, 'face')} was turned to agree with the others")
     _part_touching_fans(mesh)
     _drop_unused(mesh)
     kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
     _check_border(mesh.faces)
     return _finish(mesh, kept_lines, name, positions, tolerance)
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
 def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
@@ -178,16 +175,16 @@ def _checked_faces(positions: NDArray[np.float64], polygons: ArrayLike | Sequenc
     faces, of = split_polygons(positions, distinct[rows])
     many = len(np.unique(of[np.flatnonzero(of[1:] == of[:-1])]))
     if many:
-        notes.append(f"{_count(many, 'face')} of more than four corners cut into triangles")
+        notes.append(f"{counted(many, 'face')} of more than four corners cut into triangles")
     index = np.arange(len(positions), dtype=np.int32)
     return _Mesh(positions, faces, rows[of].astype(np.int32), index, notes)
 
 
 def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDArray[np.integer]) -> None:
     if len(dropped):
-        notes.append(f"{_count(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
+        notes.append(f"{counted(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
     if len(reduced):
-        notes.append(f"{_count(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
+        notes.append(f"{counted(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
 
 
 def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
@@ -224,7 +221,7 @@ def _drop_double_faces(mesh: _Mesh) -> None:
     keep = np.zeros(len(mesh.faces), dtype=bool)
     keep[first] = True
     doubled = mesh.origin[~keep]
-    mesh.notes.append(f"{_count(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}")
+    mesh.notes.append(f"{counted(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}")
     mesh.keep(keep)
 
 
@@ -247,7 +244,9 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     if len(sizes) > 1:
         keep = label == rank[component]
         mesh.keep(keep)
-        mesh.notes.append(f"component {component} of {len(sizes)} taken, {_count(int((~keep).sum()), 'face')} left out")
+        mesh.notes.append(
+            f"component {component} of {len(sizes)} taken, {counted(int((~keep).sum()), 'face')} left out"
+        )
 
 
 def _sizes(sizes: NDArray[np.int64]) -> str:
@@ -264,7 +263,7 @@ def _refuse_crowded_edges(mesh: _Mesh) -> None:
         return
     a, b = he.edges[crowded[0]].tolist()
     at = mesh.origin[he.face[he.edge == crowded[0]]]
-    more = f" ({_count(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
+    more = f" ({counted(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
     raise InputError(
         f"the edge between vertices {a} and {b} is not manifold: {len(at)} faces meet there ({list_some(at)}; counted "
         f"from 0){more}; cloth has at most two at an edge: delete the surplus faces or part the surface there"
@@ -357,7 +356,7 @@ def _check_border(faces: NDArray[np.int32]) -> None:
     handles = (2 - len(loops) - euler_characteristic(faces)) // 2
     if handles:
         raise InputError(
-            f"the surface has {_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+            f"the surface has {counted(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
             "through there, or give a part without"
         )
 
@@ -369,13 +368,13 @@ def _finish(
     mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
     if len(cut):
         mesh.notes.append(
-            f"{_count(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
+            f"{counted(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
         )
     before = len(mesh.vertices)
     faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.faces, lines, tolerance)
     if len(left):
         raise InputError(
-            f"{_count(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
+            f"{counted(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
             f"merged without changing the piece: {list_some(np.unique(mesh.origin[left]))} (counted from 0); delete or "
             "redraw them"
         )
@@ -383,7 +382,7 @@ def _finish(
         names = list_some(np.unique(mesh.origin[merged]))
         used = len(np.unique(faces[faces >= 0]))
         mesh.notes.append(
-            f"{_count(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
+            f"{counted(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
             f"neighbours, {before - used} of their vertices fell away: {names}"
         )
         mesh.faces, mesh.origin = faces, mesh.origin[of]
