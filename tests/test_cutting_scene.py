@@ -119,6 +119,23 @@ def test_a_tip_moved_back_too_far_is_a_note(tmp_path: Path):
     assert any("dart 'd': tip_back is 200.0 mm; it must be 0 or more and less than" in note for note in result.notes)
 
 
+def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):
+    from warpflat.scene import scene_cuts
+
+    def paths(point: list[float], **more: object):
+        plane = {"point": point, "normal": [0.0, 1.0, 0.0], **more}
+        story = scene_cuts(scene(cuts=[{"name": "waist", "plane": plane}]))
+        return story.surface.vertices[story.plans[0].paths[0]]
+
+    inside, far = paths([0.0, 0.1, 0.0]), paths([0.0, 0.1, -7.0])
+    np.testing.assert_array_equal(inside, far)
+    np.testing.assert_allclose(inside[:, 1], 0.1, atol=1e-9)
+    with pytest.raises(InputError, match=r"cuts\[0\]: the plane does not cut the piece 'trial'"):
+        paths([0.0, 5.0, 0.0])
+    with pytest.raises(InputError, match=r"cuts\[0\]: the point .* off the piece"):
+        paths([0.0, 0.1, -7.0], towards=[1.0, 0.0, 0.0])
+
+
 def test_one_film_tells_the_whole_story(tmp_path: Path):
     from pxr import Usd, UsdGeom
 

@@ -28,7 +28,10 @@ Share = Annotated[float, Field(ge=0.0, le=1.0)]
 
 
 class CutPlane(PlaneTable):
-    """A plane through a point [m]; with `towards` only the part from the point in that direction to the border."""
+    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+
+    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    """
 
     towards: Point | None = None
 
@@ -137,9 +140,11 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
 
 def _path(surface: Surface, table: CutTable) -> SurfacePath:
     from warpflat.surface.paths import as_vertex
-    from warpflat.surface.section import plane_path
+    from warpflat.surface.section import plane_path, plane_section
     from warpflat.surface.trace import polyline_path
 
+    if table.plane is not None and table.plane.towards is None:
+        return plane_section(surface, table.plane.point, table.plane.normal)
     if table.plane is not None:
         as_vertex(surface, table.plane.point)  # says so if the point is off the piece
         return plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)

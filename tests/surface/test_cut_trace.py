@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from warpflat.errors import InputError
 from warpflat.surface.cut import cut_along, glue
-from warpflat.surface.section import plane_path
+from warpflat.surface.section import plane_path, plane_section
 from warpflat.surface.split import split_faces_along
 from warpflat.surface.topology import (
     border_edges,
@@ -211,6 +211,29 @@ def test_plane_section_towards_a_side_is_a_dart_that_ends_at_its_point(point):
         cut = cut_along(result.surface.faces, result.path, vertex_count=len(result.surface.vertices))
         assert cut.kind == "dart"
         assert cut.tips.tolist() == [result.path[-1]]
+
+
+def test_a_plane_all_through_is_as_it_was_given():
+    mesh = dome(12, kinds=np.full(121, 2))
+    normal = np.array([0.3, 1.0, 0.1])
+    for point in ([0.05, 0.06, 0.44], [0.05, 0.06, 0.0], [2.0, -0.5, 0.25]):
+        path = plane_section(mesh, point, normal)
+        assert np.abs((path.points - point) @ normal).max() < 1e-12
+        result = split_faces_along(mesh, path)
+        assert cut_along(result.surface.faces, result.path, vertex_count=len(result.surface.vertices)).kind == "split"
+    # A tube's wall is met on either side of the axis.
+    tube = cylinder(12, 5, triangles=True)
+    for side in (1.0, -1.0):
+        path = plane_section(tube, [3.0 * side, 0.011, 0.1], [0.0, 1.0, 0.0])
+        assert (side * path.points[:, 0] > 0).all()
+    with pytest.raises(
+        InputError, match=r"does not cut the piece .*: along its normal the piece spans .* and the plane"
+    ):
+        plane_section(tube, [0.0, 0.0, 9.0], [0.0, 0.0, 1.0])
+    with pytest.raises(InputError, match="not all zero"):
+        plane_section(tube, [0.0, 0.0, 0.1], [0.0, 0.0, 0.0])
+    with pytest.raises(InputError, match="a plane's point is three finite numbers"):
+        plane_section(tube, [0.0, 0.1], [0.0, 0.0, 1.0])
 
 
 def test_plane_around_a_tube_is_closed_and_straight_along_vertices():

@@ -18,7 +18,32 @@ from warpflat.surface.trace import (
     simplify_places,
 )
 
-__all__ = ["plane_path"]
+__all__ = ["plane_path", "plane_section"]
+
+
+def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> SurfacePath:
+    """Where a plane meets the surface, from border to border or all round: of several such curves the nearest to the point.
+
+    Args:
+        surface: the surface.
+        point: of the plane [m]; it need not lie on the surface.
+        normal: of the plane, any length but zero.
+
+    Raises:
+        InputError: for a normal of zero, or a plane that does not cut the surface.
+    """
+    axis, origin = _direction(normal, "a plane's normal"), np.asarray(point, dtype=float)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise InputError(f"a plane's point is three finite numbers [m], got {point!r}")
+    found = _nearest_curve(surface, origin, axis, path_triangles(surface)[0])
+    if found is None:
+        reach = surface.vertices @ axis
+        raise InputError(
+            f"the plane does not cut the piece {surface.name!r}: along its normal the piece spans {reach.min():.4g} to "
+            f"{reach.max():.4g} m and the plane lies at {origin @ axis:.4g} m"
+        )
+    _, places, closed = found
+    return make_path(surface, places, closed=closed)
 
 
 def plane_path(
@@ -43,11 +68,26 @@ def plane_path(
     axis = _direction(normal, "a plane's normal")
     start = locate(surface, point)
     origin = np.sum([weight * surface.vertices[v] for v, weight in start.items()], axis=0)
+    triangles, _ = path_triangles(surface)
+    best = _nearest_curve(surface, origin, axis, triangles)
+    if best is None or best[0] > 1e-6 * np.ptp(surface.vertices, axis=0).max():
+        raise InputError(f"the plane only touches the surface at {describe_place(start)}; turn its normal")
+    _, places, closed = best
+    if towards is None:
+        return make_path(surface, places, closed=closed)
+    if closed:
+        raise InputError("the plane's curve is closed and reaches no border; leave `towards` out to cut all round")
+    return make_path(surface, _inwards(surface, places, start, origin, _direction(towards, "`towards`"), triangles))
+
+
+def _nearest_curve(
+    surface: Surface, origin: NDArray[np.float64], axis: NDArray[np.float64], triangles: NDArray[np.int32]
+) -> tuple[float, list[Place], bool] | None:
+    """Of the curves in which a plane meets the surface the nearest to its origin: how far [m], its places, whether it is closed."""
     height = (surface.vertices - origin) @ axis
     # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
     # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
     height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
-    triangles, _ = path_triangles(surface)
     best: tuple[float, list[Place], bool] | None = None
     for chain, closed in _chains(triangles, height >= 0):
         places = simplify_places([_crossing(edge, height) for edge in chain])
@@ -58,14 +98,7 @@ def plane_path(
         gap = _distances(surface, places, closed, origin).min()
         if best is None or gap < best[0]:
             best = gap, places, closed
-    if best is None or best[0] > 1e-6 * np.ptp(surface.vertices, axis=0).max():
-        raise InputError(f"the plane only touches the surface at {describe_place(start)}; turn its normal")
-    _, places, closed = best
-    if towards is None:
-        return make_path(surface, places, closed=closed)
-    if closed:
-        raise InputError("the plane's curve is closed and reaches no border; leave `towards` out to cut all round")
-    return make_path(surface, _inwards(surface, places, start, origin, _direction(towards, "`towards`"), triangles))
+    return best
 
 
 def _direction(value: ArrayLike, what: str) -> NDArray[np.float64]:
