@@ -22,7 +22,7 @@ from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, draft_garment, dr
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.from_garment import EdgeRules
-from warpflat.pattern.from_surface import pattern_of_surface
+from warpflat.pattern.from_surface import check_edge_names, pattern_of_surface
 from warpflat.pattern.read_json import pattern_from_json, read_pattern_json
 from warpflat.pattern.sample import sample_dress
 from warpflat.pattern_files import PatternOptions, export_pattern, surface_files
@@ -285,6 +285,9 @@ def test_rules_name_holes():
         pattern, _ = pattern_of_surface([flat], name="p", rules=rules)
         ((piece,),) = draft_garment(pattern).pieces.values()
         assert piece.cutouts["hole_1"].width == width
+    check_edge_names([flat.surface], EdgeRules(allowances={"hole_1": 0.004}))
+    with pytest.raises(InputError, match="no piece has an edge 'hole_2'"):
+        check_edge_names([flat.surface], EdgeRules(allowances={"hole_2": 0.004}))
     with pytest.raises(InputError, match=r"kinds\.hole_1: a hole cannot be of kind 'fold'"):
         pattern_of_surface([flat], name="p", rules=EdgeRules(kinds={"hole_1": "fold"}))
 

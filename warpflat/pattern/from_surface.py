@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
@@ -37,7 +37,7 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
     """See that every name in the rules can be an edge's, before anything is flattened.
 
-    Lines along the border name the edges. Where its corners part them, and what lies between, shows in the plane only:
+    Lines along the border name the edges, holes are numbered. Where its corners part them, and what lies between, shows in the plane only:
     "bottom_2" and "edge_7" pass if there is a bottom, and a stretch of border without a line.
 
     Args:
@@ -51,11 +51,13 @@ def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Ite
     legs = "|".join(map(re.escape, ["dart", *cuts]))
     edges: dict[str, list[str]] = {}
     for surface in surfaces:
-        lines = {label for loop in border_loops(surface.faces) for label in line_labels(loop, surface.lines)}
+        loops = border_loops(surface.faces)
+        lines = {label for loop in loops for label in line_labels(loop, surface.lines)}
         names = {line or "edge" for line in lines}
         later = re.compile(rf"({'|'.join(map(re.escape, sorted(names)))})_\d+|({legs})(_\d+)?\.(left|right)")
         asked = {name.removeprefix(f"{surface.name}.") for name in (*rules.kinds, *rules.allowances)}
         known = {line or "edge_1" for line in lines} | {name for name in asked if later.fullmatch(name)}
+        known |= {f"hole_{number}" for number in range(1, len(loops))}
         edges.setdefault(surface.name, []).extend(sorted(known))
     rules.check(edges)
 
