@@ -133,6 +133,13 @@ def test_a_half_piece_that_crosses_its_fold_is_refused():
         cut_outline(polygon_sides(corners, [0.01, 0.01, 0.01, 0.01, 0], kinds))
 
 
+def test_what_lies_by_less_beyond_the_fold_than_a_fold_may_bend_is_cut_off():
+    corners = [(0, 0), (0.2, 0), (0.2, 0.3), (-0.0004, 0.3), (0, 0.25)]
+    kinds = ["seam", "seam", "seam", "seam", "fold"]
+    cut = cut_outline(polygon_sides(corners, [0.01, 0.01, 0.01, 0.01, 0], kinds)).points
+    assert cut[:, 0].min() == pytest.approx(0.0, abs=1e-9)
+
+
 @pytest.mark.parametrize("slant", [-0.04, 0.0, 0.05])
 def test_a_hem_turned_up_covers_its_side_seams_exactly(slant):
     corners = np.array([(0, 0), (0.3, 0), (0.3 + slant, 0.4), (-slant, 0.4)])

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
+from warpflat.pattern.pieces import FOLD_STRAIGHT
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -90,7 +91,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
         A simple closed line. It contains the outline; on the fold both coincide.
 
     Raises:
-        InputError: if the piece reaches across the line of its own fold.
+        InputError: if the piece reaches farther across the line of its own fold than a fold may bend.
     """
     import shapely
 
@@ -111,10 +112,10 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     for side in sides:
         if isinstance(side, Side) and side.kind == "fold":
             half = _half_plane(side.points[0], side.points[-1], body)
-            over = body.difference(half)
-            if over.area > 1e-6:
+            over = float(shapely.distance(half, shapely.points(shapely.get_coordinates(body))).max())
+            if over > FOLD_STRAIGHT:
                 raise InputError(
-                    f"edge {side.name!r} lies on the fold, but {over.area * 1e6:.0f} mm2 of the piece lie beyond it; "
+                    f"edge {side.name!r} lies on the fold, but the piece reaches {over * 1e3:.1f} mm beyond it; "
                     "a half piece lies on one side of its fold"
                 )
             whole = _common(whole, half)
