@@ -158,7 +158,7 @@ def test_another_solver_finds_the_same_least_energy(along: Literal["free", "warp
     made = sewn(piece, stated, Straight(piece="bodice", line="left", along=along), options=FINE)
 
     network, smooth = replace(piece.network), smooth_ties(top, piece.positions)
-    hold = np.full(len(smooth), 0.3 * np.median(network.spring_arrays.stiffness))
+    hold = smooth.soft * max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
     network.sew(smooth.ends, smooth.ratio, hold, kind=smooth.kind, target=smooth.target)
 
     laid, weight = made.pieces["bodice"].positions, network.spring_stiffness.numpy()

@@ -11,6 +11,7 @@ from warpflat.fullness import FullEdge, fullness_of, give_fullness
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import FormResult, Mannequin
 from warpflat.pattern import draft_garment
+from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.from_garment import EdgeRules, pattern_of_garment
 from warpflat.seam_wishes import SeamWish, wished_seams
 from warpflat.shapes import make_shape
@@ -146,6 +147,27 @@ def test_gathers_widen_the_skirt_and_leave_the_bodice(mannequin: Mannequin):
     assert hem[1] / hem[0] == pytest.approx(1.5, abs=0.03)
     assert full.sewn.energy_after < 2.0 * plain.sewn.energy_after  # type: ignore[union-attr]
     assert any("front_skirt has up to 50 % more length" in note for note in full.notes)
+
+
+@pytest.mark.parametrize("fabric", ["interlock", "ponte", "isotropic"])
+def test_gathered_seams_are_smooth_in_soft_cloth_also_across_the_fold(fabric: str):
+    mannequin = Mannequin.from_size("EU 38")
+    form = mannequin.form("basic_block", half=True)
+    wishes = [SeamWish(name=name, factor=1.5, gathered=True) for name in ("waist", "waist 2")]
+    made = flatten_form(mannequin, form, fabric=fabric, wishes=wishes)
+    assert made.sewn is not None
+    assert made.sewn.converged
+    for piece in made.pieces.values():
+        waist = piece.positions[piece.surface.lines["waist"]]
+        if abs(waist[0, 0] - piece.positions[piece.datum[0], 0]) > 1e-6:
+            waist = waist[::-1]
+        unfolded = np.concatenate([waist[:0:-1] * [-1, 1] + [2 * waist[0, 0], 0], waist])
+        turns = turning_angles(unfolded)
+        there_and_back = np.abs(turns).sum() - np.ptp(np.concatenate([[0.0], np.cumsum(turns)]))
+        assert there_and_back < np.radians(40.0), piece.surface.name
+    rules = EdgeRules(ease=wished_seams(form, wishes).ease)
+    drafted = draft_garment(pattern_of_garment({"EU 38": made}, name="dress", rules=rules)[0])
+    assert max(abs(seam.difference_mm) for seam in drafted.seams) < 0.5
 
 
 # --- where the fullness goes

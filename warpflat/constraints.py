@@ -87,8 +87,12 @@ class Symmetric:
 Constraint = Straight | FixedLength | Symmetric
 
 
-def constraint_ties(constraint: Constraint, piece: Flattening) -> tuple[Ties, bool]:
+def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | None = None) -> tuple[Ties, bool]:
     """The constraint's ties in the piece's own numbering, and whether they say how the piece lies on the cloth.
+
+    Args:
+        constraint, piece: what is asked of which.
+        fold: the piece's vertices on its upright fold, if it has one.
 
     Raises:
         InputError: the piece has no such line, or the line cannot be what is asked for.
@@ -99,7 +103,7 @@ def constraint_ties(constraint: Constraint, piece: Flattening) -> tuple[Ties, bo
         lengths = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1)
         if constraint.length is not None:
             lengths = lengths * (constraint.length / lengths.sum())
-        return one_group(length_ties(line, lengths), smooth_ties(line, piece.positions)), False
+        return one_group(length_ties(line, lengths), smooth_ties(line, piece.positions, fold)), False
     if line[0] == line[-1]:
         raise InputError(f"{constraint.name}: the line is closed; it must run from one end to another")
     if isinstance(constraint, Straight):

@@ -36,9 +36,8 @@ __all__ = ["Held", "SeamPair", "Sewn", "sew"]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# Of a tie's spring over the median spring of the cloth; the same of those that only keep lines smooth.
+# Of a tie's spring over the median spring of the cloth.
 _STIFFNESS = 4.0
-_SOFT = 0.3
 # Steps of a round at most: what is amiss over a whole seam takes a dozen rounds, whether the cloth has come to rest before the offsets
 # grow or only begun to. Every so many rounds they become a quarter longer: offsets that follow a cloth that still swings keep it swinging.
 _ROUND = 40
@@ -161,13 +160,15 @@ def sew(
     whole = Together(pieces)
     folds = folds or {}
     alone = np.concatenate([piece.positions for piece in pieces.values()])
-    ties, kinds, laid = _ties(whole, alone, seams, constraints)
+    ties, kinds, laid = _ties(whole, alone, seams, constraints, folds)
     start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
     network = whole.network()
     if folds:
         network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
     if len(ties):
-        hold = np.where(ties.soft, _SOFT, _STIFFNESS) * float(np.median(network.spring_arrays.listed_stiffness))
+        thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
+        median = float(np.median(network.spring_arrays.listed_stiffness))
+        hold = np.where(ties.soft > 0, ties.soft * thread, _STIFFNESS * median)
         network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
     # A piece with a guided line needs no other hold: the line cannot turn.
     upright = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
@@ -188,13 +189,19 @@ def sew(
 
 
 def _ties(
-    whole: Together, alone: FloatArray, seams: Sequence[SeamPair], constraints: Sequence[Constraint]
+    whole: Together,
+    alone: FloatArray,
+    seams: Sequence[SeamPair],
+    constraints: Sequence[Constraint],
+    folds: Mapping[str, IntArray],
 ) -> tuple[Ties, list[tuple[str, str]], set[str]]:
     """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth."""
     ties, kinds, laid = [], [], set()
+    on_fold = {name: whole.numbers(name, ids) for name, ids in folds.items()}
     for seam in seams:
         first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
-        smooth = [smooth_ties(side, alone) for side in (first, second)]
+        sides = zip((first, second), seam.pieces, strict=True)
+        smooth = [smooth_ties(side, alone, on_fold.get(name)) for side, name in sides]
         if seam.joints is None:
             held = seam_ties(first, second, seam.ratio)
         else:
@@ -202,7 +209,7 @@ def _ties(
         ties.append(one_group(held, *smooth))
         kinds.append((seam.name, "seam"))
     for constraint in constraints:
-        own, lays = constraint_ties(constraint, piece_of(constraint, whole.pieces))
+        own, lays = constraint_ties(constraint, piece_of(constraint, whole.pieces), folds.get(constraint.piece))
         ties.append(replace(own, ends=whole.numbers(constraint.piece, own.ends)))
         kinds.append((constraint.name, constraint.kind))
         if lays:
@@ -225,7 +232,7 @@ def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tu
         done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
         if done or _contradict(amiss) or state.steps >= options.max_steps:
             return outcome, misses, amiss[-1] <= 1.0
-        seams.offset.assign(seams.offset.numpy() + np.where(ties.soft, 0.0, misses))
+        seams.offset.assign(seams.offset.numpy() + np.where(ties.soft > 0, 0.0, misses))
 
 
 def _contradict(amiss: Sequence[float]) -> bool:
@@ -244,7 +251,7 @@ def _held(
     pull = seams.stiffness.numpy() * (seams.offset.numpy() + misses)
     price = ties.sums(0.5 * pull * _misses(state, alone))
     largest = np.zeros(len(kinds))
-    np.maximum.at(largest, ties.group, np.where(ties.soft, 0.0, np.abs(misses)))
+    np.maximum.at(largest, ties.group, np.where(ties.soft > 0, 0.0, np.abs(misses)))
     summed = np.isfinite(ties.sum_tolerance)
     amiss = np.where(summed, np.abs(ties.sums(misses)), largest)
     return [

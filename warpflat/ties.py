@@ -31,6 +31,9 @@ _EDGE_TOLERANCE = 2e-5
 _SUM_TOLERANCE = 1e-4
 # How far a vertex may lie from its line or from its mirror image [m].
 _PLACE_TOLERANCE = 5e-5
+# Waves up to this length [m] are kept out of a line whose lengths are ruled, by springs of this stiffness over the stiffer thread's
+# where two edges are as long as a wave.
+WAVE, SMOOTH = 0.04, 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -40,7 +43,8 @@ class Ties:
     Attributes:
         ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.
         tolerance: #P, by how much c may miss zero [m].
-        soft: #P, true for ties that are no equations, only springs: what they miss is neither made good nor counted.
+        soft: #P, of ties that are no equations, only springs, their stiffness over that of the stiffer thread: what they miss is
+            neither made good nor counted; 0 of all others.
         group: #P, the seam or constraint that a tie belongs to.
         sum_tolerance: #groups, by how much the sum of its c may miss zero [m]; infinite where sums mean nothing.
     """
@@ -51,7 +55,7 @@ class Ties:
     target: FloatArray
     lever: FloatArray
     tolerance: FloatArray
-    soft: NDArray[np.bool_]
+    soft: FloatArray
     group: IntArray
     sum_tolerance: FloatArray = field(default_factory=lambda: np.array([np.inf]))
 
@@ -61,7 +65,7 @@ class Ties:
 
     def sums(self, misses: FloatArray) -> FloatArray:
         """#groups, the sum of the misses (#P) of each."""
-        counted = np.where(self.soft, 0.0, misses)
+        counted = np.where(self.soft > 0, 0.0, misses)
         return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
 
     def amiss(self, misses: FloatArray) -> float:
@@ -149,23 +153,51 @@ def straight_ties(line: IntArray) -> Ties:
     return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
 
 
-def smooth_ties(line: IntArray, positions: FloatArray) -> Ties:
-    """Every inner vertex of a row held, softly, at its present distance from the chord of its two neighbours.
+def smooth_ties(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> Ties:
+    """Every inner vertex of a row held, softly, at its present distance from chords of the row around it.
 
-    Where ties ask for more length than the cloth gives, a row of vertices would find it in a zigzag as fine as the mesh, at
-    the price of a little shear. A zigzag changes these distances by its whole width, a curve that bends otherwise by a share
-    of the square of the mesh's step.
+    Where ties ask for more length than the cloth gives, a row of vertices would find it in waves, at the price of a little
+    shear. A wave changes the distance from a chord of its own length by its whole height, a curve that bends otherwise by a
+    share of the square of the chord. What pushes a row into waves are threads that are to be longer, and they push the more the
+    shorter the waves. So the chords span two edges, four, eight and so on up to `WAVE`, and their springs go with the threads'
+    stiffness and against the square of the span, however fine the mesh and however soft the cloth is in shear.
 
     Args:
         line: vertices.
         positions: #V by 2, where the distances are taken [m].
+        fold: vertices on an upright fold, if there is one. A row that ends there goes on beyond it as its mirror image, and
+            each half has half of what holds the end.
     """
-    here, before, after = line[1:-1], line[:-2], line[2:]
+    step = float(np.linalg.norm(np.diff(positions[line], axis=0), axis=1).mean())
+    ties, reach = [], 1
+    while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
+        soft = SMOOTH * WAVE / (2 * step) / reach**2
+        ties.append(_from_chords(line, positions, reach, soft))
+        if fold is not None:
+            ties.append(_from_mirror_image(line, positions, fold, reach, soft))
+        reach *= 2
+    return one_group(*ties)
+
+
+def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> Ties:
+    """Each vertex held at its distance from the chord of those so many edges before and after it."""
+    here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
     chord, away = positions[after] - positions[before], positions[here] - positions[before]
     cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
     distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
     ties = _ties(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
-    return replace(ties, soft=np.ones(len(here), dtype=np.bool_))
+    return replace(ties, soft=np.full(len(here), soft))
+
+
+def _from_mirror_image(line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float) -> Ties:
+    """The ends on an upright fold held at their distance from the chord of the vertex so many edges before and its mirror image."""
+    rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
+    ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
+    lever = np.zeros((len(rows), 4, 2))
+    lever[:, 0, 1], lever[:, 1, 1] = -1.0, 1.0
+    target = np.einsum("pjk,pjk->p", lever, positions[ends])
+    ties = _ties(ends, LINEAR, target=target, lever=lever, tolerance=np.inf)
+    return replace(ties, soft=np.full(len(rows), soft / 2))
 
 
 def level_ties(line: IntArray, across: FloatArray) -> Ties:
@@ -216,7 +248,7 @@ def _ties(
         target=np.broadcast_to(np.asarray(target, dtype=np.float64), (count,)).copy(),
         lever=np.zeros((count, 4, 2)) if lever is None else lever,
         tolerance=np.full(count, tolerance),
-        soft=np.zeros(count, dtype=np.bool_),
+        soft=np.zeros(count),
         group=np.zeros(count, dtype=np.int32),
         sum_tolerance=np.zeros(0) if sum_tolerance is None else np.array([sum_tolerance]),
     )
