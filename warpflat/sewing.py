@@ -28,7 +28,7 @@ from warpflat.kernels.seams import compute_seam_misses
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, relax
-from warpflat.ties import Ties, even_ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
+from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together
 
 __all__ = ["Held", "SeamPair", "Sewn", "sew"]
@@ -36,9 +36,8 @@ __all__ = ["Held", "SeamPair", "Sewn", "sew"]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# Of a tie's spring over the median spring of the cloth; the same of those that keep the sides of a seam without ease or gathers smooth.
+# Of a tie's spring over the median spring of the cloth.
 _STIFFNESS = 4.0
-_SOFT = 0.3
 # Steps of a round at most: what is amiss over a whole seam takes a dozen rounds, whether the cloth has come to rest before the offsets
 # grow or only begun to. Every so many rounds they become a quarter longer: offsets that follow a cloth that still swings keep it swinging.
 _ROUND = 40
@@ -161,14 +160,14 @@ def sew(
     whole = Together(pieces)
     folds = folds or {}
     alone = np.concatenate([piece.positions for piece in pieces.values()])
-    network = whole.network()
-    thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
-    median = float(np.median(network.spring_arrays.listed_stiffness))
-    ties, kinds, laid = _ties(whole, alone, seams, constraints, folds, even=_SOFT * median / thread)
+    ties, kinds, laid = _ties(whole, alone, seams, constraints, folds)
     start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
+    network = whole.network()
     if folds:
         network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
     if len(ties):
+        thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
+        median = float(np.median(network.spring_arrays.listed_stiffness))
         hold = np.where(ties.soft > 0, ties.soft * thread, _STIFFNESS * median)
         network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
     # A piece with a guided line needs no other hold: the line cannot turn.
@@ -195,22 +194,14 @@ def _ties(
     seams: Sequence[SeamPair],
     constraints: Sequence[Constraint],
     folds: Mapping[str, IntArray],
-    *,
-    even: float,
 ) -> tuple[Ties, list[tuple[str, str]], set[str]]:
-    """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth.
-
-    even: stiffness of what keeps sides of seams smooth that are as long as on the body, over the stiffer thread's.
-    """
+    """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth."""
     ties, kinds, laid = [], [], set()
     on_fold = {name: whole.numbers(name, ids) for name, ids in folds.items()}
     for seam in seams:
         first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
         sides = zip((first, second), seam.pieces, strict=True)
-        smooth = [
-            even_ties(side, alone, even) if seam.ratio == 1.0 else smooth_ties(side, alone, on_fold.get(name))
-            for side, name in sides
-        ]
+        smooth = [smooth_ties(side, alone, on_fold.get(name)) for side, name in sides]
         if seam.joints is None:
             held = seam_ties(first, second, seam.ratio)
         else:

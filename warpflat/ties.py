@@ -12,7 +12,6 @@ from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
     "Ties",
-    "even_ties",
     "join_ties",
     "length_ties",
     "level_ties",
@@ -152,12 +151,6 @@ def straight_ties(line: IntArray) -> Ties:
     inner = line[1:-1]
     ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
     return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
-
-
-def even_ties(line: IntArray, positions: FloatArray, soft: float) -> Ties:
-    """Every inner vertex of a row held, by springs of such a stiffness over the stiffer thread's, at its present distance from the chord of
-    its two neighbours: enough where a seam asks for no more length than the cloth has."""
-    return _from_chords(line, positions, 1, soft)
 
 
 def smooth_ties(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> Ties:
