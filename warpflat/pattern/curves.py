@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 __all__ = ["Curve", "arc_lengths", "chords", "fit_curve", "turning_angles"]
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
-CORNER = np.radians(50.0)
-#: Along a border that is smoothed a corner shows over this many tolerances to either side.
-CORNER_REACH = 12.0
+CORNER = np.radians(45.0)
+#: Along a border that is smoothed a corner shows over this many tolerances to either side, and by more than this [rad].
+CORNER_REACH, CORNER_SMOOTHED = 12.0, np.radians(50.0)
 #: How far [m] a curve may lie from the points of a clean border.
 TOLERANCE = 1e-4
 #: The length of a fitted curve, up to any of its points, is off by at most this [m] wherever that can be had.
@@ -118,20 +118,34 @@ def fit_curve(
     clean = points[keep]
     clean[-1] = points[-1]
     reached = None if lengths is None else lengths[keep]
+    late = _bends_late(clean)
+    if late:
+        clean, reached = clean[::-1], None if reached is None else reached[-1] - reached[::-1]
     breaks = [0, *_corners(clean, tolerance), len(clean) - 1]
     runs = []
     for a, b in pairwise(breaks):
         run = clean[a : b + 1]
         curve = _fit_run(run, tolerance, None if reached is None else reached[a : b + 1] - reached[a])
         runs.append(_nearer(curve, run, tolerance) if near else curve)
-    return Curve(
+    whole = Curve(
         bezier=np.concatenate([run.bezier for run in runs]), straight=np.concatenate([run.straight for run in runs])
     )
+    return whole.reversed() if late else whole
+
+
+def _bends_late(points: NDArray[np.float64]) -> bool:
+    """Whether a line bends more in its second half, and is to be taken from its other end.
+
+    FITPACK places its knots from one end to the other, and left and right of a piece run against each other.
+    """
+    arc = arc_lengths(points)
+    return bool(np.abs(turning_angles(points)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
 
 
 def _corners(points: NDArray[np.float64], tolerance: float) -> list[int]:
     """Inner points that are corners; along a zigzag only those that are so over a longer stretch too."""
-    found = (np.flatnonzero(np.abs(turning_angles(points)) > CORNER) + 1).tolist()
+    sharp = CORNER if tolerance <= TOLERANCE else CORNER_SMOOTHED
+    found: list[int] = (np.flatnonzero(np.abs(turning_angles(points)) > sharp) + 1).tolist()
     if tolerance <= TOLERANCE:
         return found
     arc = arc_lengths(points)
@@ -141,7 +155,7 @@ def _corners(points: NDArray[np.float64], tolerance: float) -> list[int]:
             np.array([np.interp(arc[i] + s * CORNER_REACH * tolerance, arc, points[:, k]) for k in (0, 1)])
             for s in (-1, 1)
         )
-        if abs(float(turning_angles(np.stack([near, points[i], far]))[0])) > CORNER:
+        if abs(float(turning_angles(np.stack([near, points[i], far]))[0])) > sharp:
             corners.append(i)
     return corners
 
@@ -194,9 +208,12 @@ def _fit_run(
     line = chords(points[[0, -1]])
     if len(points) == 2 or _chord_distance(points).max() <= tolerance:
         return line
-    # Where a coarse border bends, a curve of the same length leaves its corners on one side and its chords on the other.
+    # Where a coarse border bends, a curve of the same length leaves its corners on one side and its chords on the other. What bends
+    # along a zigzag is to be smoothed away.
     step = np.linalg.norm(np.diff(points, axis=0), axis=1)
     bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
+    if lengths is not None and tolerance > TOLERANCE and not strict:
+        bend = 0.0
     best, worst = chords(points), np.inf
     for smoothing in tolerance**2 * len(points) * np.array([1.0, 0.5, 0.25, 0.1, 0.03, 0.01, 0.001, 0.0]):
         fit = _length_keeping_spline(points, arc, float(smoothing), tolerance, LENGTH_WEIGHT * slack)
