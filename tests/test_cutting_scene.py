@@ -9,6 +9,7 @@ import pytest
 
 from warpflat.cli import main
 from warpflat.errors import InputError
+from warpflat.pattern.read_json import read_pattern_json
 from warpflat.scene import make_scene, run_scene
 
 pxr = pytest.importorskip("pxr")
@@ -231,3 +232,15 @@ def test_the_command_compares_cuts_and_applies_one(
     assert piece["stages"][-2]["name"] == f"cut:{ledger['entries'][0]['name']}"
     assert main(["cuts", "b.toml", "--apply", "99"]) == 2
     assert "there is no candidate 99; valid: 1 to" in capfd.readouterr().err
+
+
+def test_a_cut_across_the_mesh_has_smooth_legs_near_the_mesh(tmp_path: Path):
+    """The shorter leg, which is to be longer, would else take up the length in teeth."""
+    dart = {"name": "a", "from": [0.17, 0.20, 0.0], "to": [0.08, 0.26, 0.14]}
+    result = run_scene(scene(surface={"shape": "bodice", "resolution": 33}, cuts=[dart], **QUIET), tmp_path)
+    assert [note for note in result.notes if "stays ragged" in note] == []
+    (piece,) = read_pattern_json(tmp_path / "pattern.json").pieces[""]
+    left, right = piece.edge("a.left"), piece.edge("a.right")
+    assert left.length == pytest.approx(right.length, abs=2e-4)
+    assert max(left.fit_error, right.fit_error) < 1.5e-3
+    assert max(len(left.curve.bezier), len(right.curve.bezier)) < 12

@@ -1,11 +1,13 @@
-"""Borders as curves: mirror images alike."""
+"""Borders as curves: mirror images alike, long bends kept, teeth smoothed or told of."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
+from warpflat.pattern import Dart, Edge, Piece, draft_piece
 from warpflat.pattern.curves import fit_curve
+from warpflat.pattern.fitting import is_wavy
 
 
 def bent(count: int = 24) -> np.ndarray:
@@ -14,9 +16,49 @@ def bent(count: int = 24) -> np.ndarray:
     return np.column_stack([0.03 * np.sin(2 * np.pi * share**1.3), -0.2 * share])
 
 
+def teeth(count: int, depth: float) -> np.ndarray:
+    """#P by 2 [m], a line of 20 cm with teeth."""
+    away = np.where(np.arange(count) % 2 == 1, -depth, 0.0)
+    away[-1] = 0.0
+    return np.column_stack([away, np.linspace(0.0, -0.2, count)])
+
+
+def dart_with(left: np.ndarray, right: np.ndarray) -> Piece:
+    """A piece with a dart from its lower border, cut away, with these legs from its tip (#P by 2 [m])."""
+    tip = np.array([0.2, 0.3])
+    left, right = (left + tip)[::-1], right + tip
+    corners = np.array([right[-1], (0.5, right[-1, 1]), (0.5, 0.5), (-0.1, 0.5), (-0.1, left[0, 1]), left[0]])
+    edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right, kind="dart")]
+    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
+    return Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)])
+
+
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-3])
 def test_a_mirror_image_that_runs_the_other_way_has_the_same_curve(tolerance: float):
     line = bent()
     curve = fit_curve(line, tolerance)
     mirrored = fit_curve(line[::-1] * [-1, 1], tolerance).reversed()
     np.testing.assert_allclose(mirrored.bezier * [-1, 1], curve.bezier, atol=1e-9)
+
+
+def test_long_bends_one_way_and_the_other_are_shape():
+    line = bent()
+    piece = Piece(
+        name="p",
+        edges=[
+            Edge(name="s", points=line),
+            Edge(name="b", points=np.array([line[-1], (0.4, -0.2), (0.4, 0), line[0]])),
+        ],
+    )
+    edge = draft_piece(piece).edge("s")
+    assert edge.tolerance == 1e-4
+    assert edge.fit_error < 1.1e-4
+    assert not is_wavy(edge.curve)
+    assert is_wavy(fit_curve(teeth(25, 0.002)))
+
+
+def test_teeth_that_no_smooth_line_can_be_as_long_as_are_told_of():
+    legs = teeth(41, 0.005), np.linspace(0.0, 1.0, 41)[:, None] * [0.1, -np.sqrt(0.08 - 0.01)]
+    piece = draft_piece(dart_with(*legs))
+    assert piece.edge("l").length == pytest.approx(piece.edge("r").length, abs=5e-4)
+    assert [note for note in piece.notes if "stays ragged at l:" in note]

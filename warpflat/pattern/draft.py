@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
-from warpflat.pattern.fitting import fit_edges
+from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import (
     SEAM_TOLERANCE,
@@ -223,6 +223,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     edges = tuple(_widened(edge, piece, darts) for edge in edges)
     cut = cut_outline(_sides(piece, edges, wedges))
     notes = [*cut.notes]
+    smoothed = [edge for edge in edges if tolerance is None and edge.tolerance > TOLERANCE]
+    if wavy := [edge.name for edge in smoothed if is_wavy(edge.curve)]:
+        notes.append(
+            f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
+            f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
+        )
     for dart in piece.darts:
         left, right = (next(e for e in edges if e.name == leg) for leg in (dart.left, dart.right))
         if abs(left.length - right.length) > SEAM_TOLERANCE:

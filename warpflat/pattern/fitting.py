@@ -11,7 +11,7 @@ from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_c
 from warpflat.pattern.notches import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
-__all__ = ["TOLERANCES", "EdgeKey", "fit_edges"]
+__all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy"]
 
 Vector = NDArray[np.float64]
 #: Names of a piece and of its edge.
@@ -22,9 +22,11 @@ Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
 #: A clean border has no more than so many curves, and one more for so much of its length [m].
 CURVES, CURVE = 4, 0.012
-#: A clean border turns back and forth by no more than this [rad], and this for each metre. The borders of garments that
-#: follow the mesh stay below 2 rad/m; a cut across the mesh, whose triangles jut out in turns, reaches 7 and more.
+#: A clean border turns back and forth, in waves shorter than about `WAVE` [m], by no more than this [rad], and this for each metre.
+#: The borders of garments that follow the mesh stay below 2 rad/m; a cut across the mesh, whose triangles jut out in turns, reaches
+#: 7 and more.
 SWING, SWING_PER_METRE = 0.3, 3.5
+WAVE = 0.04
 #: Smoothed sides of a ragged seam agree in length within this [m], if a tolerance can be found for it.
 EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by no more than this share of what they may.
@@ -76,10 +78,21 @@ def _clean(line: Vector, tolerance: float | None) -> tuple[Curve, float]:
 
 
 def _ragged(curve: Curve) -> bool:
+    return len(curve.bezier) > CURVES + curve.length / CURVE or is_wavy(curve)
+
+
+def is_wavy(curve: Curve) -> bool:
+    """Whether a curve turns back and forth as no clean border does; longer bends, one way and the other, are its shape."""
     line = curve.sample()
-    length, turns = float(arc_lengths(line)[-1]), turning_angles(line)
-    swing = float(np.abs(turns).sum() - np.ptp(np.concatenate([[0.0], np.cumsum(turns)])))
-    return len(curve.bezier) > CURVES + length / CURVE or swing > SWING + SWING_PER_METRE * length
+    arc = arc_lengths(line)
+    count = max(2, int(np.ceil(arc[-1] / (WAVE / 40))))
+    places = (np.arange(count) + 0.5) * arc[-1] / count
+    direction = np.concatenate([[0.0], np.cumsum(turning_angles(line))])[np.searchsorted(arc[1:-1], places)]
+    width = int(np.ceil(WAVE * count / arc[-1]))
+    # Averaged over a wave's length, what turns back within it is gone.
+    mean = np.convolve(np.pad(direction, width, mode="edge"), np.full(width, 1.0 / width), mode="valid")
+    swing = float(np.abs(np.diff(direction)).sum() - np.abs(np.diff(mean)).sum())
+    return swing > SWING + SWING_PER_METRE * float(arc[-1])
 
 
 def _keep_near(
@@ -168,6 +181,8 @@ def _together(
     """Both sides of a ragged seam, smoothed, with the lengths up to each point of the one that is shorter then."""
     sides = [first, second[::-1] if against else second]
     longer = np.array([1.0, 1.0 + ease])
+    # A short zigzag may have no smooth line of the right length: better a wiggle than a seam that does not match.
+    found, used = [fit_curve(side) for side in sides], TOLERANCES[-1]
     for tolerance in TOLERANCES[1:]:
         reached = [
             _reached(fit_curve(side, tolerance), side) / share for side, share in zip(sides, longer, strict=True)
@@ -177,12 +192,11 @@ def _together(
             fit_curve(side, tolerance, lengths=lengths * share) for side, share in zip(sides, longer, strict=True)
         ]
         apart = abs(curves[1].length - curves[0].length * longer[1])
+        if apart <= SAFE * LOCAL_TOLERANCE:
+            found, used = curves, tolerance
         if apart <= EQUAL and not any(map(_ragged, curves)):
             break
-    if apart > SAFE * LOCAL_TOLERANCE:
-        # A short zigzag has no smooth line of the right length: better a wiggle than a seam that does not match.
-        curves, tolerance = [fit_curve(side) for side in sides], TOLERANCE
-    return (curves[0], tolerance), (curves[1].reversed() if against else curves[1], tolerance)
+    return (found[0], used), (found[1].reversed() if against else found[1], used)
 
 
 def _reached(curve: Curve, points: Vector) -> Vector:
