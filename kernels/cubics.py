@@ -105,3 +105,57 @@ def carry_along(
     c = column[i]
     w = weight[i]
     result[i] = w[0] * values[c[0]] + w[1] * values[c[1]] + w[2] * values[c[2]] + w[3] * values[c[3]]
+
+
+@wp.kernel
+def carry_along_rows(
+    values: wp.array2d(dtype=wp.vec2d),
+    grid: wp.array2d(dtype=wp.int32),
+    column: wp.array2d(dtype=wp.int32),
+    weight: wp.array2d(dtype=wp.float64),
+    first: int,
+    # outputs
+    result: wp.array(dtype=wp.vec2d),
+):
+    """Of each vertex of a grid the sum of some values of its row, those of its column by its weights.
+
+    values: #R by #K [m]. grid: #R by #C, numbers of the vertices. column, weight: #C by 4 or fewer. result: #V [m].
+    """
+    p = wp.tid() + first
+    i = p / grid.shape[1]
+    j = p - i * grid.shape[1]
+    total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    for k in range(column.shape[1]):
+        total += weight[j, k] * values[i, column[j, k]]
+    result[grid[i, j]] = total
+
+
+@wp.kernel
+def sample_grid(
+    values: wp.array2d(dtype=wp.float64),
+    grid: wp.array2d(dtype=wp.int32),
+    row: wp.array2d(dtype=wp.int32),
+    row_weight: wp.array2d(dtype=wp.float64),
+    column: wp.array2d(dtype=wp.int32),
+    column_weight: wp.array2d(dtype=wp.float64),
+    first: int,
+    # outputs
+    sampled: wp.array3d(dtype=wp.float64),
+):
+    """Values between the rows and columns of a grid: of each place those of the rows and columns around it by their weights.
+
+    values: #V by #D. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N by 4 or fewer.
+    sampled: #M by #N by #D.
+    """
+    p = wp.tid() + first
+    place = p / sampled.shape[2]
+    d = p - place * sampled.shape[2]
+    i = place / sampled.shape[1]
+    j = place - i * sampled.shape[1]
+    total = wp.float64(0.0)
+    for a in range(row.shape[1]):
+        on_row = wp.float64(0.0)
+        for b in range(column.shape[1]):
+            on_row += column_weight[j, b] * values[grid[row[i, a], column[j, b]], d]
+        total += row_weight[i, a] * on_row
+    sampled[i, j, d] = total

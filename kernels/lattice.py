@@ -78,8 +78,60 @@ def list_corners(
                 at += 1
 
 
+@wp.func
+def is_on_grid(rows: int, columns: int, row: int, column: int):
+    return row >= 0 and row < rows and column >= 0 and column < columns
+
+
+@wp.func
+def spring_to(rows: int, columns: int, rising: int, i: int, j: int, row: int, column: int):
+    """The number of the spring from the vertex in row i and column j of a grid that is numbered row by row to one of the eight around it.
+
+    Springs are the edges, sorted by their lower vertex, then of each face the diagonal of corners 0-2, then that of corners 1-3.
+    rising: 0 if it is the former that runs from below left to above right, else 1.
+    """
+    of_row = 2 * columns - 1
+    s = int(0)
+    if row == i:
+        step = int(2)
+        if i == rows - 1:
+            step = 1
+        s = i * of_row + step * wp.min(j, column)
+    elif column == j:
+        s = wp.min(i, row) * of_row + wp.min(2 * j + 1, of_row - 1)
+    else:
+        which = rising
+        if row - i != column - j:
+            which = 1 - rising
+        edges = rows * (columns - 1) + (rows - 1) * columns
+        faces = (rows - 1) * (columns - 1)
+        s = edges + which * faces + wp.min(i, row) * (columns - 1) + wp.min(j, column)
+    return s
+
+
 @wp.kernel
 def list_neighbors(
+    rows: int,
+    columns: int,
+    offset: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    neighbor: wp.array(dtype=wp.int32),
+):
+    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin."""
+    v = wp.tid() + first
+    i = v / columns
+    j = v - i * columns
+    at = offset[v]
+    for up in range(-1, 2):
+        for right in range(-1, 2):
+            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
+                neighbor[at] = v + up * columns + right
+                at += 1
+
+
+@wp.kernel
+def number_springs(
     rows: int,
     columns: int,
     rising: int,
@@ -87,40 +139,37 @@ def list_neighbors(
     first: int,
     # outputs
     spring: wp.array(dtype=wp.int32),
-    neighbor: wp.array(dtype=wp.int32),
 ):
-    """The up to eight springs around each vertex of a grid that is numbered row by row, and the vertices at their far ends, in order.
-
-    Springs are the edges, sorted by their lower vertex, then of each face the diagonal of corners 0-2, then that of corners 1-3.
-
-    rising: 0 if it is the former that runs from below left to above right, else 1. offset: #V+1, where each vertex's begin.
-    """
+    """The springs to these vertices, by the numbers of `spring_to`."""
     v = wp.tid() + first
     i = v / columns
     j = v - i * columns
-    of_row = 2 * columns - 1
-    edges = rows * (columns - 1) + (rows - 1) * columns
-    faces = (rows - 1) * (columns - 1)
     at = offset[v]
     for up in range(-1, 2):
         for right in range(-1, 2):
-            row = i + up
-            column = j + right
-            there = row >= 0 and row < rows and column >= 0 and column < columns
-            if there and (up != 0 or right != 0):
-                s = int(0)
-                if up == 0:
-                    step = int(2)
-                    if i == rows - 1:
-                        step = 1
-                    s = i * of_row + step * wp.min(j, column)
-                elif right == 0:
-                    s = wp.min(i, row) * of_row + wp.min(2 * j + 1, of_row - 1)
-                else:
-                    which = rising
-                    if up != right:
-                        which = 1 - rising
-                    s = edges + which * faces + wp.min(i, row) * (columns - 1) + wp.min(j, column)
-                spring[at] = s
-                neighbor[at] = row * columns + column
+            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
+                spring[at] = spring_to(rows, columns, rising, i, j, i + up, j + right)
+                at += 1
+
+
+@wp.kernel
+def list_values(
+    rows: int,
+    columns: int,
+    rising: int,
+    offset: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    listed: wp.array(dtype=wp.float64),
+):
+    """The springs' values (#S) at these springs, without a list of their numbers."""
+    v = wp.tid() + first
+    i = v / columns
+    j = v - i * columns
+    at = offset[v]
+    for up in range(-1, 2):
+        for right in range(-1, 2):
+            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
+                listed[at] = value[spring_to(rows, columns, rising, i, j, i + up, j + right)]
                 at += 1

@@ -63,7 +63,7 @@ def compute_spring_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """Half of 1/2 k (l - L)^2 of each spring at each of its ends, so that the sum over vertices is the network's.
+    """1/2 k (l - L)^2 of each spring, at the lower of its vertices, so that the sum over vertices is the network's.
 
     position: #V [m]. energy: #V [J].
     """
@@ -71,9 +71,10 @@ def compute_spring_energy(
     here = position[i]
     total = wp.float64(0.0)
     for s in range(springs.offset[i], springs.offset[i + 1]):
-        stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
-        half = wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
-        total += wp.float64(0.5) * half * wp.abs(stretch)
+        there = springs.neighbor[s]
+        if there > i:
+            stretch = wp.length(position[there] - here) - springs.rest_length[s]
+            total += wp.float64(0.5) * springs.stiffness[s] * stretch * stretch
     energy[i] = springs.pull * total
 
 
@@ -85,7 +86,7 @@ def compute_spring_pull(
     # outputs
     pull: wp.array(dtype=wp.float64),
 ):
-    """Half of k |l - L| of each spring at each of its ends, whether springs pull or are but the step's matrix.
+    """k |l - L| of each spring, at the lower of its vertices, whether springs pull or are but the step's matrix.
 
     position: #V [m]. pull: #V [N].
     """
@@ -93,6 +94,7 @@ def compute_spring_pull(
     here = position[i]
     total = wp.float64(0.0)
     for s in range(springs.offset[i], springs.offset[i + 1]):
-        stretch = wp.length(position[springs.neighbor[s]] - here) - springs.rest_length[s]
-        total += wp.float64(0.5) * springs.stiffness[s] * wp.abs(stretch)
+        there = springs.neighbor[s]
+        if there > i:
+            total += springs.stiffness[s] * wp.abs(wp.length(position[there] - here) - springs.rest_length[s])
     pull[i] = total

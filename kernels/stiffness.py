@@ -5,7 +5,6 @@ import warp as wp
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
-QUARTER = wp.constant(wp.float64(1.5707963267948966))
 
 
 @wp.kernel
@@ -55,6 +54,19 @@ def list_springs(
             at -= 1
         neighbor[at] = there
         spring[at] = s
+
+
+@wp.kernel
+def pick_values(
+    entry: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    listed: wp.array(dtype=wp.float64),
+):
+    """The value of the spring that each entry of a list names."""
+    e = wp.tid() + first
+    listed[e] = value[entry[e]]
 
 
 @wp.kernel
@@ -135,13 +147,12 @@ def find_directions(
 class Lattice:
     """A fabric as a lattice of springs along the edges of quads.
 
-    warp: unit vector in the plane. angle: of the quads' first edges from it, on the whole [rad].
-    along, across: K of those edges and of the others. shear: G [N/m].
+    direction: of the quads' first edges on the whole, unit vector in the plane. along, across: K of those edges and of the others. shear: G
+    [N/m].
     least: share of K that a structural spring keeps.
     """
 
-    warp: wp.vec2d
-    angle: wp.float64
+    direction: wp.vec2d
     along: wp.float64
     across: wp.float64
     shear: wp.float64
@@ -173,10 +184,9 @@ def weigh_quads(
     q = wp.tid() + first
     quad = quads[q]
     d = first_direction(position, quad)
-    angle = wp.atan2(lattice.warp[0] * d[1] - lattice.warp[1] * d[0], wp.dot(d, lattice.warp))
     ka = lattice.along
     kb = lattice.across
-    if (int(wp.rint((angle - lattice.angle) / QUARTER)) & 1) == 1:
+    if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
         ka = lattice.across
         kb = lattice.along
     p0 = vertices[quad[0]]
@@ -191,7 +201,9 @@ def weigh_quads(
     shear = wp.min(lattice.shear, most)
     half_a = half * (ka - shear / (ratio * ratio)) * ratio
     half_b = half * (kb - shear * ratio * ratio) / ratio
-    lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
+    lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    if shear < lattice.shear:
+        lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
     h = side[q]
     stiffness[h] = half_a
     stiffness[h + 1] = half_b

@@ -13,7 +13,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.kernels.cubics import carry_along, weigh_cubics
+from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.launching import launch_each
 from warpflat.surface.grid import Lattice
 
@@ -41,13 +41,6 @@ class Cubics:
         result = self.weight[:, 0][over] * values[self.column[:, 0]]
         for k in range(1, self.column.shape[1]):
             result += self.weight[:, k][over] * values[self.column[:, k]]
-        return result
-
-    def along_rows(self, values: NDArray[Number]) -> NDArray[Number]:
-        """#M by #N, from #M by #keep."""
-        result = self.weight[:, 0] * values[:, self.column[:, 0]]
-        for k in range(1, self.column.shape[1]):
-            result += self.weight[:, k] * values[:, self.column[:, k]]
         return result
 
 
@@ -109,17 +102,24 @@ class GridCarry:
     def sample(self, values: FloatArray) -> FloatArray:
         """#C by #K, values of the coarser grid from those of the finer one (#V by #K)."""
         by_rows, by_columns = (cubics_between(fine, coarse) for coarse, fine in self._places)
-        on_rows = np.einsum("rk,rkcd->crd", by_rows.weight, values[self._grid[by_rows.column]])
-        return by_columns(on_rows).swapaxes(0, 1).reshape(-1, values.shape[1])
+        sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
+        of_rows, of_columns = ((cubics.column, cubics.weight) for cubics in (by_rows, by_columns))
+        given = [np.ascontiguousarray(values), self._grid, *of_rows, *of_columns]
+        launch_each(sample_grid, sampled.size, given, [sampled])
+        return sampled.reshape(-1, values.shape[1])
 
     def __call__(self, layout: FloatArray) -> FloatArray:
         """#V by 2, the finer layout of a coarser one (#C by 2) [m]."""
         by_rows, by_columns = self._cubics
         # x + iy, so that a vertex is one number.
         coarse = np.ascontiguousarray(layout).view(np.complex128).reshape(*map(len, self._lines))
-        result = np.empty(self._grid.size, dtype=np.complex128)
-        result[self._grid] = by_columns.along_rows(by_rows(coarse))
-        return result.view(np.float64).reshape(-1, 2)
+        on_rows, result = (
+            by_rows(coarse).view(np.float64).reshape(len(self._grid), -1, 2),
+            np.empty((self._grid.size, 2)),
+        )
+        given = [on_rows, self._grid, by_columns.column, by_columns.weight]
+        launch_each(carry_along_rows, self._grid.size, given, [result])
+        return result
 
 
 class LatticeCarry:

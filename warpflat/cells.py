@@ -17,7 +17,7 @@ from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.unfold import corners_around, lay_cells, quad_creases
 
-__all__ = ["ByVertex", "CellArrays", "cells_of", "creases_of", "first_of_faces"]
+__all__ = ["ByVertex", "CellArrays", "cells_of", "corners_of", "creases_of", "first_of_faces"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -104,7 +104,7 @@ def creases_of(surface: Surface) -> NDArray[np.int8]:
     """#F, as `quad_creases` has it, worked out once."""
     if not surface.is_quad.any():
         return quad_creases(surface.vertices, surface.faces)
-    around = _corners_of(surface)
+    around = corners_of(surface)
     return quad_creases(
         surface.vertices, surface.faces, sides=half_edges_of(surface), around=(around.offset, around.entry)
     )
@@ -115,11 +115,11 @@ def cells_of(surface: Surface) -> CellArrays:
     """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
     faces, first = surface.faces, first_of_faces(surface, 4, 1)
     laid = lay_cells(surface.vertices, faces, creases_of(surface), first)
-    return read_only(CellArrays(faces=faces, first=first, laid=laid, around=_corners_of(surface)))
+    return read_only(CellArrays(faces=faces, first=first, laid=laid, around=corners_of(surface)))
 
 
 @once_per_faces
-def _corners_of(surface: Surface) -> ByVertex:
+def corners_of(surface: Surface) -> ByVertex:
     """The faces' corners around each vertex, 4 times the face plus the corner."""
     numbered = row_by_row(surface)
     if numbered is not None:

@@ -296,7 +296,7 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
             continue
         at = int(column[0])
         # Whether the faces go round anticlockwise where columns lie to the right of one another and rows above one another.
-        y, x = np.array([np.argwhere(grid == vertex)[0] for vertex in surface.faces[0]]).T
+        y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
         turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
         side = 1.0 if (turns == upwards) != mirrored else -1.0
         step = norm(np.diff(points_at(surface.vertices, ordered), axis=2))

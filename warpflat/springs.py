@@ -21,6 +21,7 @@ from warpflat.kernels.stiffness import (
     list_springs,
     measure_edges,
     measure_hold,
+    pick_values,
     weigh_quads,
     weigh_triangles,
 )
@@ -72,7 +73,16 @@ class SpringsAround:
     @property
     def entry(self) -> IntArray:
         """2 #S, the springs' numbers, mesh edges first."""
-        return self.numbering.springs_around()[1] if isinstance(self.numbering, RowByRow) else self.numbering
+        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowByRow) else self.numbering
+
+    def listed(self, values: FloatArray) -> FloatArray:
+        """2 #S, the springs' values (#S) at both of their ends."""
+        if isinstance(self.numbering, RowByRow):
+            return self.numbering.listed(self.offset, values)
+        listed = np.empty(len(self.neighbor))
+        given = [self.numbering, np.ascontiguousarray(values, dtype=np.float64)]
+        launch_each(pick_values, len(listed), given, [listed])
+        return listed
 
     @property
     def count(self) -> int:
@@ -144,7 +154,7 @@ class SpringArrays:
 
     def listed(self, values: FloatArray) -> FloatArray:
         """2 #S, the springs' values (#S) at both of their ends."""
-        return np.take(values, self.around.entry)
+        return self.around.listed(values)
 
     @property
     def long_quads(self) -> int:
@@ -176,22 +186,21 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
     if is_quad.any():
         quads = rows_of(faces, is_quad)
         diagonal, short = np.empty(len(quads)), np.empty((len(quads), 2))
-        lattice = _lattice(fabric, quads, position, warp)
-        aligned = _off_threads(lattice.angle) <= _OFF_GRAIN
+        lattice, angle = _lattice(fabric, quads, position, warp)
+        aligned = _off_threads(angle) <= _OFF_GRAIN
         shear_excess = lattice.shear / fabric.shear_stiffness
         given = [surface.vertices, position, quads, rows_of(first, is_quad), lattice]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
-        lacks = short.any(axis=1)
-        if lacks.any():
+        if short.any():
             # Most have none: what is not written to takes no memory.
-            lack = np.zeros((len(faces), 2))
+            lacks, lack = short.any(axis=1), np.zeros((len(faces), 2))
             lack[np.flatnonzero(is_quad)[lacks]] = short[lacks]
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,
         listed_length=own.listed_length,
-        listed_stiffness=np.take(stiffness, own.around.entry),
+        listed_stiffness=own.around.listed(stiffness),
         edge_count=own.edge_count,
         lack=lack,
         aligned=aligned,
@@ -235,21 +244,23 @@ def _compliance(fabric: Fabric) -> wp.vec3d:
     return wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
 
 
-def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> Lattice:
-    """The fabric along the quads' edges.
+def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> tuple[Lattice, float]:
+    """The fabric along the quads' edges, and the angle from the warp to the first of these [rad].
 
     The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
     symmetry of a grid).
     """
     fourfold = np.empty((len(quads), 2))
     launch_each(find_directions, len(quads), [positions, quads, wp.vec2d(*warp)], [fourfold])
-    cosine, sine = fourfold.sum(axis=0)
+    # As complex numbers, of which one row is summed many times as fast as two columns are.
+    mean = complex(fourfold.view(np.complex128).sum())
+    angle = float(np.angle(mean)) / 4.0
+    across = np.array([-warp[1], warp[0]])
     lattice = Lattice()
-    lattice.warp = wp.vec2d(*warp)
-    lattice.angle = float(np.arctan2(sine, cosine)) / 4.0
-    lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, lattice.angle)
+    lattice.direction = wp.vec2d(*(np.cos(angle) * warp + np.sin(angle) * across))
+    lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, angle)
     lattice.least = _LEAST_STRUCTURAL_SHARE
-    return lattice
+    return lattice, angle
 
 
 @once_per_surface
@@ -259,7 +270,7 @@ def _unweighed(surface: Surface) -> _Unweighed:
     rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
     launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])
-    return read_only(_Unweighed(edge_count=len(edges), around=around, listed_length=np.take(rest_length, around.entry)))
+    return read_only(_Unweighed(edge_count=len(edges), around=around, listed_length=around.listed(rest_length)))
 
 
 @once_per_faces
@@ -267,7 +278,7 @@ def _springs_around(surface: Surface) -> SpringsAround:
     """The springs around each vertex, edges first, then diagonals."""
     numbered = row_by_row(surface)
     if numbered is not None:
-        offset, _, neighbor = numbered.springs_around()
+        offset, neighbor = numbered.neighbors_around()
         return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))
     corner = rows_of(surface.faces, surface.is_quad)
     ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])

@@ -39,7 +39,7 @@ class StepBuffers:
             forces [N].
         guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
-        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, half of what each spring around pulls with [N].
+        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, what each spring to a later one pulls with [N].
             Those of vertices are where `power` is: each is read as soon as it is written.
         evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
             none. advance: the places after them. along_lines: the places after a step along the lines of a lattice, once forces have been

@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
+from warpflat.cells import corners_of
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, read_only
 
@@ -235,10 +236,9 @@ def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
 
 
 def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
-    """For each of a grid's vertices a face that has it."""
-    face = np.empty(len(surface.vertices), dtype=np.int32)
-    face[surface.faces] = np.arange(len(surface.faces), dtype=np.int32)[:, None]
-    return face[vertices]
+    """For each of a grid's vertices a face that has it, the last one."""
+    around = corners_of(surface)
+    return around.entry[around.offset[vertices + 1] - 1] // 4
 
 
 def _every_other(lattice: Lattice) -> Thinned | None:

@@ -59,18 +59,16 @@ def hold_upright(
         place -= centre
         place *= turn
         place += centre
-        moving *= turn
         arm, inertia = _arm(place, weight[here])
-        spin = _moment(arm, velocity[here], weight[here]) / inertia
         # Forces are of the layout before it was turned.
         arm *= turn.conjugate()
         torque = (dot(_vectors(arm), force[here]) - dot(_vectors(arm), load[here])) / inertia
         arm *= turn
-        held[:] = arm
-        held *= weight[here]
+        if velocity[here].any():
+            moving *= turn
+            moving -= (_moment(arm, velocity[here], weight[here]) / inertia) * arm
+        np.multiply(arm, weight[here], out=held)
         held *= -torque
-        arm *= spin
-        moving -= arm
 
 
 def take_out_turning(pieces: Sequence[Upright], position: FloatArray, force: FloatArray, weight: FloatArray) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import warp as wp
-from warpflat.kernels.cubics import carry_along, weigh_cubics
+from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.kernels.lattice import number_faces
 
 from warpflat.launching import launch_each
@@ -71,3 +71,25 @@ def test_faces_are_numbered_from_side_to_side() -> None:
     # Side 2 of the second lies to the left, side 3 in the first one's sense: turned by one.
     np.testing.assert_array_equal(place.numpy()[:2], [[0, 0, 0], [0, 1, 1]])
     assert place.numpy()[2, 2] == -1
+
+
+def test_values_along_the_rows_of_a_grid_are_summed_by_weight() -> None:
+    rng = np.random.default_rng(3)
+    grid = rng.permutation(5 * 7).reshape(5, 7).astype(np.int32)
+    values, column = rng.normal(size=(5, 4, 2)), rng.integers(4, size=(7, 3)).astype(np.int32)
+    weight, result = rng.normal(size=(7, 3)), np.empty((35, 2))
+    launch_each(carry_along_rows, 35, [values, grid, column, weight], [result])
+    expected = np.einsum("jk,ijkd->ijd", weight, values[:, column])
+    np.testing.assert_allclose(result[grid], expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("depth", [1, 2, 3])
+def test_values_between_rows_and_columns_are_summed_by_both_weights(depth: int) -> None:
+    rng = np.random.default_rng(depth)
+    grid, values = rng.permutation(6 * 8).reshape(6, 8).astype(np.int32), rng.normal(size=(48, depth))
+    row, column = rng.integers(6, size=(5, 4)).astype(np.int32), rng.integers(8, size=(3, 2)).astype(np.int32)
+    row_weight, column_weight = rng.normal(size=(5, 4)), rng.normal(size=(3, 2))
+    sampled = np.empty((5, 3, depth))
+    launch_each(sample_grid, sampled.size, [values, grid, row, row_weight, column, column_weight], [sampled])
+    whole = values[grid][row[:, :, None, None], column]
+    np.testing.assert_allclose(sampled, np.einsum("ia,jb,iajbd->ijd", row_weight, column_weight, whole), rtol=1e-13)

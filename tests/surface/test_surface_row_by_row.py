@@ -42,8 +42,11 @@ def test_what_follows_from_the_numbers_is_what_is_sorted_out_of_the_faces(
     for ours, theirs in zip(numbered.corners_around(), corners_around(surface.faces, rows * columns), strict=True):
         assert ours.dtype == theirs.dtype
         np.testing.assert_array_equal(ours, theirs)
-    for ours, theirs in zip(numbered.springs_around(), springs_by_ends(surface), strict=True):
+    offset, neighbor = numbered.neighbors_around()
+    spring, value = numbered.springs_around(offset), np.random.default_rng(0).normal(size=len(neighbor) // 2)
+    for ours, theirs in zip((offset, spring, neighbor), springs_by_ends(surface), strict=True):
         np.testing.assert_array_equal(ours, theirs)
+    np.testing.assert_array_equal(numbered.listed(offset, value), value[spring])
 
 
 @pytest.mark.parametrize(

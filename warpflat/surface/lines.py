@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths import EdgeGraph, as_vertex, path_in
+from warpflat.surface.paths import EdgeGraph, are_joined, as_vertex, path_in
 from warpflat.surface.topology import half_edges_of
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
@@ -52,11 +52,7 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
     line, given = line[~same], given[~same]
     if len(line) < 2:
         raise InputError("a line needs at least two different vertices")
-    on_line = np.zeros(len(surface.vertices), dtype=bool)
-    on_line[line] = True
-    faces = np.unique(np.flatnonzero(on_line[surface.faces]) // surface.faces.shape[1])
-    around = replace(surface, faces=surface.faces[faces])
-    broken = np.flatnonzero(~EdgeGraph(around).are_joined(line[:-1], line[1:]))
+    broken = np.flatnonzero(~are_joined(half_edges_of(surface).edges, line[:-1], line[1:]))
     if len(broken):
         a, b = given[broken[0]], given[broken[0] + 1]
         raise InputError(

@@ -15,11 +15,21 @@ from warpflat.surface.topology import half_edges_of, mesh_edges
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-__all__ = ["EdgeGraph", "as_vertex", "chain_positions", "path_length"]
+__all__ = ["EdgeGraph", "are_joined", "as_vertex", "chain_positions", "path_length"]
 
 # A point given by coordinates must lie this close to the piece: as a share of its diagonal, or in edge lengths.
 _NEAR_SHARE = 0.1
 _NEAR_EDGES = 2.0
+
+
+def are_joined(edges: NDArray[np.int32], a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
+    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`topology.mesh_edges`)."""
+    low, high = np.minimum(a, b), np.maximum(a, b)
+    begin, end = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
+    joined = np.zeros(np.shape(low), dtype=bool)
+    for k in range(int((end - begin).max(initial=0))):
+        joined |= (begin + k < end) & (edges[np.minimum(begin + k, len(edges) - 1), 1] == high)
+    return joined
 
 
 class EdgeGraph:
@@ -36,14 +46,10 @@ class EdgeGraph:
         self.size = len(surface.vertices)
         ends = surface.vertices[self.edges]
         self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
-        self._keys = self.edges[:, 0].astype(np.int64) * self.size + self.edges[:, 1]
 
     def are_joined(self, a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
         """Whether edges a-b exist."""
-        one, two = np.asarray(a, dtype=np.int64), np.asarray(b, dtype=np.int64)
-        key = np.minimum(one, two) * self.size + np.maximum(one, two)
-        at = np.minimum(np.searchsorted(self._keys, key), len(self._keys) - 1)
-        return self._keys[at] == key
+        return are_joined(self.edges, a, b)
 
     def matrix(self, weight: NDArray[np.float64]) -> csr_matrix:
         """#V by #V, the weight of each edge."""

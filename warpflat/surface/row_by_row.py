@@ -11,12 +11,13 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.kernels.lattice import list_corners, list_neighbors
+from warpflat.kernels.lattice import list_corners, list_neighbors, list_values, number_springs
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces
 
 __all__ = ["RowByRow", "row_by_row"]
 
+FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
 
@@ -69,17 +70,33 @@ class RowByRow:
         launch_each(list_corners, self.rows * self.columns, [self.rows, self.columns, slot_of, offset], [corner])
         return offset, corner
 
-    def springs_around(self) -> tuple[IntArray, IntArray, IntArray]:
-        """The springs around each vertex, edges and both diagonals of each face: #V+1, where each vertex's begin, the springs' numbers,
-        edges first, then the faces' diagonals 0-2, then 1-3; and the vertices at their far ends, by which they are sorted."""
+    def neighbors_around(self) -> tuple[IntArray, IntArray]:
+        """#V+1, where each vertex's springs begin, edges and both diagonals of each face; and the vertices at their far ends, by which they
+        are sorted."""
         rows, columns = (_there(count, 3) for count in (self.rows, self.columns))
         offset = _begins(np.multiply.outer(rows, columns) - np.int32(1))
-        spring, neighbor = (np.empty(offset[-1], dtype=np.int32) for _ in range(2))
-        # Which of a face's two diagonals runs from below left to above right.
-        rising = self.place.index(0) % 2
-        given = [self.rows, self.columns, rising, offset]
-        launch_each(list_neighbors, self.rows * self.columns, given, [spring, neighbor])
-        return offset, spring, neighbor
+        neighbor = np.empty(offset[-1], dtype=np.int32)
+        launch_each(list_neighbors, self.rows * self.columns, [self.rows, self.columns, offset], [neighbor])
+        return offset, neighbor
+
+    def springs_around(self, offset: IntArray) -> IntArray:
+        """Those springs' numbers: edges first, then the faces' diagonals 0-2, then 1-3. offset: #V+1, where each vertex's begin."""
+        spring = np.empty(offset[-1], dtype=np.int32)
+        given = [self.rows, self.columns, self._rising, offset]
+        launch_each(number_springs, self.rows * self.columns, given, [spring])
+        return spring
+
+    def listed(self, offset: IntArray, values: FloatArray) -> FloatArray:
+        """The springs' values (#S) in the order of these numbers."""
+        listed = np.empty(offset[-1])
+        given = [self.rows, self.columns, self._rising, offset, np.ascontiguousarray(values, dtype=np.float64)]
+        launch_each(list_values, self.rows * self.columns, given, [listed])
+        return listed
+
+    @property
+    def _rising(self) -> int:
+        """Which of a face's two diagonals runs from below left to above right."""
+        return self.place.index(0) % 2
 
 
 def _there(count: int, most: int) -> IntArray:
