@@ -1,4 +1,9 @@
-"""Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix."""
+"""Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix.
+
+The same step smooths: without viscosity, and with shares of the velocity and of its change that are others from step to step
+(`warpflat.smoothing`). `pace` is an array of one that says so: what viscosity is to be taken times, 0 or 1, what the velocity and what
+its change; with three times 1 it is the paper's step.
+"""
 
 import warp as wp
 
@@ -44,6 +49,7 @@ def gather_forces(
     bond_stiffness: wp.array(dtype=wp.float64),
     load: wp.array(dtype=wp.vec2d),
     time_step: wp.float64,
+    pace: wp.array(dtype=wp.vec3d),
     watch: int,
     first: int,
     # outputs
@@ -56,7 +62,7 @@ def gather_forces(
     reach: wp.array(dtype=wp.float64),
     guarded: wp.array(dtype=wp.int32),
 ):
-    """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), and the neighbours' share, eq. (9).
+    """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), if there is to be viscosity, and the neighbours' share, eq. (9).
 
     position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`. bond_*: as
     `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all faces have been evaluated at these positions, 0 where only
@@ -66,7 +72,8 @@ def gather_forces(
     guarded: 1 where a face around it acts. All #V.
     """
     i = wp.tid() + first
-    total, driving = spring_forces_on(i, position, velocity, springs, time_step)
+    viscosity = pace[0][0]
+    total, driving = spring_forces_on(i, position, velocity, springs, time_step, viscosity != wp.float64(0.0))
     total += load[i]
     k = spring_stiffness[i]
     if watch != 0:
@@ -92,7 +99,7 @@ def gather_forces(
         driving += bond_viscosity[bond]
         k += bond_stiffness[bond]
     total = wp.cw_mul(total, bonds.freedom[i])
-    driving = wp.cw_mul(driving, bonds.freedom[i]) + total
+    driving = wp.cw_mul(driving, bonds.freedom[i]) * viscosity + total
     force[i] = total
     power[i] = wp.dot(total, velocity[i]) / k
     driving_force[i] = driving
@@ -130,12 +137,13 @@ def advance(
     anchor: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
     time_step: wp.float64,
+    pace: wp.array(dtype=wp.vec3d),
     first: int,
     # outputs
     position: wp.array(dtype=wp.vec2d),
     velocity: wp.array(dtype=wp.vec2d),
 ):
-    """Eq. (10): dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i), then eq. (4).
+    """Eq. (10): dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i), then eq. (4), at this pace.
 
     A vertex that would come further from its anchor than its reach is stopped there. Arguments as in `gather_forces`, all #V.
     """
@@ -145,7 +153,7 @@ def advance(
         coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
     h2 = time_step * time_step
     dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
-    v = velocity[i] + dv
+    v = velocity[i] * pace[0][1] + dv * pace[0][2]
     here = position[i]
     away = here - anchor[i] + v * time_step
     distance = wp.length(away)

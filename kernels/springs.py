@@ -39,9 +39,10 @@ def spring_forces_on(
     velocity: wp.array(dtype=wp.vec2d),
     springs: Springs,
     time_step: wp.float64,
+    viscous: bool,
 ):
-    """Sum of the spring forces on vertex i, and paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i) [N]; a
-    membrane has forces and viscosity of its own."""
+    """Sum of the spring forces on vertex i, and, if it is asked for, paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i)
+    [N]; a membrane has forces and viscosity of its own."""
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if springs.pull != wp.float64(0.0):
@@ -51,7 +52,8 @@ def spring_forces_on(
             there = springs.neighbor[s]
             stiffness = springs.stiffness[s]
             force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
-            viscosity += stiffness * (velocity[there] - moving)
+            if viscous:
+                viscosity += stiffness * (velocity[there] - moving)
     return force, time_step * viscosity
 
 

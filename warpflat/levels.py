@@ -42,9 +42,12 @@ _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 _LITTLE_GAIN = 0.07
 # Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
-# straight lines, whose kinks they have to smooth first.
-_STEPS = 4
+# straight lines, whose kinks they have to smooth first. In soft cloth, from such a K/G on, one more, and of those that swing: the guard acts
+# there, and a push in its direction may go further than one step of the others can bear.
+_STEPS = 3
 _STEPS_SMOOTH = 2
+_STEPS_SOFT = 4
+_SOFT = 12.0
 # The least share that is tried, of a correction and of a leap.
 _LEAST_SHARE = 0.05
 _LEAST_OF_LEAP = 0.2
@@ -89,9 +92,9 @@ class _Level:
     before that."""
 
     state: Relaxation
+    steps: int
     way: _Way | None = None
     lines: bool = False
-    steps: int = _STEPS
 
 
 def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
@@ -162,7 +165,9 @@ class Levels:
     ) -> None:
         self._ladders, self._mend = ladders, mend
         self._lattice = all(rungs[0].step.smooth_carry is not None for rungs in ladders if rungs)
-        self._levels = [_Level(finest, steps=_STEPS_SMOOTH if self._lattice or not mend else _STEPS)]
+        self._soft = finest.network.fabric.softness >= _SOFT
+        few = _STEPS_SOFT if self._soft else _STEPS
+        self._levels = [_Level(finest, steps=_STEPS_SMOOTH if self._lattice or not mend else few)]
         self.leading: dict[Surface, Rung] = {}
         self._watch_every = _watch_every(finest.network)
         self._memories: Sequence[CycleMemory] = ()
@@ -172,10 +177,10 @@ class Levels:
             networks = [rung.network for rung in rungs]
             coarse = ready.get(tuple(map(id, networks)))
             if coarse is not None:
-                coarse.steps = _STEPS
+                coarse.steps = few
             else:
                 start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
-                coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start))
+                coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start), steps=few)
             fine = self._levels[-1]
             if fine.way is None:
                 fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
@@ -245,7 +250,8 @@ class Levels:
         along its lines. Returns #P, the energy that they have led to [J]."""
         state, steps = self._levels[level].state, self._levels[level].steps
         state.velocity.zero_()
-        state.sweep(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
+        go = state.sweep if self._soft else state.smooth
+        go(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
         self._count(level, steps)
         if not self._levels[level].lines:
             return self._objective(level)

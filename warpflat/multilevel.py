@@ -4,7 +4,8 @@ A step tells each vertex of its neighbours only, so that the number of steps gro
 spring network of its own, with the same fabric, guard and steps, on a quarter of the vertices of the next finer one
 (`warpflat.coarsen`). A cycle (full approximation scheme, Brandt 1977; Brandt and Livne 2011):
 
-1. a few steps from rest on the fine level, in a soft cloth on a lattice the last along its rows and columns (`kernels.thread_lines`);
+1. a few steps from rest on the fine level (`warpflat.smoothing`), in a soft cloth on a lattice the last along its rows and columns
+   (`kernels.thread_lines`);
 2. the coarse level starts where its vertices are, under the load that gives it the fine level's residual forces there;
 3. the same on the coarse level, down to the coarsest, which is relaxed by steps;
 4. the way the coarse vertices have gone is carried up;

@@ -28,6 +28,7 @@ from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
+from warpflat.smoothing import STEADY, pace_of
 from warpflat.step_buffers import StepBuffers
 from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
@@ -141,6 +142,8 @@ class Relaxation:
         self.restarts = 0
         self.last: Look
         self.looked = False
+        # Whether the guard acted anywhere when all cells were last looked at before a step.
+        self._acts = False
 
     # --- what is measured against
 
@@ -182,24 +185,50 @@ class Relaxation:
                 evaluated, and no vertex leaves the reach that it had: three times as fast, and as good where steps are to smooth.
             evaluated: of the state as it is, all cells have been looked at already.
         """
-        buffers, evaluate_on = self._buffers, self._buffers.evaluate_unguarded
         for number in range(steps):
-            if number % watch_every == 0:
-                if number or not evaluated:
-                    buffers.evaluate.launch()
-                acts = buffers.on_host(buffers.guarded).any()
-                evaluate_on = buffers.evaluate_on if acts else buffers.evaluate_unguarded
-            else:
-                evaluate_on.launch()
+            self._evaluate(number, watch_every, evaluated=evaluated)
             if self.options.kinetic_damping:
-                power = _sums(buffers.on_host(buffers.power), self._vertex_begin)
-                for piece in np.flatnonzero(power < 0.0) if power.min() < 0.0 else ():
-                    buffers.stop[piece].launch()
-                    self.restarts += 1
-            buffers.advance.launch()
-            self.steps += 1
-            if each_step is not None:
-                each_step()
+                self._damp()
+            self._advance(each_step)
+
+    def smooth(
+        self,
+        steps: int,
+        each_step: Callable[[], None] | None = None,
+        *,
+        watch_every: int = 1,
+        evaluated: bool = False,
+    ) -> None:
+        """Some steps from rest that take what is rough (`warpflat.smoothing`). Arguments as of `sweep`."""
+        for number in range(steps):
+            self._buffers.go_at(pace_of(number))
+            self._evaluate(number, watch_every, evaluated=evaluated)
+            self._advance(each_step)
+        self._buffers.go_at(STEADY)
+
+    def _evaluate(self, number: int, watch_every: int, *, evaluated: bool) -> None:
+        """The forces before a step, of so many before it in a row."""
+        buffers = self._buffers
+        if number % watch_every:
+            (buffers.evaluate_on if self._acts else buffers.evaluate_unguarded).launch()
+            return
+        if number or not evaluated:
+            buffers.evaluate.launch()
+        self._acts = watch_every > 1 and bool(buffers.on_host(buffers.guarded).any())
+
+    def _damp(self) -> None:
+        """Velocities of pieces whose forces begin to brake the motion become zero."""
+        buffers = self._buffers
+        power = _sums(buffers.on_host(buffers.power), self._vertex_begin)
+        for piece in np.flatnonzero(power < 0.0) if power.min() < 0.0 else ():
+            buffers.stop[piece].launch()
+            self.restarts += 1
+
+    def _advance(self, each_step: Callable[[], None] | None) -> None:
+        self._buffers.advance.launch()
+        self.steps += 1
+        if each_step is not None:
+            each_step()
 
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""

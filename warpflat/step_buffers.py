@@ -22,6 +22,7 @@ from warpflat.kernels.thread_lines import go_along_lines, solve_lines
 from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.network import SpringNetwork
+from warpflat.smoothing import STEADY
 
 __all__ = ["StepBuffers"]
 
@@ -38,6 +39,7 @@ class StepBuffers:
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d, constant
             forces [N].
         guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
+        pace: 1 vec3d, how steps go on from one another, as `kernels.implicit` has it.
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
         vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, what each spring to a later one pulls with [N].
             Those of vertices are where `power` is: each is read as soon as it is written.
@@ -72,6 +74,7 @@ class StepBuffers:
         self.seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
+        self.pace = wp.array(np.array([STEADY]), dtype=wp.vec3d, device=device)
         self.vertex_energy = self.vertex_pull = self.power
         self.face_energy = wp.zeros(f, dtype=wp.float64, device=device)
         self._views: dict[int, NDArray[Any]] = {}
@@ -84,6 +87,13 @@ class StepBuffers:
             if self.network.device.is_cpu:
                 self._views[id(array)] = view
         return view
+
+    def go_at(self, pace: tuple[float, float, float]) -> None:
+        """Let the next steps go at this pace."""
+        values = self.on_host(self.pace)
+        values[0] = pace
+        if not self.network.device.is_cpu:
+            self.pace.assign(values)
 
     def _cells(self, watch: int) -> Launch:
         """Forces on the cells, of all faces (1) or of those that act (0)."""
@@ -142,6 +152,7 @@ class StepBuffers:
                 self.seam_stiffness,
                 self.load,
                 self.time_step,
+                self.pace,
                 watch,
             ],
             outputs=[
@@ -189,6 +200,7 @@ class StepBuffers:
                 self.anchor,
                 self.reach,
                 self.time_step,
+                self.pace,
             ],
             outputs=[self.position, self.velocity],
             device=net.device,

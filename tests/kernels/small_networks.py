@@ -14,6 +14,7 @@ from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 
 from warpflat.fabric import Fabric
 from warpflat.network import SpringNetwork
+from warpflat.smoothing import STEADY
 from warpflat.surface import make_surface
 
 DEVICE = "cpu"
@@ -71,6 +72,7 @@ class Launched:
     time_step: float = 0.01
     pieces: int = 1
     watch: int = 1
+    pace: tuple[float, float, float] = STEADY
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -94,6 +96,7 @@ class Launched:
             "reach": zeros(n),
             "guarded": zeros(n, wp.int32),
             "pull": zeros(n),
+            "pace": wp.array(np.array([self.pace]), dtype=wp.vec3d, device=DEVICE),
             "energy": zeros(n),
         }
 

@@ -183,3 +183,20 @@ def test_pieces_of_a_launch_equal_the_whole():
     for name in whole.arrays:
         assert np.array_equal(whole[name], parts[name]), name
     assert np.array_equal(whole.kinetic_energy(), parts.kinetic_energy())
+
+
+@pytest.mark.parametrize("pace", [(0.0, 0.0, 4.0 / 3.0), (0.0, 0.2, 2.4), (1.0, 1.0, 1.0)])
+def test_shares_of_velocity_and_push_are_those_of_the_pace(pace: tuple[float, float, float]):
+    network = small_network()
+    velocities = np.random.default_rng(7).normal(scale=1e-3, size=(network.vertex_count, 2))
+    at = Launched(network, shaken(network, scale=1.2), velocities, 0.02, pace=pace).evaluate_guard().gather_forces()
+    viscosity, carried, push = pace
+    h, m, stiffness = 0.02, network.mass.numpy()[:, None], at["stiffness"][:, None]
+    viscous = spring_sums(network, velocities) - velocities * spring_sums(network, np.ones_like(velocities))
+    driving = at["force"] + viscosity * h * viscous
+    np.testing.assert_allclose(at["driving_force"], driving, rtol=1e-9, atol=1e-9 * np.abs(driving).max())
+    guess = driving * h / (m + h**2 * stiffness)
+    change = (driving * h + h**2 * spring_sums(network, guess)) / (m + h**2 * stiffness)
+    new = carried * velocities + push * change
+    new *= np.minimum(1.0, at["reach"] / np.maximum(h * np.linalg.norm(new, axis=1), 1e-300))[:, None]
+    np.testing.assert_allclose(at.advance()["velocity"], new, rtol=1e-7, atol=1e-8 * np.abs(new).max())
