@@ -167,11 +167,11 @@ class Flattening:
 
     def write_obj(self, folder: Path) -> str:
         """Write `NAME.obj` and return its name."""
-        from warpflat.export import write_obj
+        from warpflat.export import file_in, write_obj
 
-        file = f"{self.surface.name}.obj"
-        write_obj(folder / file, self.surface, self.positions, faces=self.faces, pattern_to_surface=self.vertex_origin)
-        return file
+        file = file_in(folder, self.surface.name, ".obj")
+        write_obj(file, self.surface, self.positions, faces=self.faces, pattern_to_surface=self.vertex_origin)
+        return file.name
 
     def picture_piece(self) -> PicturePiece:
         """Its row in a picture."""

@@ -245,29 +245,29 @@ def _write(
     paper: str,
     sizes: Sequence[str] | None = None,
 ) -> str:
+    from warpflat.export import file_in
     from warpflat.export.dxf import write_dxf
     from warpflat.export.pattern_json import write_pattern_json
     from warpflat.export.pdf import write_pdf
     from warpflat.export.svg import write_svg
 
+    file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
     if kind == "dxf":
-        write_dxf(drafted, folder / f"{name}.dxf", dialect=dialect, sizes=sizes)
-        return f"{name}.dxf"
-    if kind == "svg":
-        write_svg(drafted, folder / f"{name}.svg", sizes=sizes, nested=True)
-        return f"{name}.svg"
-    if kind == "pdf":
-        write_pdf(drafted, folder / "pattern.pdf", paper=paper, sizes=sizes)
-        return "pattern.pdf"
-    write_pattern_json(drafted, folder / "pattern.json")
-    return "pattern.json"
+        write_dxf(drafted, file, dialect=dialect, sizes=sizes)
+    elif kind == "svg":
+        write_svg(drafted, file, sizes=sizes, nested=True)
+    elif kind == "pdf":
+        write_pdf(drafted, file, paper=paper, sizes=sizes)
+    else:
+        write_pattern_json(drafted, file)
+    return file.name
 
 
 def _marker(
     drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
 ) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
     """Write `NAME.marker.svg` and `NAME.marker.json`, for one garment of each size."""
-    from warpflat.export import write_json
+    from warpflat.export import file_in, write_json
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern import make_marker
 
@@ -275,8 +275,8 @@ def _marker(
         marker = make_marker(drafted, cloth, seconds=seconds)
     except InputError as error:
         return [], (f"no marker was made: {error}",), {}
-    files = [f"{name}.marker.svg", f"{name}.marker.json"]
-    write_marker_svg(marker, folder / files[0])
+    files = [file_in(folder, name, ending) for ending in (".marker.svg", ".marker.json")]
+    write_marker_svg(marker, files[0])
     placements: list[dict[str, Any]] = [
         {
             "piece": copy.piece.name,
@@ -294,9 +294,9 @@ def _marker(
         "pieces": len(placements),
         "garments": len(drafted.pieces),
     }
-    write_json(folder / files[1], {"schema": 1, **measures, "placements": placements})
+    write_json(files[1], {"schema": 1, **measures, "placements": placements})
     told = (
         f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
         f"{counted(len(placements), 'piece')}"
     )
-    return files, (told,), measures
+    return [file.name for file in files], (told,), measures

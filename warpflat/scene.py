@@ -19,6 +19,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
 from warpflat.mannequin.table import MannequinTable
+from warpflat.names import checked_name, fitted_name
 from warpflat.relax import RelaxOptions
 from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
 from warpflat.scene_types import (
@@ -193,7 +194,7 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
 
     Args:
         data: nested tables.
-        name: of the scene, unless the data have one.
+        name: of the scene, unless the data have one; with "_" where no file can bear it.
         folder: from where relative paths are taken.
         where: what messages begin with.
 
@@ -201,7 +202,10 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
         InputError: as `load_scene`.
     """
     settings = check_table(SceneTable, data, where)
-    return Scene(name=settings.name or name, settings=settings, folder=folder, where=where)
+    if settings.name is not None:
+        with told_by(f"{where}: name"):
+            checked_name(settings.name)
+    return Scene(name=settings.name or fitted_name(name), settings=settings, folder=folder, where=where)
 
 
 def run_scene(
@@ -228,7 +232,7 @@ def run_scene(
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
     from warpflat.cutting import cut, separate
-    from warpflat.export import FrameWriter, prepare_folder
+    from warpflat.export import FrameWriter, file_in, prepare_folder
     from warpflat.film import Film
     from warpflat.leftovers import settle
     from warpflat.pattern_files import pattern_options, surface_files
@@ -278,8 +282,9 @@ def run_scene(
         from warpflat.wear_picture import write_wear_picture
 
         for piece in pieces:
-            files.append(f"{piece.surface.name}.wear.png")
-            write_wear_picture(folder / files[-1], piece)
+            picture = file_in(folder, piece.surface.name, ".wear.png")
+            write_wear_picture(picture, piece)
+            files.append(picture.name)
     if wanted:
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)

@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpflat.export.atomic import atomic_path, prepare_folder, require_writable
+    from warpflat.export.atomic import atomic_path, file_in, prepare_folder, require_writable
     from warpflat.export.metrics import write_json
     from warpflat.export.obj import write_obj
     from warpflat.export.picture import PicturePiece, write_picture
@@ -17,6 +17,7 @@ __all__ = [
     "FrameWriter",
     "PicturePiece",
     "atomic_path",
+    "file_in",
     "prepare_folder",
     "require_writable",
     "validate_usd",
@@ -29,6 +30,7 @@ _HOME = {
     "FrameWriter": "usd",
     "PicturePiece": "picture",
     "atomic_path": "atomic",
+    "file_in": "atomic",
     "prepare_folder": "atomic",
     "require_writable": "atomic",
     "validate_usd": "usd_validation",

@@ -9,8 +9,18 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from warpflat.errors import InputError
+from warpflat.names import checked_name
 
-__all__ = ["atomic_path", "hidden_beside", "prepare_folder", "require_writable"]
+__all__ = ["atomic_path", "file_in", "hidden_beside", "prepare_folder", "require_writable"]
+
+
+def file_in(folder: Path, name: str, ending: str) -> Path:
+    """The file of what is called `name` in a folder: whoever names it, nothing is written elsewhere.
+
+    Raises:
+        InputError: `name` leads out of the folder, or cannot name a file for another reason.
+    """
+    return folder / f"{checked_name(name)}{ending}"
 
 
 def hidden_beside(final: Path) -> Path:

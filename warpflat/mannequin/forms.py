@@ -13,6 +13,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
 from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
 from warpflat.mannequin.profiles import Floats
+from warpflat.names import checked_name, same_file
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
@@ -50,6 +51,9 @@ class Form:
         profiles: what is done to the body's profiles, by level.
         ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
+
+    Raises:
+        InputError: a piece's name that cannot name a file, or two that would be one file on some system.
     """
 
     name: str
@@ -57,6 +61,19 @@ class Form:
     profiles: Mapping[str, Adjustment] = field(default_factory=dict)
     ruled: tuple[tuple[str, str], ...] = ()
     blend: tuple[Form, float] | None = None
+
+    def __post_init__(self) -> None:
+        files: dict[str, str] = {}
+        for piece in self.pieces:
+            try:
+                checked_name(piece)
+            except InputError as error:
+                raise InputError(f"form {self.name}: pieces: {error}") from None
+            other = files.setdefault(same_file(piece), piece)
+            if other != piece:
+                raise InputError(
+                    f"form {self.name}: pieces: {other!r} and {piece!r} would be one file on Windows and macOS; rename one"
+                )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -103,12 +120,12 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
 
     Args:
         name: what the form is called.
-        data: keys ``pieces`` (by name: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
+        data: keys ``pieces`` (by name, which names a file, too: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
             :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``like``
             (a shipped form whose pieces and profiles are taken over where this one gives none).
 
     Raises:
-        InputError: for an unknown key or a value of the wrong kind.
+        InputError: for an unknown key, a value of the wrong kind, or a piece's name that cannot name a file.
     """
     where = f"form {name}"
     _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like"}, where)

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.names import checked_name
 from warpflat.surface.mesh import Surface
 from warpflat.surface.polygons import (
     distinct_corners,
@@ -71,7 +72,7 @@ def make_surface(
     Args:
         vertices: #I by 3, positions [m].
         polygons: #F by k vertex indices (counted from 0) filled up with -1 on the right, or a list of lists.
-        name: what the piece is called in files and messages.
+        name: what the piece is called in files and messages; something that can name a file on any system.
         lines: feature lines by name: vertex indices (of `vertices`) along edges.
         component: which connected part to take if there are several: "largest", or its number, largest first from 0.
         weld: whether vertices at the same place are one. By default they are if `split_corners` says that the format
@@ -83,8 +84,9 @@ def make_surface(
         source: what messages call the input, such as a file's name; by default `name`.
 
     Raises:
-        InputError: with one line, if the input is no surface or no such part of one.
+        InputError: with one line, if the input is no surface or no such part of one, or the name cannot name a file.
     """
+    checked_name(name)
     try:
         return _make(
             vertices,

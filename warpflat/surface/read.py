@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import make_surface
 from warpflat.surface.mesh import Surface
@@ -66,7 +67,8 @@ def read_surface(
         units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
             overrides what the file says.
         component: which connected part to take if there are several: "largest", or its number, largest first from 0.
-        name: what to call the piece; by default the file's stem, or the USD prim's name.
+        name: what to call the piece (see :func:`warpflat.surface.make_surface`); by default the file's stem, or the USD prim's or
+            GLB node's name, with "_" where no file can bear it.
         prim: which mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
         weld: whether vertices at the same place are one; by default judged by format and mesh (see
             :func:`warpflat.surface.make_surface`).
@@ -76,6 +78,8 @@ def read_surface(
     """
     file = Path(path)
     try:
+        if name:
+            checked_name(name)
         if units is not None and units not in METRES_PER_UNIT:
             raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
         _check_file(file)
@@ -89,7 +93,7 @@ def read_surface(
     surface = make_surface(
         raw.vertices * raw.scale,
         raw.polygons,
-        name=name or raw.name or file.stem,
+        name=name or fitted_name(raw.name or file.stem),
         lines=raw.chains,
         component=component,
         weld=weld,

@@ -1,0 +1,66 @@
+"""Names that become files: what a file can be called on every system."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from warpflat.errors import InputError
+
+__all__ = ["checked_name", "fitted_name", "same_file"]
+
+# Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
+_FORBIDDEN = '/\\:*?"<>|'
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
+# File systems take 255; there is room left for what is added, as ".marker.svg" and the temporary name's digits.
+_MOST_BYTES = 200
+
+
+def checked_name(name: str) -> str:
+    """The name, if files can bear it on any system.
+
+    Raises:
+        InputError: it is no text, empty, too long, leads to another folder, or is refused by some system.
+    """
+    if reason := _refused(name):
+        shown = f"{name[:40]}..." if isinstance(name, str) and len(name) > 40 else name
+        raise InputError(
+            f"{shown!r} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
+        )
+    return name
+
+
+def fitted_name(name: str, otherwise: str = "piece") -> str:
+    """A name that nobody chose for a file, such as that of a node in a scene, changed where no file can bear it."""
+    plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
+    short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
+    return f"_{short}" if _is_device(short) else short or otherwise
+
+
+def same_file(name: str) -> str:
+    """What two names have in common that are one file on Windows or macOS, where capitals and composition do not count."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def _refused(name: object) -> str:
+    if not isinstance(name, str):
+        return "it is no text"
+    if not name.strip():
+        return "it is empty"
+    if forbidden := next(filter(_is_forbidden, name), ""):
+        return f"it has {forbidden!r} in it"
+    if name.startswith("."):
+        return "it begins with a dot, and would be hidden"
+    if _is_device(name):
+        return "Windows keeps it for a device"
+    if (length := len(name.encode())) > _MOST_BYTES:
+        return f"it takes {length} bytes, {_MOST_BYTES} are the most"
+    return ""
+
+
+def _is_device(name: str) -> bool:
+    return bool(_DEVICES.fullmatch(name.split(".")[0].strip()))
+
+
+def _is_forbidden(letter: str) -> bool:
+    return letter in _FORBIDDEN or unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
