@@ -173,7 +173,7 @@ def test_a_bodice_that_does_not_fit_says_where_and_which_cut_helps(tmp_path: Pat
 
 def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
     fits = outside <= 0.01
-    strain = {"p05": -0.01, "p95": 0.08}
+    strain = {"min": -0.02, "p05": -0.01, "p95": 0.08, "max": 0.203}
     return {
         "area_m2": area,
         "wear": {
@@ -182,7 +182,7 @@ def worn_entry(outside: float, area: float, cut: str) -> dict[str, object]:
             "strain_limit": 0.05,
             "strain_warp": strain,
             "strain_weft": strain,
-            "pressure": {"p05": 0.0, "p50": 0.0, "p95": 0.0},
+            "pressure": {"p05": 0.0, "p50": 30.0, "p95": 256.0, "max": 676.0},
             "where_not": [] if fits else ["stretched 8 % along weft"],
             "would_help": [] if fits else [{"cut": cut, "length_m": 0.1, "outside_after": 0.02}],
         },
@@ -201,6 +201,11 @@ def test_a_garment_fits_if_all_of_its_pieces_do_and_says_which_do_not():
         ],
     }
     lines = fit_lines({"pieces": pieces, "wear": found})
+    assert lines[0] == (
+        "front: fits: no (warp -1.0 to +8.0 % [-2.0 to +20.3], weft -1.0 to +8.0 % [-2.0 to +20.3], limit 5 %; "
+        "pressure 0 to 256 Pa [up to 676], median 30)"
+    )
+    assert lines[-2] == "ranges: 5 to 95 % of the cloth [all of it]"
     assert "  would help: a dart from the border: 12.0 % -> 2.0 % beyond the limit" in lines
     assert lines[-1] == "garment: fits: no: front (9.0 % of its cloth beyond the limit)"
     assert garment_wear({"back": pieces["back"]})["fits"] is True  # type: ignore[dict-item]
@@ -233,6 +238,12 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     told = " ".join(text.get_text() for text in figure.texts)
     assert "does not fit: cylinder" in told
     assert "fits: yes, 0.0 % beyond the limit" in told
+    # The most is told as well: a twentieth of the cloth lies beyond the upper end of the range.
+    most = [result.measures["wear"] for result in results]
+    assert "5 to 95 % of the cloth [all of it]" in told
+    for wear in most:
+        assert f"{100 * wear['strain_weft']['max']:+.1f}]" in told
+        assert wear["pressure"]["max"] < 1 or f"[up to {wear['pressure']['max']:,.0f}]" in " ".join(told.split())
 
 
 @pytest.mark.parametrize(

@@ -15,7 +15,7 @@ from warpflat.export.colours import weighted_percentile
 from warpflat.export.picture_png import save_png
 from warpflat.surface.topology import border_edges
 from warpflat.tightness import MAPS, WornFit
-from warpflat.wear_report import help_words
+from warpflat.wear_report import RANGES, help_words, pressure_words, strain_words
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -221,12 +221,11 @@ def _write_row_label(figure: Figure, result: Flattening, x: float, y: float) -> 
 
     fit = result.fit
     lines = [f"fits: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
-    for thread in ("warp", "weft"):
-        low, high = (weighted_percentile(getattr(fit, f"strain_{thread}"), fit.area, share) for share in (0.05, 0.95))
-        lines.append(f"{thread} {100 * low:+.1f} to {100 * high:+.1f} %")
-    pressure = weighted_percentile(fit.pressure, fit.area, 0.95)
-    if pressure >= 1.0:
-        lines.append(f"pressure up to {pressure:,.0f} Pa ({pressure / _MMHG:.1f} mmHg)")
+    measures = fit.as_dict()
+    lines += [f"{RANGES}:", *strain_words(measures)]
+    if pressure := pressure_words(measures):
+        p05, p95, most = (measures["pressure"][at] / _MMHG for at in ("p05", "p95", "max"))
+        lines += [pressure, f"= {p05:.1f} to {p95:.1f} mmHg [up to {most:.1f}]"]
     if result.grain_angle:
         lines.append(f"warp turned by {result.grain_angle:g} degrees")
     if not fit.fits:

@@ -15,9 +15,22 @@ from warpflat.tightness import Misfit, WornFit, assess_fit
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
 
-__all__ = ["Remedy", "fit_lines", "garment_wear", "help_words", "remedies", "wear_measures"]
+__all__ = [
+    "RANGES",
+    "Remedy",
+    "fit_lines",
+    "garment_wear",
+    "help_words",
+    "pressure_words",
+    "remedies",
+    "strain_words",
+    "wear_measures",
+]
 
 IntArray = NDArray[np.int32]
+
+#: What ranges of strain and pressure are told of.
+RANGES = "5 to 95 % of the cloth [all of it]"
 
 # A line that passes within this distance of the worst place can take the dart for it [m].
 _NEARBY = 0.03
@@ -183,6 +196,23 @@ def help_words(remedy: Mapping[str, Any], outside: float | None = None) -> str:
     return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit"
 
 
+def strain_words(wear: Mapping[str, Any]) -> list[str]:
+    """For warp and weft of an entry `wear`, as `RANGES` says: "weft -0.6 to +8.6 % [-2.7 to +20.3]"."""
+    found = []
+    for thread in ("warp", "weft"):
+        low, least, most, high = (100 * wear[f"strain_{thread}"][at] for at in ("min", "p05", "p95", "max"))
+        found.append(f"{thread} {least:+.1f} to {most:+.1f} % [{low:+.1f} to {high:+.1f}]")
+    return found
+
+
+def pressure_words(wear: Mapping[str, Any]) -> str:
+    """The same of the pressure; nothing where the cloth does not press at all."""
+    pressure = wear["pressure"]
+    if pressure["max"] < 1.0:
+        return ""
+    return f"pressure {pressure['p05']:,.0f} to {pressure['p95']:,.0f} Pa [up to {pressure['max']:,.0f}]"
+
+
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """What the console says of each piece's fit: one line, and one for each place and remedy where it does not."""
     lines = []
@@ -190,21 +220,19 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         wear = piece.get("wear")
         if wear is None:
             continue
-        strains = ", ".join(
-            f"{thread} {100 * wear[f'strain_{thread}']['p05']:+.1f} to {100 * wear[f'strain_{thread}']['p95']:+.1f} %"
-            for thread in ("warp", "weft")
-        )
-        pressure = wear["pressure"]
-        told = f"{name}: fits: {'yes' if wear['fits'] else 'no'} ({strains}, limit {100 * wear['strain_limit']:.3g} %"
-        if pressure["p50"] >= 1.0:
-            told += f"; pressure {pressure['p05']:.0f} to {pressure['p95']:.0f} Pa, median {pressure['p50']:.0f}"
-        lines.append(told + ")")
+        verdict = f"{name}: fits: {'yes' if wear['fits'] else 'no'}"
+        told = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
+        if pressure := pressure_words(wear):
+            told += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
+        lines.append(f"{verdict} ({told})")
         if wear["fits"]:
             continue
         lines += [f"  where not: {words}" for words in wear["where_not"]]
         lines += [f"  {help_words(remedy, wear['outside'])}" for remedy in wear["would_help"]]
         if not wear["would_help"]:
             lines.append("  would help: another fabric, or another stretch; no single dart does")
+    if lines:
+        lines.append(f"ranges: {RANGES}")
     if "wear" in metrics:
         unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
         verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
