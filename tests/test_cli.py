@@ -5,6 +5,7 @@ import json
 import math
 import os
 import re
+import signal
 import subprocess
 import sys
 from collections.abc import Callable
@@ -133,6 +134,23 @@ def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeyp
     monkeypatch.setattr("warpflat.console.ProgressBar.__call__", interrupt)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     assert warpflat("run", "cap.toml") == (130, "", "warpflat: interrupted\n")
+    assert list(Path("out/cap").iterdir()) == []
+
+
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX has signals that can be handled")
+def test_terminating_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+    def terminate(*_: object) -> None:
+        os.kill(os.getpid(), signal.SIGTERM)
+
+    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", terminate)
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
+    # Whatever it was before is what it is again.
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        assert warpflat("run", "cap.toml") == (143, "", "warpflat: terminated\n")
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGTERM, before)
     assert list(Path("out/cap").iterdir()) == []
 
 

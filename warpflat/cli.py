@@ -5,9 +5,12 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import sys
 import tempfile
-from collections.abc import Callable, Sequence
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
@@ -22,14 +25,15 @@ if TYPE_CHECKING:
 
 __all__ = ["cli", "main"]
 
-DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 
 _EXIT_CODES = """\b
 Exit codes:
   0    done
   1    done, but a piece did not converge or has flipped faces
   2    bad input; one line says what is wrong, where, and what would be right
-  130  interrupted"""
+  130  interrupted
+  143  terminated"""
 
 _FILES = """\b
 What comes out, in DIR:
@@ -47,6 +51,10 @@ class _Interrupted(Exception):
     pass
 
 
+class _Terminated(BaseException):
+    pass
+
+
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -59,7 +67,8 @@ class _Group(click.Group):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
     try:
-        code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
+        with _stopped_by_sigterm():
+            code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
         return _fail(str(error))
@@ -70,10 +79,32 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort, _Interrupted):
         click.echo("warpflat: interrupted", err=True)
         return INTERRUPTED
+    except _Terminated:
+        click.echo("warpflat: terminated", err=True)
+        return TERMINATED
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
+
+
+@contextmanager
+def _stopped_by_sigterm() -> Iterator[None]:
+    """Let SIGTERM end what is going on by an exception, as SIGINT does, so that no temporary file stays; a second one ends it at once."""
+
+    def stop(*_: object) -> None:
+        signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        raise _Terminated
+
+    # Elsewhere it is ignored, or the business of whoever has called; only a process's main thread may ask for it.
+    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+    if ours:
+        signal.signal(signal.SIGTERM, stop)
+    try:
+        yield
+    finally:
+        if ours:
+            signal.signal(signal.SIGTERM, signal.SIG_DFL)
 
 
 def _fail(message: str) -> int:

@@ -44,6 +44,37 @@ def test_failure_leaves_what_was_there(tmp_path: Path) -> None:
     assert os.listdir(tmp_path) == ["a.txt"]
 
 
+KILLED = """
+import os, signal, sys
+from warpflat.export import atomic_path
+with atomic_path(sys.argv[1]) as temporary:
+    temporary.write_text("half")
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="other systems tell nothing of a process by its number")
+def test_what_a_killed_run_has_left_is_removed_and_nothing_else(tmp_path: Path) -> None:
+    others = [".notes-0123456789ab.txt", ".warpflat", "a-warpflat-01234567-1-01234567.txt"]
+    for name in others:
+        (tmp_path / name).touch()
+    environment = {**os.environ, "PYTHONPATH": str(Path(warpflat.__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", KILLED, str(tmp_path / "frames.usdc")], env=environment)
+    (left,) = set(os.listdir(tmp_path)) - set(others)
+    assert left.startswith(".frames-")
+    with atomic_path(tmp_path / "picture.png") as at_work:
+        prepare_folder(tmp_path)
+        assert set(os.listdir(tmp_path)) == {*others, at_work.name}
+    # Another machine's stay for a day, since nobody here can tell whether they are being written.
+    elsewhere = tmp_path / left.replace(left.split("-")[-3], "ffffffff")
+    elsewhere.touch()
+    prepare_folder(tmp_path)
+    assert elsewhere.exists()
+    os.utime(elsewhere, (0, 0))
+    prepare_folder(tmp_path)
+    assert set(os.listdir(tmp_path)) == {*others, "picture.png"}
+
+
 def test_permissions_are_the_users_even_if_the_writer_was_private(tmp_path: Path) -> None:
     (tmp_path / "usual").touch()
     with atomic_path(tmp_path / "a.txt") as temporary:

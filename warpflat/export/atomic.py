@@ -2,7 +2,12 @@
 
 from __future__ import annotations
 
+import functools
+import hashlib
 import os
+import platform
+import re
+import time
 import uuid
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
@@ -11,7 +16,12 @@ from pathlib import Path
 from warpflat.errors import InputError
 from warpflat.names import checked_name
 
-__all__ = ["atomic_path", "file_in", "hidden_beside", "prepare_folder", "require_writable"]
+__all__ = ["atomic_path", "file_in", "hidden_beside", "prepare_folder", "remove_unfinished", "require_writable"]
+
+# .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
+_HIDDEN = re.compile(r"\..*-warpflat-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{8}(\.\w+)?")
+# After so long without a change nobody writes it any more, on whichever machine [s].
+_ABANDONED = 24 * 3600.0
 
 
 def file_in(folder: Path, name: str, ending: str) -> Path:
@@ -25,7 +35,47 @@ def file_in(folder: Path, name: str, ending: str) -> Path:
 
 def hidden_beside(final: Path) -> Path:
     """A fresh hidden name in the folder of `final`, with its suffix (writers choose the format by it)."""
-    return final.with_name(f".{final.stem}-{uuid.uuid4().hex[:12]}{final.suffix}")
+    mark = f"warpflat-{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
+    return final.with_name(f".{final.stem}-{mark}{final.suffix}")
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove the hidden files of runs that were killed: their process is gone, or it is another machine's and a day has passed."""
+    with suppress(OSError):
+        for path in folder.iterdir():
+            found = _HIDDEN.fullmatch(path.name)
+            if found and not path.is_symlink() and _is_abandoned(path, found["machine"], int(found["process"])):
+                with suppress(OSError):
+                    path.unlink()
+
+
+def _is_abandoned(path: Path, machine: str, process: int) -> bool:
+    if os.name == "posix" and machine == _machine():
+        return not _is_running(process)
+    try:
+        return time.time() - path.stat().st_mtime > _ABANDONED
+    except OSError:
+        return False
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True  # somebody else's
+    return True
+
+
+@functools.cache
+def _machine() -> str:
+    """Eight digits for where a process's number means one process: a machine, until it starts anew, and a container on it."""
+    known = [platform.node()]
+    with suppress(OSError):
+        known.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
+        known.append(os.readlink("/proc/self/ns/pid"))
+    return hashlib.sha256("\n".join(known).encode(errors="replace")).hexdigest()[:8]
 
 
 def require_writable(final: str | os.PathLike[str]) -> None:
@@ -75,6 +125,8 @@ def atomic_path(final: str | os.PathLike[str]) -> Iterator[Path]:
 def prepare_folder(path: str | os.PathLike[str]) -> Path:
     """Create the output folder, parents included, and make sure that files can be written into it.
 
+    What killed runs have left half-written there is removed (see `remove_unfinished`).
+
     Raises:
         InputError: it is a file, lies below a file, or cannot be created or written.
     """
@@ -88,6 +140,7 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
         probe.unlink()
     except OSError as error:
         raise InputError(f"output folder {folder} cannot be written: {_reason(error)}; choose another one") from error
+    remove_unfinished(folder)
     return folder
 
 
