@@ -270,7 +270,7 @@ GOOD = "stiffness_warp = 1500\nstiffness_weft = 900\nshear_stiffness = 30\nareal
         ),
         (
             "[x]\n" + GOOD.replace("0.15", "{ value = 0.15, unit = 'g/m' }"),
-            r"areal_density: unknown unit 'g/m'; did you mean 'g/m2'",
+            r"fabric 'x': areal_density: unknown unit 'g/m'; did you mean 'g/m2'",
         ),
         ("[x]\n" + GOOD.replace("1500", "'1500'"), r"x: stiffness_warp: should be a valid number, got '1500'"),
         (
@@ -279,7 +279,7 @@ GOOD = "stiffness_warp = 1500\nstiffness_weft = 900\nshear_stiffness = 30\nareal
         ),
         ("[x]\n" + GOOD.replace("1500", "nan"), r"x: stiffness_warp: should be a finite number"),
         ("[x]\n" + GOOD.replace("areal_density = 0.15", ""), r"fabric 'x': areal_density is missing; write"),
-        ("[x]\nbase = 'wovn'\n", r"unknown fabric 'wovn': did you mean 'woven'"),
+        ("[x]\nbase = 'wovn'\n", r"fabric 'x': base: unknown fabric 'wovn': did you mean 'woven'"),
         ("[x.kes]\nEMT_warp = 4.3\n", r"unknown key 'EMT_warp'; did you mean 'emt_warp'"),
         ("[x]\nbase = 'denim'\n[x.fast]\ne100_warp = 3\n", r"x: fast.e100_weft: is missing"),
         (

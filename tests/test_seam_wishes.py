@@ -126,6 +126,12 @@ def test_the_pattern_knows_the_ease_and_its_notches_meet(eased: Garment, shirt: 
     np.testing.assert_allclose(front, 1.03 * np.array(back), rtol=5e-3)
 
 
+def test_no_ease_is_no_fullness(shirt: FormResult):
+    wished = wished_seams(shirt, [SeamWish(name="side left", factor=1.0), SeamWish(name="side right", factor=1.02)])
+    assert {name: len(edges) for name, edges in wished.full.items()} == {"back": 1}
+    assert wished.ease == {"side left": 0.0, "side right": pytest.approx(0.02)}
+
+
 def test_gathers_widen_the_skirt_and_leave_the_bodice(mannequin: Mannequin):
     form = mannequin.form("basic_block", half=True)
     plain = flatten_form(mannequin, form, fabric="woven")

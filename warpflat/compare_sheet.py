@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.compare import Comparison, outline
 from warpflat.export.atomic import atomic_path, require_writable
+from warpflat.export.letters import all_letters
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -80,6 +81,7 @@ def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> N
         ET.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)
 
 
+@all_letters()
 def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) -> None:
     """Each piece with its outlines laid upon each other, and close-ups of where they are furthest apart.
 

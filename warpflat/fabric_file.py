@@ -202,11 +202,11 @@ def fabric_from_table(
         values: dict[str, Any] = {}
         origins: dict[str, Provenance] = {}
         if table.base is not None:
-            base = find_fabric(table.base, read_shipped_fabrics() if library is None else library)
+            base = _base(name, table.base, read_shipped_fabrics() if library is None else library)
             values = {f.name: getattr(base, f.name) for f in fields(Fabric) if f.name not in ("name", "aliases")}
             origins = dict(values.pop("provenance"))
         given, told = _readings(table)
-        own, own_told = _own_values(table, sources or {})
+        own, own_told = _own_values(name, table, sources or {})
         if table.base is not None:
             # A curve of the base would contradict a stiffness that is given here.
             for direction in ("warp", "weft"):
@@ -224,13 +224,22 @@ def fabric_from_table(
         raise InputError(f"{where}: {error}") from None
 
 
-def _own_values(table: FabricTable, sources: Mapping[str, str]) -> tuple[dict[str, Any], dict[str, Provenance]]:
+def _base(name: str, base: str, library: Mapping[str, Fabric]) -> Fabric:
+    try:
+        return find_fabric(base, library)
+    except InputError as error:
+        raise InputError(f"fabric {name!r}: base: {error}") from None
+
+
+def _own_values(
+    name: str, table: FabricTable, sources: Mapping[str, str]
+) -> tuple[dict[str, Any], dict[str, Provenance]]:
     values: dict[str, Any] = {}
     origins: dict[str, Provenance] = {}
     for key, units in _UNITS.items():
         given: float | ValueTable | None = getattr(table, key)
         if isinstance(given, ValueTable):
-            factor = _factor(key, given.unit, units)
+            factor = _factor(name, key, given.unit, units)
             values[key] = given.value * factor
             spread = (given.spread[0] * factor, given.spread[1] * factor) if given.spread else None
             origins[key] = replace(_provenance(given, given.unit, sources), spread=spread, at_least=given.at_least)
@@ -240,7 +249,7 @@ def _own_values(table: FabricTable, sources: Mapping[str, str]) -> tuple[dict[st
     for key in ("curve_warp", "curve_weft"):
         curve: CurveTable | None = getattr(table, key)
         if curve is not None:
-            values[key] = _curve(curve, _factor(key, curve.unit, _TENSILE))
+            values[key] = _curve(curve, _factor(name, key, curve.unit, _TENSILE))
             origins[key] = _provenance(curve, curve.unit, sources)
     return values, origins
 
@@ -255,9 +264,9 @@ def _provenance(origin: _Origin, unit: str, sources: Mapping[str, str]) -> Prove
     )
 
 
-def _factor(key: str, unit: str, units: Mapping[str, float]) -> float:
+def _factor(name: str, key: str, unit: str, units: Mapping[str, float]) -> float:
     if unit not in units:
-        raise InputError(f"{key}: unknown unit {unit!r}; {nearest(unit, units)}")
+        raise InputError(f"fabric {name!r}: {key}: unknown unit {unit!r}; {nearest(unit, units)}")
     return units[unit]
 
 

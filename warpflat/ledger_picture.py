@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
+from warpflat.export.letters import all_letters
 from warpflat.export.picture_page import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_views import DrawnView, facets_of, surface_view
 
@@ -42,6 +43,7 @@ def candidate_words(entry: LedgerEntry) -> tuple[str, str, str, str, str, str]:
     )
 
 
+@all_letters()
 def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     """Draw the candidates' paths, numbered as in the table beside them, over the energy that the piece stores now.
 

@@ -233,6 +233,7 @@ def run_scene(
     """
     from warpflat.cutting import cut, separate
     from warpflat.export import FrameWriter, file_in, prepare_folder
+    from warpflat.export.letters import note_on_names
     from warpflat.film import Film
     from warpflat.leftovers import settle
     from warpflat.pattern_files import pattern_options, surface_files
@@ -295,7 +296,8 @@ def run_scene(
         files=(*files, *pattern.files),
         sources=scene_sources(scene),
     )
-    notes = (*result.notes, *story.notes, *pattern.notes, *settled)
+    unnamed = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
+    notes = (*result.notes, *story.notes, *pattern.notes, *unnamed, *settled)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 

@@ -62,6 +62,7 @@ def run_garment(
 ) -> SceneResult:
     """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
     from warpflat.export import FrameWriter
+    from warpflat.export.letters import note_on_names
 
     settings = scene.settings
     relax = scene_relax_options(scene)
@@ -153,9 +154,9 @@ def run_garment(
         files=(*files, *pattern.files),
         sources=scene_sources(scene),
     )
-    return SceneResult(
-        metrics=metrics, files=(*files, *pattern.files), notes=(*garment.notes, *odd, *pattern.notes, *settled)
-    )
+    unnamed = note_on_names(garment.pieces) if settings.output.picture else ()
+    notes = (*garment.notes, *odd, *pattern.notes, *unnamed, *settled)
+    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 
 def _in_order(sizes: Iterable[str], wanted: Sequence[str]) -> list[str]:

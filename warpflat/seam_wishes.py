@@ -82,6 +82,8 @@ def wished_seams(form: FormResult, wishes: Sequence[SeamWish]) -> WishedSeams:
                 continue
             side = 0 if longer == first_side else 1
             ratios[number] = wish.factor if side == 0 else 1.0 / wish.factor
+            if wish.factor == 1.0:
+                continue  # as long as on the body: nothing to ease in
             here = form.seams[number]
             edge = FullEdge(vertices=here.vertices[side], factor=wish.factor, gathered=wish.gathered)
             full.setdefault(here.pieces[side], []).append(edge)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import weighted_percentile
+from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_png import save_png
 from warpflat.surface.topology import border_edges
 from warpflat.tightness import MAPS, WornFit
@@ -83,6 +84,7 @@ def _scales(fits: Sequence[WornFit], groups: Sequence[Sequence[str]]) -> dict[st
     return found
 
 
+@all_letters()
 def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
     """Strains, tensions and pressure on the pattern, six maps with their scales; what lies beyond the limit is outlined.
 
@@ -121,6 +123,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
         save_png(temporary, figure, {"Software": "warpflat"})
 
 
+@all_letters()
 def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str) -> None:
     """All pieces of a garment as worn: a row per piece, a column per map, all at one scale of length and of colour.
 
@@ -157,8 +160,9 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
 
     y = top
     drawn: dict[str, PolyCollection] = {}
+    called = titles([result.surface.name for result in results], is_drawn)
     for result, height in zip(results, rows, strict=True):
-        _write_row_label(figure, result, 0.15 / size[0], 1.0 - (y + 0.15) / size[1])
+        _write_row_label(figure, result, called[result.surface.name], 0.15 / size[0], 1.0 - (y + 0.15) / size[1])
         middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
         for number, name in enumerate(MAPS):
             axis = figure.add_axes(place(_LABEL + number * column, y, column, height))
@@ -216,7 +220,7 @@ def _shown(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def _write_row_label(figure: Figure, result: Flattening, x: float, y: float) -> None:
+def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y: float) -> None:
     from textwrap import fill
 
     fit = result.fit
@@ -232,7 +236,7 @@ def _write_row_label(figure: Figure, result: Flattening, x: float, y: float) -> 
         lines.append("")
         lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
         lines += [f"{help_words(remedy)}" for remedy in result.measures["wear"]["would_help"][:1]]
-    figure.text(x, y, result.surface.name, fontsize=11, weight="bold", va="top")
+    figure.text(x, y, title, fontsize=11, weight="bold", va="top")
     y -= 0.22 / float(figure.get_size_inches()[1])
     text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
     figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")

@@ -1,7 +1,9 @@
 from __future__ import annotations
 
+import warnings
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
@@ -10,6 +12,7 @@ from warpflat.export import PicturePiece, write_picture
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale, weighted_percentile
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.labels import LabelRoom, Spot, along_line, beyond_ends
+from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture_png import png_bytes
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.topology import border_edges, triangulate
@@ -53,6 +56,25 @@ def test_picture_shows_both_views_in_the_colours_of_the_scale(tmp_path: Path) ->
     body = pixels[:, : width // 2]
     assert (body.min(axis=-1) < 0.9).sum() > 100_000
     assert near(pixels, np.ones(3)) > 0.4 * height * width
+
+
+def test_a_name_that_no_font_can_write_is_a_number_in_pictures(tmp_path: Path) -> None:
+    nameless = ("\U000f0000", "\U000f0001")
+    for file, names in (("a.png", ("front", *nameless)), ("b.png", ("front", "piece", "piece 2"))):
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")
+            write_picture(tmp_path / file, [piece_of(dome(5), name=name) for name in names])
+    assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
+    assert titles(["piece", *nameless], is_drawn) == {"piece": "piece", nameless[0]: "piece 2", nameless[1]: "piece 3"}
+    assert note_on_names(["front", "devant é", "Ωмега"]) == ()
+    assert "'\\U000f0000' is 'piece'" in note_on_names(nameless)[0]
+
+
+def test_fonts_for_other_scripts_are_used_where_they_are_installed(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert "DejaVu Serif" not in matplotlib.rcParams["font.family"]
+    monkeypatch.setattr("warpflat.export.letters._FOR_OTHER_SCRIPTS", ("Not Installed", "DejaVu Serif"))
+    with all_letters():
+        assert matplotlib.rcParams["font.family"] == [*matplotlib.rcParamsDefault["font.family"], "DejaVu Serif"]
 
 
 def test_pieces_are_rows_and_share_the_scale(tmp_path: Path) -> None:

@@ -160,6 +160,20 @@ def test_names_in_any_script_give_ascii_blocks_that_differ(tmp_path):
     assert blocks == ["RUCKENTEIL_LINKS", "RUCKENTEIL_LINKS_2", "PIECE", "PIECE_2"]
 
 
+def test_pieces_that_ascii_cannot_name_go_by_their_number_in_every_size(tmp_path):
+    corners = np.array([(0, 0), (0.1, 0), (0.1, 0.1), (0, 0)])
+    edges = [Edge(name=f"{i}", points=corners[i : i + 2]) for i in range(3)]
+    sizes = {s: [Piece(name=n, edges=edges, size=s) for n in ("前身頃", "front", "後身頃")] for s in ("EU 36", "EU 38")}
+    write_dxf(draft_garment(Garment(name="x", pieces=sizes)), tmp_path / "p.dxf", created=CREATED)
+    document = ezdxf.readfile(tmp_path / "p.dxf")
+    told = {
+        block.name: next(t.dxf.text for t in block.query("TEXT") if t.dxf.text.startswith("PIECE NAME"))
+        for block in document.blocks if not block.name.startswith("*")
+    }  # fmt: skip
+    names = {"PIECE": "piece", "FRONT": "front", "PIECE_2": "piece 2"}
+    assert told == {f"{block}_EU_{n}": f"PIECE NAME: {name}" for block, name in names.items() for n in (36, 38)}
+
+
 def test_the_same_pattern_gives_the_same_bytes(dress, tmp_path):
     for name in ("a.dxf", "b.dxf"):
         write_dxf(dress, tmp_path / name, created=CREATED, sizes=["38"])

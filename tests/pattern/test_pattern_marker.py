@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import shapely
 
 from warpflat.errors import InputError
-from warpflat.pattern import draft_garment
+from warpflat.pattern import Garment, draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfolded
 from warpflat.pattern.sample import sample_dress
@@ -81,8 +83,12 @@ def test_reversible_cloth_may_cut_both_of_a_pair_one_way_up(dress):
 
 
 def test_bad_cloth_and_names_are_refused(dress):
-    with pytest.raises(InputError, match="mm wide, the cloth"):
+    with pytest.raises(InputError, match=r"'front bodice' size 36 is \d+ mm wide, the cloth"):
         make_marker(dress, Cloth(width=0.3), seconds=1)
+    (first, *_) = sample_dress(("38",)).pieces["38"]
+    plain = draft_garment(Garment(name="plain", pieces={"": [replace(first, size="")]}))
+    with pytest.raises(InputError, match=r"'front bodice' is \d+ mm wide, the cloth"):
+        make_marker(plain, Cloth(width=0.3), seconds=1)
     with pytest.raises(InputError, match="no size"):
         make_marker(dress, Cloth(width=1.4), sizes={"99": 1}, seconds=1)
     with pytest.raises(InputError, match="no piece is of fabric"):

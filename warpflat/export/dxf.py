@@ -22,6 +22,7 @@ from numpy.typing import NDArray
 from warpflat._version import __version__
 from warpflat.errors import InputError, nearest
 from warpflat.export.atomic import atomic_path
+from warpflat.export.letters import titles
 from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
@@ -77,11 +78,13 @@ def write_dxf(
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
+    called = titles([piece.name for piece in next(iter(garment.pieces.values()))], _is_written)
     for placed in lay_out(groups, width=1.5).placed:
         for piece in placed.pieces:
-            name = block_name(piece, taken)
+            title = called[piece.name]
+            name = block_name(piece, taken, title)
             block = document.blocks.new(name, base_point=(0, 0))
-            _write_piece(block, piece, scale, validation=dialect == "astm")
+            _write_piece(block, piece, title, scale, validation=dialect == "astm")
             space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
     _write_style(space, garment, units, scale, created or datetime.now().astimezone())
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
@@ -101,9 +104,12 @@ def _new_document() -> Drawing:
         logger.setLevel(level)
 
 
-def block_name(piece: DraftedPiece, taken: set[str]) -> str:
-    """A block name such as FRONT_BODICE_38 in the few characters that R12 allows, and not in `taken` (it is added)."""
-    text = f"{piece.name}_{piece.size}" if piece.size else piece.name
+def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
+    """A block name such as FRONT_BODICE_38 in the few characters that R12 allows, and not in `taken` (it is added).
+
+    `title` stands for the piece's name where that has none of these characters.
+    """
+    text = f"{title or piece.name}_{piece.size}" if piece.size else title or piece.name
     clean = re.sub(r"[^A-Z0-9_$-]+", "_", _ascii(text).upper()).strip("_") or "PIECE"
     unique, count = clean, 1
     while unique in taken:
@@ -119,7 +125,12 @@ def _ascii(text: str) -> str:
     return "".join(c for c in plain if not unicodedata.combining(c)).encode("ascii", "replace").decode("ascii")
 
 
-def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, validation: bool) -> None:
+def _is_written(name: str) -> bool:
+    """Whether 7 bits leave anything of a name."""
+    return any(letter.isalnum() for letter in _ascii(name))
+
+
+def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: float, *, validation: bool) -> None:
     boundary = _from_a_corner(piece.cut_line)
     _polyline(block, boundary, scale, "1", closed=True)
     corner = _is_corner(boundary)
@@ -159,7 +170,7 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, scale: float, *, valid
         for edge in piece.edges:
             if edge.kind not in ("fold", "dart"):
                 _polyline(block, edge.curve.sample(5e-6), scale, "87")
-    texts = [f"PIECE NAME: {piece.name}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
+    texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
     texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
     texts += [f"ANNOTATION: {text}" for text, _ in piece.label.lines[2:3]]
     texts += [f"ANNOTATION: {note}" for note in piece.notes]

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
+from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_page import DPI, PAGE_WIDTH, TOP_MARGIN, Pen, Row, draw_colour_bar, draw_row, lay_out
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import facets_of, pattern_view, surface_view
@@ -50,6 +51,7 @@ class PicturePiece:
     captions: Mapping[str, str] = field(default_factory=dict)
 
 
+@all_letters()
 def write_picture(
     path: str | os.PathLike[str],
     pieces: Sequence[PicturePiece],
@@ -75,7 +77,8 @@ def write_picture(
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     require_writable(path)
-    rows = [_prepared(piece) for piece in pieces]
+    called = titles([piece.name for piece in pieces], is_drawn)
+    rows = [_prepared(piece, called[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([row.areas for row in rows])
     scale = energy_scale(density, areas) if scale is None else scale
@@ -93,14 +96,14 @@ def write_picture(
         save_png(temporary, figure, {"Software": "warpflat"})
 
 
-def _prepared(piece: PicturePiece) -> Row:
+def _prepared(piece: PicturePiece, title: str) -> Row:
     surface, positions = piece.surface, np.asarray(piece.positions, dtype=np.float64)
     faces = np.asarray(piece.faces, dtype=np.int32)
     in_space = surface.lines if piece.surface_lines is None else piece.surface_lines
     in_plane = facets_of(faces)
     on_body = in_plane if np.array_equal(faces, surface.faces) else facets_of(surface.faces)
     return Row(
-        name=piece.name,
+        name=title,
         captions=piece.captions,
         density=np.asarray(piece.face_energy_density, dtype=np.float64),
         on_body=surface_view(surface, on_body, polylines_of(in_space)),

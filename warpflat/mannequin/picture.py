@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.export.atomic import atomic_path
+from warpflat.export.letters import all_letters
 from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.normals import face_normals, vertex_normals
 from warpflat.mannequin.profiles import Floats
@@ -23,6 +24,7 @@ _HEIGHT = 8.0
 _LINE, _INK = "#9c1f30", "#333333"
 
 
+@all_letters()
 def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
     """Draw the mannequin from front, three-quarter, side and back, with profiles and lines by name and girth in cm.
 

@@ -144,8 +144,9 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         cut = unfolded(piece) @ matrix.T
         across = float(np.ptp(cut[:, 1]))
         if across + SIMPLER > usable:
+            size = f" size {piece.size}" if piece.size else ""
             raise InputError(
-                f"piece {piece.name!r} size {piece.size} is {across * 1000:.0f} mm wide, the cloth "
+                f"piece {piece.name!r}{size} is {across * 1000:.0f} mm wide, the cloth "
                 f"{usable * 1000:.0f} mm between its margins; give wider cloth or divide the piece"
             )
         matrices.append(matrix)
