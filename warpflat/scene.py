@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import os
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -22,6 +21,7 @@ from warpflat.mannequin.table import MannequinTable
 from warpflat.names import checked_name, fitted_name
 from warpflat.relax import RelaxOptions
 from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
+from warpflat.scene_files import FrameSchedule, SceneResult, write_surface
 from warpflat.scene_types import (
     BorderTable,
     ConstraintTable,
@@ -58,6 +58,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "FileSurface",
+    "FrameSchedule",
     "LineTable",
     "OutputTable",
     "Scene",
@@ -142,21 +143,6 @@ class SceneTable(Table):
 
 
 @dataclass(frozen=True, kw_only=True)
-class SceneResult:
-    """What a run did.
-
-    Attributes:
-        metrics: as `metrics.json`.
-        files: names of the files that were written.
-        notes: what was mended or chosen on the way, one sentence each.
-    """
-
-    metrics: dict[str, Any]
-    files: tuple[str, ...]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
 class Scene:
     """A checked scene, ready to be run.
 
@@ -232,12 +218,9 @@ def run_scene(
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
     from warpflat.cutting import cut, separate
-    from warpflat.export import FrameWriter, file_in, prepare_folder
-    from warpflat.export.letters import note_on_names
+    from warpflat.export import FrameWriter, prepare_folder
     from warpflat.film import Film
-    from warpflat.leftovers import settle
-    from warpflat.pattern_files import pattern_options, surface_files
-    from warpflat.result_files import metrics_of, write_results
+    from warpflat.pattern_files import pattern_options
     from warpflat.scene_seams import scene_constraints, scene_surface_seams
     from warpflat.sew_surface import sew_surface
 
@@ -277,28 +260,17 @@ def run_scene(
                 result = sewn.result
                 film.last(result)
     pieces = separate(result)
-    told = {} if sewn is None else sewn.metrics()
-    files = write_results(pieces, folder, picture=settings.output.picture, frames=False, more=told)
-    if settings.wear is not None and settings.output.picture:
-        from warpflat.wear_picture import write_wear_picture
-
-        for piece in pieces:
-            picture = file_in(folder, piece.surface.name, ".wear.png")
-            write_wear_picture(picture, piece)
-            files.append(picture.name)
-    if wanted:
-        files.append("frames.usdc")
-    pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
-    metrics, settled = settle(
+    return write_surface(
+        scene,
+        pieces,
         folder,
-        {**metrics_of(pieces, told), **pattern.metrics},
-        name=scene.name,
-        files=(*files, *pattern.files),
+        drawing=drawing,
+        seams=seams,
+        more={} if sewn is None else sewn.metrics(),
+        frames=wanted,
         sources=scene_sources(scene),
+        notes=(*result.notes, *story.notes),
     )
-    unnamed = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
-    notes = (*result.notes, *story.notes, *pattern.notes, *unnamed, *settled)
-    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 
 def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
@@ -511,35 +483,6 @@ def scene_sources(scene: Scene) -> list[Path]:
     if mannequin is not None and mannequin.scan is not None:
         named.append(mannequin.scan)
     return [scene.folder / expand_variables(file) for file in named]
-
-
-class FrameSchedule:
-    """Which steps become frames: every so many, or about a given number that thins out towards the end."""
-
-    def __init__(self, output: OutputTable) -> None:
-        self._every = output.frame_every
-        self._number = output.frames
-        self._next = 0
-
-    @property
-    def wanted(self) -> bool:
-        """Whether there are frames at all."""
-        return self._number > 0
-
-    def is_due(self, step: int, max_steps: int) -> bool:
-        """Whether the look at this step, of at most `max_steps`, becomes a frame; the first one always does.
-
-        Looks may be several steps apart: one is due when a frame was due at or before it.
-        """
-        if step < self._next:
-            return False
-        if self._every is not None:
-            self._next = step - step % self._every + self._every
-        else:
-            # Steps in a geometric row: as many frames between 10 and 20 as between 1,000 and 2,000.
-            growth = max(max_steps, 2) ** (1.0 / self._number)
-            self._next = max(step + 1, math.ceil(step * growth))
-        return True
 
 
 @contextmanager
