@@ -42,8 +42,8 @@ _AT_REST_FIRST = 1e-3
 _MOST_BOTTOM_STEPS = 24.0
 _LITTLE_GAIN = 0.07
 # Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
-# straight lines, whose kinks they have to smooth first. In soft cloth, from such a K/G on, one more, and of those that swing: the guard acts
-# there, and a push in its direction may go further than one step of the others can bear.
+# straight lines, whose kinks they have to smooth first. In soft cloth, from such a K/G on, one more, and of those that swing: the guard
+# acts there, and a push in its direction may go further than a step of the others can bear.
 _STEPS = 3
 _STEPS_SMOOTH = 2
 _STEPS_SOFT = 4
