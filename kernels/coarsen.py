@@ -51,17 +51,19 @@ def sort_corners(
 @wp.kernel
 def order_rings(
     offset: wp.array(dtype=wp.int32),
+    first_side: wp.array(dtype=wp.int32),
     side: wp.array(dtype=wp.vec2i),
     first: int,
     # outputs
     degree: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
 ):
-    """degree, neighbor: as in `Ring`; of `sort_corners`' triangles at each vertex, whose number is in `degree` before. A degree of -1
-    where they are more than one fan."""
+    """offset, degree, neighbor: as in `Ring`; of `sort_corners`' triangles at each vertex, which begin at `first_side` and whose number is
+    in `degree` before. A degree of -1 where they are more than one fan."""
     v = wp.tid() + first
-    begin = offset[v]
+    begin = first_side[v]
     end = begin + degree[v]
+    ring = offset[v]
     if begin == end:
         return
     # Along the border the first neighbour is one to which no triangle leads.
@@ -77,7 +79,7 @@ def order_rings(
             closed = 0
     here = start
     for i in range(begin, end):
-        neighbor[i] = here
+        neighbor[ring + i - begin] = here
         after = int(-1)
         for e in range(begin, end):
             if side[e][0] == here:
@@ -87,8 +89,8 @@ def order_rings(
             return
         here = after
     if closed == 0:
-        neighbor[end] = here
-        neighbor[end + 1] = -1
+        neighbor[ring + degree[v]] = here
+        neighbor[ring + degree[v] + 1] = -1
         degree[v] = degree[v] + 2
 
 

@@ -261,16 +261,23 @@ def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArra
     ring = Ring()
     ring.vertices = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3d, device="cpu")
     ring.layout = wp.array([] if layout is None else np.ascontiguousarray(layout), dtype=wp.vec2d, device="cpu")
-    offset = np.zeros(count + 1, dtype=np.int32)
-    np.cumsum(np.maximum(np.bincount(triangles.ravel(), minlength=count) + 2, _ROOM), out=offset[1:])
-    ring.offset = wp.array(offset, dtype=wp.int32, device="cpu")
+    around = np.bincount(triangles.ravel(), minlength=count)
+    room, sides = (_begins(places) for places in (np.maximum(around + 2, _ROOM), around))
+    ring.offset = wp.array(room, dtype=wp.int32, device="cpu")
     ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
-    ring.neighbor = wp.empty(int(offset[-1]), dtype=wp.int32, device="cpu")
-    side = wp.empty(int(offset[-1]), dtype=wp.vec2i, device="cpu")
+    ring.neighbor = wp.empty(int(room[-1]), dtype=wp.int32, device="cpu")
+    side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
+    begin = wp.array(sides, dtype=wp.int32, device="cpu")
     corners = wp.array(np.ascontiguousarray(triangles), dtype=wp.vec3i, device="cpu")
-    wp.launch(sort_corners, dim=1, inputs=[corners, ring.offset], outputs=[ring.degree, side], device="cpu")
+    wp.launch(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
     order = record(
-        order_rings, dim=count, inputs=[ring.offset, side], outputs=[ring.degree, ring.neighbor], device="cpu"
+        order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
     )
     order.launch()
     return ring
+
+
+def _begins(counts: NDArray[np.integer]) -> IntArray:
+    begin = np.zeros(len(counts) + 1, dtype=np.int32)
+    np.cumsum(counts, out=begin[1:])
+    return begin

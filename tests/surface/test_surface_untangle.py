@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import os
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -84,3 +85,19 @@ def test_first_layout_of_real_pieces_comes_free_of_folds(name):
     out, left = untangle(surface, np.stack(signed_distance_and_station(surface, line), axis=1))
     assert left == 0
     assert areas(surface, out).min() > 0
+
+
+@pytest.mark.parametrize("rings", [1, 2, 6])
+def test_the_patch_that_sweeps_see_changes_nothing(rings: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    vertices, triangles, _ = scattered(900, plane)
+    surface = make_surface(vertices, triangles)
+    flat, rng = surface.vertices[:, :2].copy(), np.random.default_rng(4)
+    near = np.linalg.norm(flat - [0.4, 0.6], axis=1) < 0.15
+    flat[near] += rng.normal(scale=0.06, size=(int(near.sum()), 2))
+    layouts = []
+    for reach in (rings, 100):
+        monkeypatch.setattr(sys.modules["warpflat.surface.untangle"], "_RINGS", reach)
+        layouts.append(untangle(surface, flat))
+    assert layouts[0][1] == layouts[1][1]
+    np.testing.assert_array_equal(layouts[0][0], layouts[1][0])
+    assert (layouts[0][0] != flat).any()

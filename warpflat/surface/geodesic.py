@@ -198,6 +198,8 @@ class _Ways:
             )
             if shortened[0] == 0:
                 break
+        # The most that is held at once, and not needed any more.
+        del corner, slot, offset, ends, seen
         self._order, self._straight = self._order_of_ways()
         self.distance = self._carry(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
 

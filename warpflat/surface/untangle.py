@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -13,14 +11,13 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.vectors import cross, norm, points_at
 
-if TYPE_CHECKING:
-    from scipy.sparse import csr_array
-
 __all__ = ["signed_cell_areas", "untangle"]
 
 
 # So many sweeps without fewer mirrored triangles than ever before, and the rest will not help either.
 _PATIENCE = 25
+# Vertices that are so many rings away from mirrored triangles are ready to be moved; more, once sweeps come there.
+_RINGS = 6
 
 
 def untangle(
@@ -48,8 +45,6 @@ def untangle(
     Returns:
         #V by 2 positions [m], and how many corner triangles are still mirrored (0: done).
     """
-    from scipy.sparse import csc_array
-
     corner, _, _ = corner_triangles(surface.faces)
     flat = np.array(positions, dtype=np.float64)
 
@@ -61,37 +56,58 @@ def untangle(
     mirrored = crushed(np.arange(len(corner)) if suspects is None else suspects)
     if len(mirrored) == 0:
         return flat, 0
-    pull = _pull(surface)
-    total, pulled = pull.sum(axis=1)[:, None], pull.T.tocsr()
-    around = csc_array(
-        (np.ones(corner.size, dtype=np.int8), corner.ravel(), np.arange(0, corner.size + 1, 3)),
-        shape=(len(flat), len(corner)),
-    ).tocsr()
+    turned = np.unique(corner[mirrored])
+    patch = _Patch(surface, corner, turned, _RINGS)
     fewest, since = len(mirrored), 0
     for _ in range(most_sweeps):
+        if not patch.inside[turned].all():
+            patch = _Patch(surface, corner, np.flatnonzero(patch.near), _RINGS)
+        moving = np.union1d(turned, patch.pulled[turned].indices)
+        flat[moving] = 0.5 * (flat[moving] + patch.pull[moving] @ flat / patch.total[moving])
+        mirrored = crushed(patch.triangle[np.unique(patch.around[moving].indices)])
         turned = np.unique(corner[mirrored])
-        moving = np.union1d(turned, pulled[turned].indices)
-        flat[moving] = 0.5 * (flat[moving] + pull[moving] @ flat / total[moving])
-        mirrored = crushed(np.unique(around[moving].indices))
         fewest, since = (len(mirrored), 0) if len(mirrored) < fewest else (fewest, since + 1)
         if len(mirrored) == 0 or since > _PATIENCE:
             break
     return flat, len(mirrored)
 
 
-def _pull(surface: Surface) -> csr_array:
-    """#V by #V, the weights of the neighbours that each vertex moves between."""
-    from scipy.sparse import csr_array
+class _Patch:
+    """Some vertices and those up to so many rings around them.
 
-    he = half_edges_of(surface)
-    on_rim = he.count == 1
-    border = np.zeros(len(surface.vertices), dtype=bool)
-    border[he.edges[on_rim]] = True
-    start, end = np.concatenate([he.edges, he.edges[:, ::-1]]).T
-    ends = points_at(surface.vertices, he.edges.T)
-    weight = np.tile(1.0 / np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny), 2)
-    keep = ~border[start] | np.tile(on_rim, 2)
-    return csr_array((weight[keep], (start[keep], end[keep])), shape=(len(border), len(border)))
+    Attributes:
+        near: #V, whether a vertex is one of these. inside: #V, whether its neighbours are, too.
+        pull: #V by #V, the weights of the neighbours that each of these moves between; of others none. pulled: its transpose. total: #V by
+            1, its rows' sums.
+        triangle: #N, the corner triangles at these vertices. around: #V by #N, which of them lie around each vertex.
+    """
+
+    def __init__(self, surface: Surface, corner: NDArray[np.int32], vertices: NDArray[np.integer], rings: int) -> None:
+        from scipy.sparse import csc_array, csr_array
+
+        count, he = len(surface.vertices), half_edges_of(surface)
+        self.near = np.zeros(count, dtype=bool)
+        self.near[vertices] = True
+        for _ in range(rings):
+            self.inside = self.near.copy()
+            self.near[corner[self.near[corner].any(axis=1)]] = True
+        on_rim = he.count == 1
+        border = np.zeros(count, dtype=bool)
+        border[he.edges[on_rim]] = True
+        here = self.near[he.edges].any(axis=1)
+        edges, on_rim = he.edges[here], on_rim[here]
+        start, end = np.concatenate([edges, edges[:, ::-1]]).T
+        ends = points_at(surface.vertices, edges.T)
+        weight = np.tile(1.0 / np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny), 2)
+        keep = self.near[start] & (~border[start] | np.tile(on_rim, 2))
+        self.pull = csr_array((weight[keep], (start[keep], end[keep])), shape=(count, count))
+        self.pulled, self.total = self.pull.T.tocsr(), self.pull.sum(axis=1)[:, None]
+        self.triangle = np.flatnonzero(self.near[corner].any(axis=1))
+        of_triangles = corner[self.triangle]
+        offset = np.arange(0, of_triangles.size + 1, 3)
+        self.around = csc_array(
+            (np.ones(of_triangles.size, dtype=np.int8), of_triangles.ravel(), offset), shape=(count, len(self.triangle))
+        ).tocsr()
 
 
 def signed_cell_areas(corner: NDArray[np.int32], positions: NDArray[np.float64]) -> NDArray[np.float64]:
