@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 import numpy as np
 import pytest
 import warp as wp
@@ -77,3 +80,26 @@ def test_rows_that_do_not_lie_in_a_row(either_way: str) -> None:
     for _ in range(2):
         record(measure_edges, dim=3, inputs=[wide[::2], EDGES], outputs=[length], device="cpu").launch()
         np.testing.assert_allclose(length, [5.0, 12.0, 13.0])
+
+
+def test_threads_that_need_a_kernel_at_once_load_it_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Loaded twice, its code is unloaded under the first one's feet: crashes of narrow strips, whose levels are made beside them."""
+    monkeypatch.setattr(packing, "_forms", {})
+    recorded, loads = packing._recorded, []
+
+    def slow(*given: object) -> wp.Launch:
+        loads.append(threading.current_thread().name)
+        time.sleep(0.05)
+        return recorded(*given)
+
+    monkeypatch.setattr(packing, "_recorded", slow)
+    lengths = np.zeros((4, 3))
+    threads = [
+        threading.Thread(target=launch_each, args=(measure_edges, 3, [VERTICES, EDGES], [length])) for length in lengths
+    ]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert len(loads) == 1
+    np.testing.assert_allclose(lengths, np.tile([5.0, 12.0, 13.0], (4, 1)))

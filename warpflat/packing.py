@@ -8,6 +8,7 @@ takes is found out once, from a launch that Warp records, and later launches are
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Callable, Sequence
 from functools import partial
 from typing import Any
@@ -47,9 +48,11 @@ def commands_of(
     if device.is_cpu and wp.config.version.startswith(_RELEASES):
         form = _forms.get(kernel)
         if form is None:
-            form = _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
-            if form.fits:
-                _forms[kernel] = form
+            # Of two threads that load a module at once one has its code unloaded by the other.
+            with _loading:
+                form = _forms.get(kernel) or _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
+                if form.fits:
+                    _forms[kernel] = form
         packed = form.commands(ranges, [*given, 0, *outputs])
         if packed is not None:
             return packed
@@ -82,9 +85,9 @@ class _Form:
         args = recorded.kernel.adj.args
         self.fits = recorded.block_dim == 1 and len(values) == len(args) and not recorded.kernel.is_generic
         self._first = args[first].label
-        self._run = recorded.hooks.forward
         # Code stays loaded as long as this is held.
         self._code = recorded.kernel.module.load(recorded.device, 1)
+        self._run = self._code.get_kernel_hooks(recorded.kernel).forward
         self._arguments: type[ctypes.Structure] = type(
             "Arguments",
             (ctypes.Structure,),
@@ -110,6 +113,7 @@ class _Form:
 
 
 _forms: dict[wp.Kernel, _Form] = {}
+_loading = threading.Lock()
 
 
 def _way(of: Any, packed: type) -> Callable[[Any], Any]:
