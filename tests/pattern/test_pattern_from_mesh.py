@@ -122,6 +122,73 @@ def test_a_ragged_border_has_no_more_corners_than_its_shape():
     assert shapely.Polygon(draft_piece(piece).cut_line).is_valid
 
 
+def strap(width, step, across, bend=0.0):
+    """A strip of quads 0.6 m long, its corners' indices, bent to an arc of so much [rad]."""
+    faces, flat, _, index = grid(across, round(0.6 / step), width, 0.6)
+    if bend:
+        x, turn = flat[:, 0] + 0.6 / bend, flat[:, 1] / 0.6 * bend
+        flat = np.column_stack([x * np.cos(turn), x * np.sin(turn)])
+    return faces, flat, [index[0, 0], index[0, -1], index[-1, 0], index[-1, -1]]
+
+
+@pytest.mark.parametrize("bend", [0.0, 1.2])
+@pytest.mark.parametrize("across", [1, 2, 5])
+@pytest.mark.parametrize("step", [0.001, 0.005, 0.02])
+@pytest.mark.parametrize("width", [0.004, 0.0077, 0.010, 0.012, 0.0121, 0.020, 0.040])
+def test_a_strap_has_four_corners_however_narrow(width, step, across, bend):
+    faces, flat, corners = strap(width, step, across, bend)
+    piece = piece_from_mesh(faces, flat, name="strap")
+    assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted(corners)
+
+
+def test_a_narrow_side_keeps_its_allowance_all_along():
+    faces, flat, lines, _ = grid(4, 160, 0.010, 0.8)
+    piece = piece_from_mesh(
+        faces,
+        flat,
+        name="binding",
+        lines={"left": lines["centre"], "right": lines["side"]},
+        allowances={"left": 0.02, "right": 0.02},
+    )
+    assert [(e.name, round(e.length, 6)) for e in piece.edges] == [
+        ("edge_1", 0.01),
+        ("right", 0.8),
+        ("edge_2", 0.01),
+        ("left", 0.8),
+    ]
+    cut = draft_piece(piece).cut_line
+    np.testing.assert_allclose(np.ptp(cut, axis=0), [0.05, 0.82], atol=1e-9)
+
+
+def test_a_pointed_end_has_a_corner_at_its_point_too():
+    """A tie with a sewn point: three corners within one window."""
+    faces, flat, corners = strap(0.010, 0.005, 2)
+    tip = len(flat) - 2
+    flat[tip, 1] += 0.005
+    piece = piece_from_mesh(faces, flat, name="tie")
+    assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted([*corners, tip])
+
+
+@pytest.mark.parametrize("count", [7, 13, 25])
+@pytest.mark.parametrize("width", [0.006, 0.008, 0.010])
+def test_a_round_end_has_one_corner(width, count):
+    turn = np.linspace(0, np.pi, count)
+    up = np.linspace(0, 0.3, 61)
+    ring = np.concatenate(
+        [
+            np.column_stack([width / 2 * np.cos(turn), 0.3 + width / 2 * np.sin(turn)]),
+            np.column_stack([np.full(60, -width / 2), up[-2::-1]]),
+            np.column_stack([np.full(60, width / 2), up[:-1]]),
+        ]
+    )
+    faces = np.stack([np.arange(len(ring)), np.roll(np.arange(len(ring)), -1)], axis=1)
+    faces = np.column_stack([np.full(len(ring), len(ring)), faces, np.full(len(ring), -1)]).astype(np.int32)
+    piece = piece_from_mesh(faces, np.concatenate([ring, [[0.0, 0.15]]]), name="strap")
+    starts = sorted(int(e.vertices[0]) for e in piece.edges)
+    assert len(starts) == 3
+    assert starts[1:] == [count + 59, count + 60]
+
+
 def test_the_grain_follows_the_datum_line_inside_the_piece():
     faces, flat, lines, _ = grid()
     angle = np.radians(20)

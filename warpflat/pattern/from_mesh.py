@@ -16,9 +16,12 @@ from warpflat.surface.topology import border_loops
 __all__ = ["line_labels", "piece_from_mesh"]
 
 Vector = NDArray[np.float64]
+Ids = NDArray[np.intp]
 
 #: A corner is measured over this much border [m] on either side: single steps of a ragged border turn anywhere.
 WINDOW = 0.012
+#: Over a narrow end, from one corner to another within the window, the border turns by more than this [rad].
+END = np.radians(135.0)
 #: A border that turns back by more than this [rad] is the tip of a crack: a dart that opens by less than 40 degrees.
 TIP = np.radians(140.0)
 #: The two legs of a crack are as long as each other, within this share.
@@ -125,32 +128,86 @@ def _area(ring: Vector) -> float:
 
 
 def _turns(ring: Vector) -> Vector:
-    """#P, by how much [rad] the border turns at each vertex, over `WINDOW` on either side, but at least a step."""
-    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    window = min(WINDOW, float(step.sum()) / 24)
-    count = len(ring)
-    around = np.concatenate([[0.0], np.cumsum(np.tile(step, 3))])[: 3 * count]
-    here = np.arange(count, 2 * count)
-    before = np.minimum(np.searchsorted(around, around[here] - window - 1e-12), here - 1)
-    after = np.maximum(np.searchsorted(around, around[here] + window + 1e-12, side="right") - 1, here + 1)
-    arrive, leave = ring - ring[before % count], ring[after % count] - ring
-    cross = arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0]
-    return np.asarray(np.arctan2(cross, np.einsum("ij,ij->i", arrive, leave)))
+    """#P, by how much [rad] the border turns at each vertex, over the window on either side, but at least a step."""
+    walk = _Walk(ring)
+    return walk.turns(walk.back(walk.here, walk.window), walk.here, walk.on(walk.here, walk.window))
+
+
+class _Walk:
+    """A closed border, three times round, so that there are places before and after each of those `here`.
+
+    Attributes:
+        window: over which a corner is measured [m].
+        here: #P, the places of the second round.
+        along: the length [m] up to each place.
+    """
+
+    def __init__(self, ring: Vector) -> None:
+        step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        self.ring, self.count = ring, len(ring)
+        self.length = float(step.sum())
+        self.window = min(WINDOW, self.length / 24)
+        self.here = np.arange(self.count, 2 * self.count)
+        self.along = np.concatenate([[0.0], np.cumsum(np.tile(step, 3))])[: 3 * self.count]
+
+    def back(self, places: Ids, reach: float | Vector) -> Ids:
+        """The farthest places within `reach` [m] before others, but at least a step."""
+        return np.minimum(np.searchsorted(self.along, self.along[places] - reach - 1e-12), places - 1)
+
+    def on(self, places: Ids, reach: float | Vector) -> Ids:
+        """Likewise after them."""
+        return np.maximum(np.searchsorted(self.along, self.along[places] + reach + 1e-12, side="right") - 1, places + 1)
+
+    def turns(self, before: Ids, at: Ids, after: Ids) -> Vector:
+        """By how much [rad] the way from places `before` over those `at` to those `after` turns, to the left positive."""
+        a, b, c = (self.ring[places % self.count] for places in (before, at, after))
+        arrive, leave = b - a, c - b
+        cross = arrive[:, 0] * leave[:, 1] - arrive[:, 1] * leave[:, 0]
+        return np.asarray(np.arctan2(cross, np.einsum("ij,ij->i", arrive, leave)))
+
+    def apart(self, one: int, other: int) -> float:
+        """The length [m] of border between two vertices."""
+        between = abs(float(self.along[one] - self.along[other]))
+        return min(between, self.length - between)
 
 
 def _corners(ring: Vector, angle: float) -> set[int]:
     """Vertices at which the border turns by more than `angle` [rad], and most within the window around them."""
-    turns = np.abs(_turns(ring))
-    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
-    window = min(WINDOW, float(step.sum()) / 24)
-    total, along = float(step.sum()), np.concatenate([[0.0], np.cumsum(step)[:-1]])
-    corners: list[int] = []
+    walk, turns = _Walk(ring), np.abs(_turns(ring))
+    corners = _narrow_ends(walk, angle)
     for i in sorted(np.flatnonzero(turns > angle).tolist(), key=lambda i: (-turns[i], i)):
-        apart = [abs(float(along[i] - along[j])) for j in corners]
         # The window of a corner shows in its neighbours' turns too; the next vertex of a coarse border does not.
-        if all(min(d, total - d) > window for d in apart):
+        if all(walk.apart(i, j) > walk.window for j in corners):
             corners.append(i)
     return set(corners)
+
+
+def _narrow_ends(walk: _Walk, angle: float) -> list[int]:
+    """The corners at the ends of straps, ties and bindings, which lie within one window of each other.
+
+    Between two such corners the border turns back, by more than `END`: so does no tooth of a ragged one, which turns the other way
+    beside them. And each of them turns by more than `angle` [rad] over a quarter of the way to the other: no rounded end does.
+    """
+    found: list[tuple[float, float, int, int]] = []
+    for steps in range(1, walk.count // 2):
+        one, other = walk.here, walk.here + steps
+        close = walk.along[other] - walk.along[one] <= walk.window + 1e-12
+        if not close.any():
+            break
+        one, other = one[close], other[close]
+        apart = walk.along[other] - walk.along[one]
+        ways = [(walk.back(one, walk.window), one, other), (one, other, walk.on(other, walk.window))]
+        ways += [(walk.back(at, apart / 4), at, walk.on(at, apart / 4)) for at in (one, other)]
+        turns = np.stack([walk.turns(*way) for way in ways])
+        total = turns[0] + turns[1]
+        sharp = (np.sign(total) * turns).min(axis=0)
+        for k in np.flatnonzero((sharp > angle) & (np.abs(total) > END)).tolist():
+            found.append((-float(sharp[k]), float(apart[k]), int(one[k]) % walk.count, int(other[k]) % walk.count))
+    corners: list[int] = []
+    for _, apart_by, *pair in sorted(found):
+        if all(walk.apart(i, j) > apart_by / 2 for i in pair for j in corners if i != j):
+            corners += [i for i in pair if i not in corners]
+    return corners
 
 
 def line_labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]) -> list[str]:
