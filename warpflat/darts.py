@@ -128,7 +128,7 @@ def _drawn(
 
 
 def _curved(left: NDArray[np.float64], right: NDArray[np.float64]) -> dict[str, Any]:
-    """A dart that is cut away along its curved legs, both from the border to the tip."""
+    """A dart along its curved legs, both from the border to the tip."""
     tip = left[-1]
     to_left, to_right = left[0] - tip, right[0] - tip
     lengths = [float(np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()) for leg in (left, right)]

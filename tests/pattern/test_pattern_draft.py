@@ -246,6 +246,53 @@ def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
     assert shapely.Polygon(folded.cut_line - folded.frame[:, 2]).contains(shapely.Point(0.15, 0.0))
 
 
+def curved_dart(mouth, bends=(0.08, 0.08), length=0.1):
+    """A block with a dart that is to be cut away; its left and right leg leave their chords by these shares of their length."""
+    tip = np.array([0.15, length])
+    share = np.linspace(0.0, 1.0, 25)[:, None]
+    ends = [np.array([0.15 - mouth / 2, 0.0]), np.array([0.15 + mouth / 2, 0.0])]
+    left, right = (
+        end + share * (tip - end) + 4 * b * length * share * (1 - share) * [-1, 0]
+        for end, b in zip(ends, bends, strict=True)
+    )
+    corners = np.array([ends[1], (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0), ends[0]])
+    edges = [Edge(name="l", points=left, kind="dart"), Edge(name="r", points=right[::-1], kind="dart")]
+    edges += [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(5)]
+    return draft_garment(
+        Garment(
+            name="g", pieces={"": [Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)])]}
+        )
+    ).pieces[""][0]
+
+
+@pytest.mark.parametrize("bends", [(0.08, -0.08), (0.08, 0.08), (-0.05, -0.05), (0.06, 0.05)])
+@pytest.mark.parametrize("mouth", [0.006, 0.012, 0.021, 0.0249])
+def test_a_dart_without_room_for_its_allowances_is_folded_along_its_middle(mouth, bends):
+    piece = curved_dart(mouth, bends)
+    (dart,) = piece.darts
+    assert any(f"is folded, not cut away: its mouth of {mouth * 1000:.0f} mm" in note for note in piece.notes)
+    assert {(n.edge, n.seam) for n in piece.notches} == {("l", "d"), ("r", "d")}
+    wedge = shapely.Polygon(np.concatenate([piece.edge("l").line, piece.edge("r").line[1:]]))
+    cut = shapely.Polygon(piece.cut_line)
+    assert cut.is_valid
+    assert cut.buffer(1e-6).contains(wedge)
+    fold = shapely.LineString(dart.fold)
+    above = fold.intersection(shapely.box(-1, piece.edge("l").line[0, 1], 1, 1))
+    assert wedge.buffer(1e-5).contains(above), "between the legs, from the tip to the mouth"
+    assert shapely.Point(dart.fold[-1]).distance(cut.exterior) < 1e-6
+
+
+def test_a_dart_with_room_is_cut_away_and_notched_where_its_allowances_are_apart():
+    piece = curved_dart(0.03, length=0.15)
+    assert piece.darts[0].fold is None
+    assert piece.edge("l").width == 0.010
+    first, second = (n for n in piece.notches if n.seam == "p.d")
+    assert first.length == pytest.approx(second.length, abs=5e-4)
+    for notch in (first, second):
+        assert np.linalg.norm(notch.base[0] - notch.at) < 0.0101
+        assert shapely.LinearRing(piece.cut_line).distance(shapely.Point(notch.base[0])) < 1e-5
+
+
 def test_legs_of_different_length_are_noted():
     corners = np.array(
         [(0, 0), (0.1, 0), (0.12, 0.15), (0.14, 0.004), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float

@@ -25,6 +25,7 @@ from warpflat.pattern.notches import (
     seam_reports,
 )
 from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Hole, Piece, Seam
+from warpflat.surface.drawn_legs import are_curved
 
 __all__ = [
     "DraftedCutout",
@@ -42,6 +43,10 @@ Vector = NDArray[np.float64]
 
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
 ALONG_GRAIN = np.radians(1.0)
+#: Allowance [m] of the legs of a dart that is cut away, where they name none, and what there is to be cut away between both.
+LEG, BETWEEN = 0.010, 0.005
+#: Points of the fold between curved legs.
+MIDDLE = 33
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -82,7 +87,7 @@ class DraftedEdge:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedDart:
-    """A dart's lines: the legs are edges; `fold` is 2 by 2 [m], from the tip to the cut line (None where it is cut)."""
+    """A dart's lines: the legs are edges; `fold` is #P by 2 [m], from the tip to the cut line (None where it is cut)."""
 
     dart: Dart
     tip: Vector
@@ -237,6 +242,11 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             notes.append(
                 f"dart {dart.name} is cut away, not folded: {_why_cut(dart, left, right)}; sew its legs as a seam"
             )
+        if darts[dart.name] and dart.cut:
+            notes.append(
+                f"dart {dart.name} is folded, not cut away: its mouth of {_mouth(left, right) * 1000:.0f} mm has no room for the "
+                f"allowances of its legs, which bend by {_bend(left, right) * 1000:.0f} mm; pin leg on leg"
+            )
     drafted_darts = tuple(_dart_lines(dart, wedges, edges, cut.points) for dart in piece.darts)
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: _fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
@@ -345,11 +355,27 @@ def _darts(piece: Piece, edges: tuple[DraftedEdge, ...]) -> tuple[dict[str, Wedg
     for dart in piece.darts:
         left, right = _line(edges, dart.left), _line(edges, dart.right)
         wedge = Wedge(name=dart.name, left=left, right=right, fold_to=dart.fold_to or _fold_to(left, right))
+        legs = [next(e for e in edges if e.name == name) for name in (dart.left, dart.right)]
         # Legs that are one line (a dart of no width) have nothing to fold.
-        folded[dart.name] = not dart.cut and SAME_POINT < wedge.opening <= WIDEST_DART
+        folded[dart.name] = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and _has_room(*legs))
         if folded[dart.name]:
             wedges[dart.name] = wedge
     return wedges, folded
+
+
+def _has_room(left: DraftedEdge, right: DraftedEdge) -> bool:
+    """Whether a dart's mouth is so wide that there is something to cut away between its legs' allowances."""
+    widths = _leg_width(left) + _leg_width(right)
+    return widths == 0 or _mouth(left, right) >= widths + BETWEEN
+
+
+def _leg_width(leg: DraftedEdge) -> float:
+    return LEG if leg.edge.allowance is None else leg.edge.allowance
+
+
+def _mouth(left: DraftedEdge, right: DraftedEdge) -> float:
+    """How far [m] a dart opens at the border."""
+    return float(np.linalg.norm(left.line[0] - right.line[-1]))
 
 
 def _fold_to(left: Vector, right: Vector) -> str:
@@ -367,7 +393,7 @@ def _widened(edge: DraftedEdge, piece: Piece, folded: Mapping[str, bool]) -> Dra
     dart = next(d for d in piece.darts if edge.name in (d.left, d.right))
     if folded[dart.name]:
         return replace(edge, width=0.0)
-    return replace(edge, width=0.010) if edge.edge.allowance is None else edge
+    return replace(edge, width=_leg_width(edge))
 
 
 def _sides(piece: Piece, edges: tuple[DraftedEdge, ...], wedges: Mapping[str, Wedge]) -> list[Side | Wedge]:
@@ -398,9 +424,20 @@ def _dart_lines(
     first = min(parts, key=lambda part: part.distance(shapely.Point(wedge.tip)))
     ends = np.asarray(first.coords)[[0, -1]]
     far = ends[np.argmax(np.linalg.norm(ends - wedge.tip, axis=1))]
-    return DraftedDart(
-        dart=dart, tip=wedge.tip, fold=np.stack([wedge.tip, far]), fold_to=wedge.fold_to, opening=opening
-    )
+    fold = np.stack([wedge.tip, far])
+    if are_curved(left, right):
+        fold = np.concatenate([_between(left[::-1], right), fold[1:]])
+    return DraftedDart(dart=dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=opening)
+
+
+def _between(first: Vector, second: Vector) -> Vector:
+    """The middle line of two lines with one start, by shares of their lengths."""
+    shares = np.linspace(0.0, 1.0, MIDDLE)
+    sides = [
+        np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
+        for line, arc in ((line, arc_lengths(line)) for line in (first, second))
+    ]
+    return np.asarray((sides[0] + sides[1]) / 2)
 
 
 def _line(edges: tuple[DraftedEdge, ...], name: str) -> Vector:
@@ -431,10 +468,14 @@ def _fisheye(points: Vector, tolerance: float | None) -> Vector:
 
 
 def _why_cut(dart: Dart, left: DraftedEdge, right: DraftedEdge) -> str:
+    return f"its legs bend by {_bend(left, right) * 1000:.0f} mm" if dart.cut else "it opens too wide"
+
+
+def _bend(left: DraftedEdge, right: DraftedEdge) -> float:
+    """How far [m] the legs of a dart leave their chords."""
     import shapely
 
-    bend = max(
+    return max(
         float(shapely.distance(shapely.LineString(e.line[[0, -1]]), shapely.points(e.line)).max())
         for e in (left, right)
     )
-    return f"its legs bend by {bend * 1000:.0f} mm" if dart.cut else "it opens too wide"

@@ -30,6 +30,8 @@ DOUBLE_SPACING = 0.008
 SHORTEST, SPACING = 0.080, 0.200
 #: A notch this close [m] to a joint of edges would be lost in it.
 CLEAR = 0.012
+#: A place at which one side cannot be notched is tried again at these shares of its length from the seam's start.
+NEARER = (1.0, 0.5, 0.25)
 #: Sides of a seam may differ by this [m], and by this over any stretch of `STRETCH` [m].
 SEAM_TOLERANCE, LOCAL_TOLERANCE = 5e-4, 2e-4
 STRETCH = 0.050
@@ -170,14 +172,20 @@ class _Chain:
         """Whether the edge there is that of a second copy, cut turned over."""
         return self.side[self.index(length)].mirrored
 
-    def notch(self, seam: str, length: float, double: bool) -> Notch:
-        """A notch at that length; both slits of a double one lie as far to either side of it."""
+    def notch(self, seam: str, length: float, double: bool) -> Notch | None:
+        """A notch at that length; both slits of a double one lie as far to either side of it.
+
+        None where the cut line does not run along the edge, since the allowance there meets another one.
+        """
         index = self.index(length)
         piece, edge = self.pieces[index], self.edges[index]
         local = length - self.joints[index]
         at, direction = self._frame(index, local)
         offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
-        base = tuple(_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets)
+        found = [_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets]
+        base = tuple(point for point in found if point is not None)
+        if len(base) < len(offsets):
+            return None
         depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
@@ -202,27 +210,41 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     sides are equal; ease is spread evenly. Fractions are not symmetric about the middle, so that a side sewn on the
     wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
     other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
+
+    Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved towards
+    the seam's start, on both sides.
     """
     notches: dict[str, list[Notch]] = {}
     for seam in seams:
         first, second = (_Chain(side, pieces) for side in seam.sides)
+        # A piece that is sewn to its own mirror image has one edge for both sides.
+        chains = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
         for fraction in _fractions(seam, first, second):
-            # A piece that is sewn to its own mirror image has one edge for both sides.
-            chains = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
-            places = [(chain, fraction * chain.length) for chain in chains]
-            names = [chain.piece_name(length).lower() for chain, length in places]
-            places = [(chain, length) for chain, length in places if not chain.mirrored(length)]
-            back = any("back" in name for name in names) and not any("front" in name for name in names)
-            for chain, length in places:
-                notch = chain.notch(seam.name, length, back if seam.double is None else seam.double)
-                notches.setdefault(chain.piece_name(length), []).append(notch)
+            for piece, notch in _matched(seam, chains, fraction):
+                notches.setdefault(piece, []).append(notch)
         for chain, other in ((first, second), (second, first)):
             for joint in chain.joints[1:-1] / chain.length:
                 length = float(joint * other.length)
                 if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
-                    notch = other.notch(seam.name, length, double=False)
-                    notches.setdefault(other.piece_name(length), []).append(notch)
+                    single = other.notch(seam.name, length, double=False)
+                    if single is not None:
+                        notches.setdefault(other.piece_name(length), []).append(single)
     return notches
+
+
+def _matched(seam: Seam, chains: Sequence[_Chain], fraction: float) -> list[tuple[str, Notch]]:
+    """The notches of both sides for one share of the seam's length, each with its piece; none if they cannot be cut."""
+    for share in NEARER:
+        places = [(chain, share * fraction * chain.length) for chain in chains]
+        names = [chain.piece_name(length).lower() for chain, length in places]
+        back = any("back" in name for name in names) and not any("front" in name for name in names)
+        double = back if seam.double is None else seam.double
+        places = [(chain, length) for chain, length in places if not chain.mirrored(length)]
+        found = [(chain.piece_name(length), chain.notch(seam.name, length, double)) for chain, length in places]
+        matched = [(piece, notch) for piece, notch in found if notch is not None]
+        if len(matched) == len(found):
+            return matched
+    return []
 
 
 def _fractions(seam: Seam, first: _Chain, second: _Chain) -> list[float]:
@@ -263,6 +285,8 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut_line: Vector) ->
         for name, mouth in ((dart.left, wedge.left[0]), (dart.right, wedge.right[-1])):
             inwards = (wedge.tip - mouth) / max(float(np.linalg.norm(wedge.tip - mouth)), 1e-12)
             base = _base(mouth, inwards, 0.05, cut_line)
+            if base is None:
+                continue
             width = float(np.linalg.norm(base - mouth))
             depth = min(DEPTH, SHARE * width) if width > 1e-4 else RAW_DEPTH
             notches.append(
@@ -271,13 +295,13 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut_line: Vector) ->
     return tuple(notches)
 
 
-def _base(at: Vector, inwards: Vector, width: float, cut_line: Vector) -> Vector:
-    """Where the cut line is met, straight out from a point of the sewing line."""
+def _base(at: Vector, inwards: Vector, width: float, cut_line: Vector) -> Vector | None:
+    """Where the cut line is met, straight out from a point of the sewing line; None if it is not, within twice the width."""
     import shapely
 
     ring = shapely.LinearRing(cut_line)
     ray = shapely.LineString([at + 1e-5 * inwards, at - (2 * width + 0.005) * inwards])
     hits = shapely.get_coordinates(ray.intersection(ring))
     if len(hits) == 0:
-        return np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
+        return None
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])

@@ -74,7 +74,7 @@ class Dart:
         right: the edge that runs from the tip back to the border.
         fold_to: the side to which the wedge is pressed, "left" or "right"; None lets the piece decide: downwards for
             a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
-        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts.
+        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for that.
     """
 
     name: str
