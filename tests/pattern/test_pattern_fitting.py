@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import shapely
 
 from warpflat.pattern import Dart, Edge, Piece, draft_piece
-from warpflat.pattern.curves import fit_curve
-from warpflat.pattern.fitting import is_wavy
+from warpflat.pattern.curves import chords, fit_curve
+from warpflat.pattern.fitting import is_wavy, smooth_line
 
 
 def bent(count: int = 24) -> np.ndarray:
@@ -62,3 +63,37 @@ def test_teeth_that_no_smooth_line_can_be_as_long_as_are_told_of():
     piece = draft_piece(dart_with(*legs))
     assert piece.edge("l").length == pytest.approx(piece.edge("r").length, abs=5e-4)
     assert [note for note in piece.notes if "stays ragged at l:" in note]
+
+
+@pytest.mark.parametrize("edge", [0.002, 0.005, 0.012])
+def test_a_line_inside_loses_the_teeth_of_the_mesh_and_keeps_its_ends_and_its_way(edge: float):
+    """Along the vertices on either side of a plane: by turns up to half an edge above and below it."""
+    count = round(0.4 / edge)
+    x = np.linspace(0.0, 0.4, count)
+    way = np.column_stack([x, 0.03 * np.sin(7 * x)])
+    jagged = way + np.random.default_rng(5).uniform(-0.5, 0.5, (count, 1)) * [0.0, edge]
+    jagged[[0, -1]] = way[[0, -1]]
+    assert is_wavy(chords(jagged))
+    smooth = smooth_line(jagged)
+    np.testing.assert_array_equal(smooth[[0, -1]], way[[0, -1]])
+    assert not is_wavy(chords(smooth))
+    drawn = shapely.LineString(smooth)
+    assert shapely.distance(drawn, shapely.points(jagged)).max() < edge
+    assert shapely.distance(drawn, shapely.points(way)).max() < edge / 2
+
+
+@pytest.mark.parametrize("line", [bent(), np.array([(0.0, 0.0), (0.0, 0.1), (0.1, 0.1), (0.1, 0.0)])])
+def test_a_clean_line_inside_stays_as_it_is(line: np.ndarray):
+    assert smooth_line(line) is line
+
+
+def test_lines_are_smoothed_on_the_pattern_only_and_not_where_a_tolerance_is_asked_for():
+    square = np.array([(0.0, 0.0), (0.4, 0.0), (0.4, 0.4), (0.0, 0.4), (0.0, 0.0)])
+    edges = [Edge(name=f"e{i}", points=square[i : i + 2]) for i in range(4)]
+    line = teeth(41, 0.005) + np.array([0.2, 0.3])
+    piece = Piece(name="p", edges=edges, internal_lines={"level": line})
+    drafted = draft_piece(piece)
+    assert is_wavy(chords(piece.internal_lines["level"]))
+    assert not is_wavy(chords(drafted.internal_lines["level"]))
+    as_asked = draft_piece(piece, tolerance=1e-4).internal_lines["level"]
+    np.testing.assert_allclose(as_asked - as_asked[0], line - line[0], atol=1e-12)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
-from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy
+from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import (
     SEAM_TOLERANCE,
@@ -263,6 +263,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     drills = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts]
     drills += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in eye_legs(line)[0][[0, -1]]]
     internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    internal = {name: smooth_line(line) if tolerance is None else line for name, line in internal.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line) if piece.grain is None else _moved(piece.grain, frame)
     obstacles = [grain, *internal.values()]

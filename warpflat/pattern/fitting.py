@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
 from warpflat.pattern.notches import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
-from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.pieces import SAME_POINT, Piece, Seam, SeamSide
 
-__all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy"]
+__all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy", "smooth_line"]
 
 Vector = NDArray[np.float64]
 #: Names of a piece and of its edge.
@@ -27,6 +27,8 @@ CURVES, CURVE = 4, 0.012
 #: 7 and more.
 SWING, SWING_PER_METRE = 0.3, 3.5
 WAVE = 0.04
+#: Inside a piece, waves of so many edges are smoothed away, the short ones first, until a line is clean.
+WAVES = (2.0, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0)
 #: Smoothed sides of a ragged seam agree in length within this [m], if a tolerance can be found for it.
 EQUAL = 1e-4
 #: Curves keep near their points where the sides of their seams then differ by no more than this share of what they may.
@@ -65,6 +67,36 @@ def fit_edges(
     for piece in pieces:
         _uncross(piece, lines, fitted)
     return fitted
+
+
+def smooth_line(line: Vector) -> Vector:
+    """A line inside a piece without the teeth in which it runs along the mesh, within an edge of it; its ends stay.
+
+    One that is clean stays as it is. Unlike a border it may lose the length of its teeth: nothing is sewn along it.
+
+    Args:
+        line: #P by 2 [m].
+    """
+    import shapely
+    from scipy.interpolate import make_smoothing_spline
+
+    arc = arc_lengths(line)
+    edge = float(np.median(np.diff(arc)))
+    if len(line) < 5 or np.diff(arc).min() < SAME_POINT or not is_wavy(chords(line)):
+        return line
+    weights = np.ones(len(line))
+    weights[[0, -1]] = 1e6
+    smooth, places = line, np.linspace(0.0, arc[-1], 2 * len(line))
+    for wave in WAVES:
+        stiffness = (wave * edge / (2 * np.pi)) ** 4 * len(line) / arc[-1]
+        tried = make_smoothing_spline(arc, line, w=weights, lam=stiffness)(places)
+        tried[[0, -1]] = line[[0, -1]]
+        if shapely.distance(shapely.LineString(tried), shapely.points(line)).max() > edge:
+            break
+        smooth = tried
+        if not is_wavy(chords(smooth)):
+            break
+    return smooth
 
 
 def _clean(line: Vector, tolerance: float | None) -> tuple[Curve, float]:
