@@ -236,6 +236,7 @@ def evaluate_guard(
     cells: Cells,
     guard: ThreadGuard,
     time_step: wp.float64,
+    pace: wp.array(dtype=wp.vec3d),
     watch: int,
     first: int,
     # outputs
@@ -252,7 +253,8 @@ def evaluate_guard(
     guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
     that moves as a whole is not held back.
 
-    position: #V [m]. velocity: #V [m/s]. watch: 1 to look at all faces; with 0 those in which the guard did not act are passed over.
+    position: #V [m]. velocity: #V [m/s]. pace: as `implicit` has it; without viscosity none is written. watch: 1 to look at all faces; with
+    0 those in which the guard did not act are passed over.
     acting: #F, 1 where the guard acts in a cell or is about to, and of long quads; elsewhere the last three are not written.
     clearance: #F, the least height of its cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the faces'
     corners [N]; a triangle's fourth is not used.
@@ -273,14 +275,16 @@ def evaluate_guard(
     acting[f] = acts
     clearance[f] = wp.sqrt(height2)
     if acts != 0:
+        viscous = pace[0][0] != wp.float64(0.0)
         weight = cell_weight(face)
         s = sheared(cells.shear[f], warp, weft, cells.slack[f])
         t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
         slot = 4 * f
         for corner_slot in range(4):
             force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-            viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
             stiffness[slot + corner_slot] = wp.float64(0.0)
+            if viscous:
+                viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         for k in range(count_cells(face)):
             at = cell_places(face, k)
             i0 = face[at[0]]
@@ -332,19 +336,20 @@ def evaluate_guard(
                 k0 *= area
                 k1 *= area
                 k2 *= area
-                v0 = velocity[i0]
-                v1 = velocity[i1]
-                v2 = velocity[i2]
-                v_cell = (k0 * v0 + k1 * v1 + k2 * v2) / wp.max(k0 + k1 + k2, wp.float64(1.0e-300))
                 force[slot + at[0]] -= f1 + f2
                 force[slot + at[1]] += f1
                 force[slot + at[2]] += f2
-                viscosity[slot + at[0]] += (time_step * k0) * (v_cell - v0)
-                viscosity[slot + at[1]] += (time_step * k1) * (v_cell - v1)
-                viscosity[slot + at[2]] += (time_step * k2) * (v_cell - v2)
                 stiffness[slot + at[0]] += k0
                 stiffness[slot + at[1]] += k1
                 stiffness[slot + at[2]] += k2
+                if viscous:
+                    v0 = velocity[i0]
+                    v1 = velocity[i1]
+                    v2 = velocity[i2]
+                    v_cell = (k0 * v0 + k1 * v1 + k2 * v2) / wp.max(k0 + k1 + k2, wp.float64(1.0e-300))
+                    viscosity[slot + at[0]] += (time_step * k0) * (v_cell - v0)
+                    viscosity[slot + at[1]] += (time_step * k1) * (v_cell - v1)
+                    viscosity[slot + at[2]] += (time_step * k2) * (v_cell - v2)
 
 
 @wp.func

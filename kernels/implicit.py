@@ -91,8 +91,9 @@ def gather_forces(
             slot = cells.slot[e]
             if face_acting[slot / 4] != 0:
                 total += face_force[slot]
-                driving += face_viscosity[slot]
                 k += face_stiffness[slot]
+                if viscosity != wp.float64(0.0):
+                    driving += face_viscosity[slot]
     for b in range(bonds.offset[i], bonds.offset[i + 1]):
         bond = bonds.slot[b]
         total += bond_force[bond]

@@ -179,6 +179,7 @@ def evaluate_membrane(
     cells: Cells,
     cloth: Cloth,
     time_step: wp.float64,
+    pace: wp.array(dtype=wp.vec3d),
     watch: int,
     first: int,
     # outputs
@@ -197,7 +198,7 @@ def evaluate_membrane(
     negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear. With
     the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and creep.
 
-    position: #V [m]. velocity: #V [m/s]. watch: as in `cells.evaluate_guard`. acting: #F, 0 where all cells are mirrored; there the
+    position: #V [m]. velocity: #V [m/s]. pace, watch: as in `cells.evaluate_guard`. acting: #F, 0 where all cells are mirrored; there the
     last three are not written, and a mirrored cell adds nothing to them.
     clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the
     faces' corners [N]. stiffness: 4 #F [N/m].
@@ -208,6 +209,7 @@ def evaluate_membrane(
     face = cells.face[f]
     begin = cells.first[f]
     slot = 4 * f
+    viscous = pace[0][0] != wp.float64(0.0)
     acts = int(0)
     least = wp.float64(wp.inf)
     for k in range(count_cells(face)):
@@ -219,8 +221,9 @@ def evaluate_membrane(
             if acts == 0:
                 for corner_slot in range(4):
                     force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-                    viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
                     stiffness[slot + corner_slot] = wp.float64(0.0)
+                    if viscous:
+                        viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
             acts = 1
             inv = wp.inverse(D)
             F = laid_edges(cells.laid[begin + k]) * inv
@@ -263,25 +266,26 @@ def evaluate_membrane(
             stiffness[slot + at[0]] += two * wp.max(k0 - cloth.held[held], none)
             stiffness[slot + at[1]] += two * wp.max(k1 - cloth.held[held + 1], none)
             stiffness[slot + at[2]] += two * wp.max(k2 - cloth.held[held + 2], none)
-            # v changes F by -F A, with A the gradient of v in the plane.
-            a1 = velocity[corner[1]] - velocity[corner[0]]
-            a2 = velocity[corner[2]] - velocity[corner[0]]
-            A = wp.mat22d(a1[0], a2[0], a1[1], a2[1]) * inv
-            back_warp = wp.transpose(F) * worn_warp
-            back_weft = wp.transpose(F) * worn_weft
-            unit_warp = back_warp / length_warp
-            unit_weft = back_weft / length_weft
-            rate = stress_rates(-wp.dot(unit_warp, A * warp), -wp.dot(unit_weft, A * weft), e, cloth)
-            tau_rate = -across[2] * (wp.dot(back_weft, A * warp) + wp.dot(back_warp, A * weft))
-            R = wp.outer(unit_warp * rate[0] + back_weft * tau_rate, warp) + wp.outer(
-                unit_weft * rate[1] + back_warp * tau_rate, weft
-            )
-            V = (R * inv_t) * (area * time_step)
-            d1 = wp.vec2d(V[0, 0], V[1, 0])
-            d2 = wp.vec2d(V[0, 1], V[1, 1])
-            viscosity[slot + at[0]] -= d1 + d2
-            viscosity[slot + at[1]] += d1
-            viscosity[slot + at[2]] += d2
+            if viscous:
+                # v changes F by -F A, with A the gradient of v in the plane.
+                a1 = velocity[corner[1]] - velocity[corner[0]]
+                a2 = velocity[corner[2]] - velocity[corner[0]]
+                A = wp.mat22d(a1[0], a2[0], a1[1], a2[1]) * inv
+                back_warp = wp.transpose(F) * worn_warp
+                back_weft = wp.transpose(F) * worn_weft
+                unit_warp = back_warp / length_warp
+                unit_weft = back_weft / length_weft
+                rate = stress_rates(-wp.dot(unit_warp, A * warp), -wp.dot(unit_weft, A * weft), e, cloth)
+                tau_rate = -across[2] * (wp.dot(back_weft, A * warp) + wp.dot(back_warp, A * weft))
+                R = wp.outer(unit_warp * rate[0] + back_weft * tau_rate, warp) + wp.outer(
+                    unit_weft * rate[1] + back_warp * tau_rate, weft
+                )
+                V = (R * inv_t) * (area * time_step)
+                d1 = wp.vec2d(V[0, 0], V[1, 0])
+                d2 = wp.vec2d(V[0, 1], V[1, 1])
+                viscosity[slot + at[0]] -= d1 + d2
+                viscosity[slot + at[1]] += d1
+                viscosity[slot + at[2]] += d2
     acting[f] = acts
     clearance[f] = least
 

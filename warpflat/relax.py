@@ -28,7 +28,7 @@ from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
-from warpflat.smoothing import STEADY, pace_of
+from warpflat.smoothing import STEADY, STILL, pace_of
 from warpflat.step_buffers import StepBuffers
 from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
@@ -185,6 +185,7 @@ class Relaxation:
                 evaluated, and no vertex leaves the reach that it had: three times as fast, and as good where steps are to smooth.
             evaluated: of the state as it is, all cells have been looked at already.
         """
+        self._buffers.go_at(STEADY)
         for number in range(steps):
             self._evaluate(number, watch_every, evaluated=evaluated)
             if self.options.kinetic_damping:
@@ -204,7 +205,6 @@ class Relaxation:
             self._buffers.go_at(pace_of(number))
             self._evaluate(number, watch_every, evaluated=evaluated)
             self._advance(each_step)
-        self._buffers.go_at(STEADY)
 
     def _evaluate(self, number: int, watch_every: int, *, evaluated: bool) -> None:
         """The forces before a step, of so many before it in a row."""
@@ -233,6 +233,7 @@ class Relaxation:
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""
         self.velocity.zero_()
+        self._buffers.go_at(STILL)
         self._buffers.evaluate.launch()
 
     def step_along_lines(self) -> None:
@@ -380,8 +381,7 @@ class Relaxation:
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
-        self.velocity.zero_()
-        self._buffers.evaluate.launch()
+        self.evaluate_at_rest()
         return self.cloth_force()
 
     def cloth_force(self) -> FloatArray:

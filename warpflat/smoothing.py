@@ -9,12 +9,15 @@ of the fourth kind leave 1 / (2 k + 1) of any way after k steps, weighed so: as 
 
 from __future__ import annotations
 
-__all__ = ["STEADY", "pace_of"]
+__all__ = ["STEADY", "STILL", "pace_of"]
 
 Pace = tuple[float, float, float]
 
 STEADY: Pace = (1.0, 1.0, 1.0)
 """The paper's: with viscosity, and with all of the velocity and of the push (`kernels.implicit`)."""
+
+STILL: Pace = (0.0, 1.0, 1.0)
+"""The same at rest, where there is no viscosity to be had."""
 
 
 def pace_of(number: int) -> Pace:

@@ -66,7 +66,7 @@ class StepBuffers:
         self.reach = wp.zeros(n, dtype=wp.float64, device=device)
         self.guarded = wp.zeros(n, dtype=wp.int32, device=device)
         self.face_acting = wp.zeros(f, dtype=wp.int32, device=device)
-        # Written and read only where cells act: elsewhere no memory stands behind them.
+        # Written and read only where cells act, the second only with viscosity: elsewhere no memory stands behind them.
         self.face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
         self.face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
         self.face_stiffness = wp.empty(4 * f, dtype=wp.float64, device=device)
@@ -102,7 +102,7 @@ class StepBuffers:
         return record(
             kernel,
             dim=net.face_count,
-            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, watch],
+            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.pace, watch],
             outputs=[
                 self.face_acting,
                 self.face_clearance,

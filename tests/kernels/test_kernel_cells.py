@@ -11,6 +11,7 @@ from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, sma
 
 from warpflat.fabric import grain_axes
 from warpflat.network import SpringNetwork
+from warpflat.smoothing import STEADY, STILL
 from warpflat.surface import make_surface
 
 # How the patch, seen from the front, is made larger or smaller along weft and warp.
@@ -310,3 +311,15 @@ def test_a_long_quad_always_counts_and_the_stretch_that_is_meant_is_at_rest():
             Launched(network, shape @ by).guard_energy()[0] for by in (smaller, smaller + 0.02 * np.eye(2)[::-1])
         )
         assert rest < 1e-6 * sheared
+
+
+def test_without_viscosity_none_is_written_and_all_else_is_the_same():
+    network = small_network()
+    velocities = np.random.default_rng(3).normal(size=(network.vertex_count, 2))
+    with_it, without = (
+        Launched(network, shaken(network, scale=0.8), velocities, pace=pace).evaluate_guard() for pace in (STEADY, STILL)
+    )
+    for name in ("face_acting", "face_clearance", "face_force", "face_stiffness"):
+        np.testing.assert_array_equal(with_it[name], without[name])
+    assert with_it["face_viscosity"].any()
+    assert not without["face_viscosity"].any()

@@ -14,6 +14,7 @@ from warpflat.kernels.membrane import compute_membrane_energy, compute_membrane_
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.membrane import cloth_of
 from warpflat.network import SpringNetwork
+from warpflat.smoothing import STEADY
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import border_edges
 from warpflat.tangent import TangentMatrix
@@ -62,7 +63,16 @@ def evaluated(
     wp.launch(
         evaluate_membrane,
         dim=f,
-        inputs=[at, moving, network.cells, network.cloth, 0.01, 1, 0],
+        inputs=[
+            at,
+            moving,
+            network.cells,
+            network.cloth,
+            0.01,
+            wp.array([STEADY], dtype=wp.vec3d, device=DEVICE),
+            1,
+            0,
+        ],
         outputs=list(out.values()),
         device=DEVICE,
     )
