@@ -334,6 +334,26 @@ def test_the_datum_runs_up_the_long_axis_through_the_middle():
     np.testing.assert_array_equal(choose_datum(surface), surface.lines["centre"])
 
 
+@pytest.mark.parametrize("columns", [2, 3, 4, 9, 10, 11])
+@pytest.mark.parametrize("cells", ["quads", "triangles"])
+@pytest.mark.parametrize("bent", [False, True], ids=["flat", "bent"])
+def test_the_datum_of_a_rectangle_is_parallel_to_its_sides(columns: int, cells: str, bent: bool):
+    """However many columns: with an even number the middle lies halfway between two."""
+    x, y = np.meshgrid(np.linspace(0, 0.27, columns), np.linspace(0, 0.4, 15))
+    if bent:
+        points = np.stack([0.3 * np.sin(x / 0.3), y, 0.3 * np.cos(x / 0.3)], axis=-1)
+    else:
+        points = np.stack([x, y, 0.0 * x], axis=-1)
+    i = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    faces = quads if cells == "quads" else quads[:, [[0, 1, 2], [0, 2, 3]]].reshape(-1, 3)
+    line = choose_datum(make_surface(points.reshape(-1, 3), faces))
+    column = line % columns
+    assert len(line) == 15
+    assert (column == column[0]).all()
+    assert column[0] in {(columns - 1) // 2, columns // 2}
+
+
 @pytest.mark.parametrize("name", ["dome", "saddle", "bodice", "hemisphere"])
 def test_pieces_about_as_wide_as_long_hang_down(name: str):
     surface = make_shape(name, resolution=17)

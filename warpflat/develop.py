@@ -41,6 +41,10 @@ __all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmoni
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
+# A datum that climbs by less than this share of its length is as level as its plane.
+_LEVEL = 1e-6
+# A line beside it is along the same section if its ends are as far apart, to this share.
+_AS_LONG = 0.05
 # A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
 _LEAST_AREA = 0.01
 # Up to this share of the faces may be mirrored for a development to be mended rather than given up.
@@ -76,15 +80,19 @@ def choose_datum(surface: Surface) -> IntArray:
 
     The long axis is the first principal axis of the surface; where length and width are within a fifth of each other, and
     one is nearer to the vertical (+y), that one. The line follows the section by the plane of that axis and the mean
-    normal. Of a band that this cuts crosswise, since it curls, the line runs through the middle from end to end instead.
+    normal, or a parallel one beside it whose line has its ends far more level. Of a band that this cuts crosswise, since it
+    curls, the line runs through the middle from end to end instead.
     """
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     area = np.linalg.norm(normal, axis=1)
     centre = np.average(p.mean(axis=1), axis=0, weights=area)
-    spread = p.mean(axis=1) - centre
-    values, axes = np.linalg.eigh((spread * area[:, None]).T @ spread / area.sum())
+    # Exact over each triangle, or the axis of a rectangle of quads would lean to the diagonals by which these are split.
+    at = np.concatenate([p, p.mean(axis=1, keepdims=True)], axis=1) - centre
+    share = np.array([1.0, 1.0, 1.0, 9.0]) / 12.0
+    spread = np.einsum("i,k,ikx,iky->xy", area, share, at, at)
+    values, axes = np.linalg.eigh(spread / area.sum())
     facing = normal.sum(axis=0)
     long_axis = axes[:, 2]
     if values[1] > 0.64 * values[2]:
@@ -92,11 +100,12 @@ def choose_datum(surface: Surface) -> IntArray:
         up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
         if np.linalg.norm(up) > 0.5:
             long_axis = up / np.linalg.norm(up)
+    long_axis = long_axis * _upwards(long_axis, long_axis)
     across = np.cross(long_axis, facing)
     if np.linalg.norm(across) < 1e-9 * max(float(np.linalg.norm(facing)), 1e-300) or not np.any(facing):
         across = axes[:, 1]
     try:
-        line = line_on_plane(surface, centre, across)
+        line = _level_line(surface, centre, across)
     except InputError:
         line = np.empty(0, dtype=np.int32)
     if len(line) < 2 or line[0] == line[-1]:
@@ -105,9 +114,50 @@ def choose_datum(surface: Surface) -> IntArray:
     band = line_along_band(surface, line)
     line = line if band is None else band
     rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
-    leading = int(np.abs(long_axis if band is None else rising).argmax())
-    upwards = rising[1] if abs(rising[1]) > 1e-6 * np.linalg.norm(rising) else rising[leading]
-    return np.ascontiguousarray(line if upwards >= 0 else line[::-1], dtype=np.int32)
+    upwards = _upwards(rising, long_axis if band is None else rising)
+    return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32)
+
+
+def _upwards(direction: FloatArray, leading: FloatArray) -> int:
+    """1 for a direction that rises along +y, or, where it is level, along the axis that `leading` is nearest to; else -1."""
+    axis = 1 if abs(direction[1]) > 1e-6 * np.linalg.norm(direction) else int(np.abs(leading).argmax())
+    return 1 if direction[axis] >= 0 else -1
+
+
+def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntArray:
+    """The line along the section by a plane, or, where its ends are far less level than its, by one through a vertex beside an end.
+
+    The grain is the chord of the ends, and where the section lies halfway between two columns, each ends on either of them.
+
+    Raises:
+        InputError: if the plane misses the piece.
+    """
+    direction = normal / np.linalg.norm(normal)
+    height = (surface.vertices - point) @ direction
+
+    def reach_and_slope(line: IntArray) -> tuple[float, float]:
+        reach = float(np.linalg.norm(surface.vertices[line[-1]] - surface.vertices[line[0]]))
+        return reach, abs(float(height[line[-1]] - height[line[0]])) / max(reach, 1e-300)
+
+    line = line_on_plane(surface, point, normal)
+    reach, slope = reach_and_slope(line) if len(line) else (0.0, 0.0)
+    if slope < _LEVEL:
+        return line
+    edges = half_edges_of(surface).edges
+    at_ends = edges[np.isin(edges, line[[0, -1]]).any(axis=1) & (height[edges].prod(axis=1) < 0)]
+    shifts = np.unique(np.round(height[np.union1d(at_ends, line[[0, -1]])] / reach, 9)) * reach
+    best = (0.5 * slope, 0.0, 0.0), line
+    for shift in shifts.tolist():
+        try:
+            other = line_on_plane(surface, point + shift * direction, normal)
+        except InputError:
+            continue
+        its_reach, its_slope = reach_and_slope(other)
+        # Rounded, so that rounding does not choose: of two as level and as near, the right one.
+        key = round(its_slope, 6), round(abs(shift) / reach, 6), -shift
+        if abs(its_reach / reach - 1.0) < _AS_LONG and key < best[0]:
+            best = key, other
+    return best[1]
 
 
 def develop(surface: Surface, datum: IntArray) -> Development:
