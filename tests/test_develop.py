@@ -7,7 +7,15 @@ import pytest
 from numpy.typing import NDArray
 
 from warpflat.cells import cells_of
-from warpflat.develop import _winds_twice, choose_datum, develop, geodesic_layout, harmonic_layout, profile_layout
+from warpflat.develop import (
+    _winds_twice,
+    choose_datum,
+    develop,
+    flat_layout,
+    geodesic_layout,
+    harmonic_layout,
+    profile_layout,
+)
 from warpflat.errors import InputError
 from warpflat.shapes import make_shape
 from warpflat.strain import signed_cell_areas
@@ -52,6 +60,49 @@ def ring(inner: float, outer: float, *, height: float = 0.0, around: int = 24, a
     i = np.arange(around * across).reshape(across, around)
     right = np.roll(i, -1, axis=1)
     return make_surface(points, np.stack([i[:-1], right[:-1], right[1:], i[1:]], axis=-1).reshape(-1, 4))
+
+
+# --- flat pieces
+
+
+def turned(surface: Surface, *, seed: int, offset: float = 0.0) -> Surface:
+    """Anywhere in space."""
+    from scipy.spatial.transform import Rotation
+
+    rotation = Rotation.random(random_state=seed).as_matrix()
+    return make_surface(surface.vertices @ rotation.T + offset, surface.faces)
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_flat_piece_gives_itself(seed: int):
+    """A narrow ring, whose faces the geodesic layout mirrors, and any triangles; told the same from rounded coordinates."""
+    for whole in (ring(0.185, 0.2, around=96, across=9), disk(150, lambda x, y: 0.0 * x, seed=seed)):
+        surface = turned(whole, seed=seed, offset=0.5)
+        datum = choose_datum(surface)
+        development = develop(surface, datum)
+        assert (development.method, development.notes) == ("flat", ())
+        assert mirrored(surface, development.positions) == 0
+        assert edge_errors(surface, development.positions).max() < 1e-12
+        chord = np.diff(development.positions[datum[[0, -1]]], axis=0)[0]
+        assert abs(chord[0]) < 1e-12 < chord[1]
+        rough = make_surface(surface.vertices.astype(np.float32).astype(float), surface.faces)
+        assert develop(rough, datum).method == "flat"
+
+
+def test_a_flat_sheet_folded_over_is_not_taken_as_it_lies():
+    """Half of its faces would be mirrored."""
+    x, y = np.meshgrid(np.linspace(-0.3, 0.4, 8), np.linspace(0, 0.4, 5))
+    i = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    surface = make_surface(np.stack([np.abs(x), y, 0.0 * x], axis=-1).reshape(-1, 3), quads)
+    development = develop(surface, i[:, 0].astype(np.int32))
+    assert development.method == "profiles"
+    assert edge_errors(surface, development.positions).max() < 1e-12
+
+
+def test_a_piece_a_little_bent_is_not_flat():
+    surface = disk(150, lambda x, y: 1e-3 * x * y)
+    assert flat_layout(surface, choose_datum(surface)) is None
 
 
 # --- profiles
@@ -403,7 +454,7 @@ def test_the_datum_of_a_curled_band_runs_through_its_middle_from_end_to_end(inne
     middle = np.arange(61) * 5 + 2
     assert np.array_equal(line, middle) or np.array_equal(line, middle[::-1])
     development = develop(surface, line)
-    assert development.method == ("geodesic" if triangles else "profiles")
+    assert development.method == ("flat" if height == 0 else "geodesic" if triangles else "profiles")
     assert development.notes == ()
 
 
@@ -413,7 +464,9 @@ def test_the_datum_of_a_strip_one_face_wide_runs_along_one_side():
     line = choose_datum(surface)
     assert len(line) == 61
     assert len(set((line % 2).tolist())) == 1
-    assert develop(surface, line).method == "profiles"
+    layout = profile_layout(surface, line)
+    assert layout is not None
+    assert mirrored(surface, layout) == 0
 
 
 def test_the_datum_of_a_band_of_any_triangles_and_with_holes_ends_at_its_ends():

@@ -1,8 +1,8 @@
 """Development: the first, unrelaxed layout of a piece, from a datum line (paper, section IV.B).
 
-Three ways, the first that leaves no face mirrored: along the profiles of a quad grid, by geodesic distance from the datum
-line, and, where both fold too much to be mended, a harmonic map onto a disk, which cannot. Cracks are closed for the first two,
-where that helps.
+The first way that leaves no face mirrored: a flat piece as it lies, along the profiles of a quad grid, by geodesic distance from
+the datum line, and, where both fold too much to be mended, a harmonic map onto a disk, which cannot. Cracks are closed for
+profiles and distances, where that helps.
 """
 
 from __future__ import annotations
@@ -36,7 +36,15 @@ from warpflat.surface.topology import (
 from warpflat.surface.untangle import untangle
 from warpflat.surface.vectors import norm, points_at
 
-__all__ = ["Development", "choose_datum", "develop", "geodesic_layout", "harmonic_layout", "profile_layout"]
+__all__ = [
+    "Development",
+    "choose_datum",
+    "develop",
+    "flat_layout",
+    "geodesic_layout",
+    "harmonic_layout",
+    "profile_layout",
+]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -45,6 +53,8 @@ IntArray = NDArray[np.int32]
 _LEVEL = 1e-6
 # A line beside it is along the same section if its ends are as far apart, to this share.
 _AS_LONG = 0.05
+# A piece is flat if it strays no further from its plane, to this share of its size: single precision leaves that much.
+_FLAT = 1e-5
 # A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
 _LEAST_AREA = 0.01
 # Up to this share of the faces may be mirrored for a development to be mended rather than given up.
@@ -64,7 +74,7 @@ class Development:
 
     Attributes:
         positions: #V by 2 [m], the datum along +y.
-        method: "profiles", "geodesic" or "harmonic".
+        method: "flat", "profiles", "geodesic" or "harmonic".
         mended: whether so many faces had to be turned back that it says little of directions.
         notes: why a way was not taken, one sentence each.
     """
@@ -172,6 +182,9 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     """
     notes: list[str] = []
     cells = cells_of(surface)
+    flat = flat_layout(surface, datum)
+    if flat is not None and len(_mirrored(cells, flat)) == 0:
+        return Development(positions=flat, method="flat")
     ways = (("profiles", profile_layout), ("geodesic", geodesic_layout))
     closed = _with_cracks_closed(surface, datum)
     if closed is not None:
@@ -303,6 +316,22 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
         angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
         turn += np.bincount(cells.corner[rows, k], angle, minlength=len(turn))
     return bool((turn > 2 * np.pi + 1e-6).any())
+
+
+def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
+    """A piece that lies in a plane already, as it lies there: #V by 2 [m], the datum's chord upwards; None if it does not."""
+    triangles, _ = triangulate(surface.faces)
+    p = surface.vertices[triangles]
+    facing = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
+    away = surface.vertices - surface.vertices.mean(axis=0)
+    if (
+        np.ptp(away @ facing) > _FLAT * np.linalg.norm(np.ptp(away, axis=0)) * np.linalg.norm(facing)
+        or not facing.any()
+    ):
+        return None
+    right = np.cross(np.eye(3)[np.abs(facing).argmin()], facing)
+    axes = np.column_stack([right, np.cross(facing, right)])
+    return _upright(away @ (axes / np.linalg.norm(axes, axis=0)), datum)
 
 
 def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
