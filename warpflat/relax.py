@@ -108,6 +108,7 @@ class Relaxation:
         upright: of each piece the vertices whose chord is kept along +y, the ends of the datum: it is the grain, and
             nothing else says how the piece lies on the cloth, so that it would turn for ever to please a guard bound to
             the plane.
+        least_strain: a layout that stores less energy than this strain everywhere counts as free of strain, and at rest.
         position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d,
             constant forces [N]. anchor: #V vec2d, where all cells were last looked at [m]. spare: #V vec2d, for anybody, until
             forces are evaluated. On the network's device.
@@ -121,6 +122,7 @@ class Relaxation:
     options: RelaxOptions
     start: InitVar[FloatArray]
     upright: Sequence[Upright] = ()
+    least_strain: float = 1e-9
 
     def __post_init__(self, start: FloatArray) -> None:
         n = self.network.vertex_count
@@ -149,11 +151,13 @@ class Relaxation:
 
     @cached_property
     def negligible_energy(self) -> FloatArray:
-        """#P [J], what a strain of 1e-9 everywhere stores: below it a layout counts as free of strain, and at rest."""
+        """#P [J], what the least strain stores everywhere."""
         springs = (net.spring_arrays for net in self.network.pieces)
         # Each spring is listed twice.
-        return 0.25e-18 * np.array(
-            [np.einsum("i,i,i->", s.listed_stiffness, s.listed_length, s.listed_length) for s in springs]
+        return (
+            0.25
+            * self.least_strain**2
+            * np.array([np.einsum("i,i,i->", s.listed_stiffness, s.listed_length, s.listed_length) for s in springs])
         )
 
     @cached_property
@@ -339,7 +343,8 @@ class Relaxation:
             if number[piece.lower] >= 0
         ]
         network = join_networks([self.network.pieces[piece] for piece in pieces])
-        kept = Relaxation(network, self.options, start=self.positions()[rows], upright=upright)
+        start = self.positions()[rows]
+        kept = Relaxation(network, self.options, start=start, upright=upright, least_strain=self.least_strain)
         kept.velocity.assign(self.velocity.numpy()[rows])
         kept.load.assign(self.load.numpy()[rows])
         kept.steps, kept.restarts, kept.work_units = self.steps, self.restarts, self.work_units

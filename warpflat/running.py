@@ -33,6 +33,8 @@ IntArray = NDArray[np.int32]
 
 # A first round only turns and shapes the layout, since directions are measured again after it: tolerances are so many times the others.
 _FIRST_ROUND = 30.0
+# And a layout that can be free of strain has told its directions once it is strained by no more than this.
+_FIRST_STRAIN = 1e-6
 # Quads across the grain are worth a note where they are so many times as stiff in shear as the cloth.
 _MUCH_EXCESS = 3.0
 # With levels it is over once a cycle takes no more than this share of the energy away.
@@ -208,6 +210,7 @@ class _Batch:
                 energy_tolerance=_FIRST_ROUND * self._options.energy_tolerance,
                 residual_tolerance=_FIRST_ROUND * self._options.residual_tolerance,
             )
+            state.least_strain = _FIRST_STRAIN
             self._round(levels, enough=_FIRST_GAIN)
             layout = state.positions()
             self._put(
