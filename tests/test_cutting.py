@@ -395,6 +395,55 @@ def test_triangles_have_free_paths_that_are_drawn_straight():
     assert entry.result.flipped_faces == 0
 
 
+def cap() -> Flattening:
+    """A hemisphere's energy is highest all along its border, nowhere inside."""
+    angle = np.radians(80)
+    surface = fan(lambda t: 0.1 * math.sin(t * angle), lambda t: 0.1 * math.cos(t * angle), 32, 10)
+    return warpflat.flatten(surface, fabric="woven", datum=meridian(surface, 32, 10, 0))
+
+
+def test_from_peaks_at_the_border_cuts_lead_inwards():
+    flat = cap()
+    ledger = make_ledger(flat, by="released", candidates=[one for one in find_candidates(flat) if not one.has_twin])
+    best = ledger.entries[0]
+    assert best.candidate.name.startswith("inward ")
+    assert len(best.candidate.drawn) == 2
+    assert best.released > 0.8 * stored(flat)
+    assert not best.overlaps
+    half_of_it = next(entry for entry in ledger.entries if entry.candidate.name.startswith("short inward"))
+    assert half_of_it.length == pytest.approx(0.5 * best.length, rel=0.1)
+    # The tips are four fifths of the way to the pole.
+    for path in best.candidate.drawn:
+        assert np.hypot(*path.points[-1, [0, 2]]) < 0.04
+        assert np.hypot(*path.points[0, [0, 2]]) > 0.098
+
+
+def test_no_way_inwards_begins_beside_an_earlier_cut():
+    """There would be strips of cloth between them."""
+    result, ledgers = cut_automatically(cap(), AutoCut(max_cuts=4), fully=False)
+    assert len(ledgers) >= 2
+    mouths = np.array([result.surface.vertices[path[0]] for made in result.cuts for path in made.paths])
+    apart = np.linalg.norm(mouths[:, None] - mouths[None], axis=-1)
+    assert apart[~np.eye(len(mouths), dtype=bool)].min() > 0.03
+    names = [made.name for made in result.cuts]
+    assert len(set(names)) == len(names)
+
+
+def test_a_cut_that_overlaps_is_told_and_not_made_by_itself():
+    """The border of a saddle is too long for its middle: cloth is missing along a cut from there."""
+    flat = warpflat.flatten(make_shape("saddle", resolution=17), fabric="interlock", datum="centre")
+    ledger = make_ledger(flat)
+    assert ledger.entries[0].released > 0
+    assert all(entry.overlaps and entry.angle < 0 for entry in ledger.entries)
+    assert cut_automatically(flat, AutoCut())[0] is flat
+
+
+def test_a_piece_that_lies_flat_but_for_rounding_has_nothing_to_cut_for():
+    flat = warpflat.flatten(make_shape("cylinder", resolution=9), fabric="woven", datum="centre")
+    with pytest.raises(InputError, match="stores no strain energy inside: there is nothing to cut for"):
+        find_candidates(flat)
+
+
 def test_a_piece_without_energy_has_nothing_to_cut_for():
     flat = warpflat.flatten(make_shape("cylinder", resolution=9), fabric="woven", datum="centre")
     result, ledgers = cut_automatically(flat, AutoCut(stop_below=1e-6))

@@ -177,8 +177,19 @@ def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
     assert len(stages) == 4
     assert any(note.startswith("cuts found: ") for note in found.notes)
     enough = stages[1]["spring_energy_j"] + stages[1]["guard_energy_j"] + 0.01
-    none = run_scene(scene(auto_cut={"max_cuts": 1, "stop_below": enough}, **QUIET), tmp_path / "none")
+    # The same cut is drawn into the mesh, and not made.
+    settings = {"max_cuts": 1, "by": "per_cm", "stop_below": enough}
+    none = run_scene(scene(auto_cut=settings, **QUIET), tmp_path / "none")
     assert len(none.metrics["pieces"]["trial"]["stages"]) == 2
+
+
+def test_auto_cut_leaves_a_piece_whole_where_there_is_nothing_to_cut_and_says_why(tmp_path: Path):
+    flat = {"surface": {"shape": "cylinder", "resolution": 9}, "datum": "centre"}
+    result = run_scene(scene(auto_cut={}, **flat, **QUIET), tmp_path)
+    assert not result.metrics["pieces"]["trial"]["cuts"]
+    (note,) = (note for note in result.notes if note.startswith("no cut was found"))
+    assert note.endswith("stores no strain energy inside: there is nothing to cut for")
+    assert "trial.svg" in result.files
 
 
 @pytest.mark.parametrize(

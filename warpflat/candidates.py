@@ -1,11 +1,12 @@
-"""Where a piece could be cut: feature lines through or near the peaks of its energy, and free paths that follow it.
+"""Where a piece could be cut: feature lines through or near the peaks of its energy, free paths that follow it, and ways inwards.
 
-A candidate runs from the border to a peak, or from border to border. Peaks that mirror each other (two busts) make
-pairs: a pattern maker cuts both or none.
+A candidate runs from the border to a peak, from border to border, or, where the peak is at the border, from there inwards.
+Peaks that mirror each other (two busts) make pairs: a pattern maker cuts both or none.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
@@ -15,9 +16,11 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening
-from warpflat.strain_map import EnergyMap, energy_map
+from warpflat.strain_map import EnergyMap, energy_map, smooth_to_vertices
+from warpflat.surface.curvature import curvature_tensors
+from warpflat.surface.geodesic import distance_from
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths import EdgeGraph
+from warpflat.surface.paths import EdgeGraph, chain_positions
 from warpflat.surface.topology import border_edges, edge_faces
 from warpflat.surface.trace import SurfacePath, polyline_path
 
@@ -37,6 +40,10 @@ _NEARLY_AS_HIGH = 0.7
 _MOST_PEAKS = 4
 # Two cuts whose lengths agree to this share mirror each other.
 _ALIKE = 0.03
+# A cut from a peak at the border ends after such shares of the way inwards.
+_INWARDS = {"inward": 0.8, "short inward": 0.4}
+# A piece whose edges are all within this share of their lengths is flat but for rounding.
+_FREE_OF_STRAIN = 1e-6
 # Where no energy is, a free path costs so many times its length at the peak.
 _DEAR = 20.0
 
@@ -90,15 +97,7 @@ def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None
     density = np.zeros(len(surface.vertices))
     np.maximum.at(density, result.vertex_origin, apart.vertex_density)
     on_border = _border(result)
-    inside = np.where(on_border, -1.0, density)
-    order = np.argsort(-inside, kind="stable")
-    chosen: list[int] = []
-    for vertex in order.tolist():
-        if inside[vertex] <= 0 or (chosen and inside[vertex] < _NEARLY_AS_HIGH * inside[chosen[0]]):
-            break
-        gap = [float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[other])) for other in chosen]
-        if len(chosen) < _MOST_PEAKS and min(gap, default=np.inf) > _APART * size:
-            chosen.append(vertex)
+    chosen = _highest(surface, np.where(on_border, -1.0, density), apart=_APART * size)
     whole = energy_map(
         surface, result.face_energy_density, smoothing_length=_SMOOTHING * size, landmarks=dict(landmarks or {})
     )
@@ -110,18 +109,22 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
     """Cuts worth comparing on a flattened piece, cut before or not.
 
     Each feature line that passes near a peak, from each of its ends on the border to that peak and as a whole; one free
-    path per peak from there to the border; and the pairs of those that mirror each other.
+    path per peak from there to the border; from the border near a peak two ways inwards; and the pairs of those that mirror each other.
 
     Raises:
         InputError: the piece stores no energy away from its border, so there is nowhere to cut to.
     """
     peaks = peaks or find_peaks(result)
-    if not peaks.vertices:
+    if not peaks.vertices or result.measures["length_error"] < _FREE_OF_STRAIN:
         raise InputError(f"piece {result.surface.name!r} stores no strain energy inside: there is nothing to cut for")
     found: list[Candidate] = []
     for name, line in result.surface.lines.items():
         found += _along_line(result, name, np.asarray(line, dtype=np.int32), peaks)
-    found += [free for number in range(len(peaks.vertices)) if (free := _free_path(result, number, peaks)) is not None]
+    for number in range(len(peaks.vertices)):
+        free = _free_path(result, number, peaks)
+        found += [] if free is None else [free]
+        if free is None or _extent(result.surface, free) < _REACH * _diagonal(result.surface):
+            found += _ways_inwards(result, number, peaks)
     singles = _without_doubles(found)
     pairs = _pairs(result.surface, singles)
     twins = {name for pair in pairs for name in pair[1]}
@@ -153,7 +156,7 @@ def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> 
     surface = result.surface
     size = _diagonal(surface)
     on_border = _border(result)
-    if line[0] == line[-1] or on_border[line[1:-1]].mean() > 0.5:
+    if line[0] == line[-1] or np.count_nonzero(on_border[line[1:-1]]) > 0.5 * (len(line) - 2):
         return []
     points = surface.vertices[line]
     found: list[Candidate] = []
@@ -239,8 +242,7 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     surface = result.surface
     if len(path) < 2 or _length(surface, path) < _SHORTEST * _diagonal(surface) or not _is_free(result, path):
         return None
-    earlier = sum(line.startswith("free path ") for line in surface.lines)
-    name = f"free path {earlier + number + 1}"
+    name = f"free path {_made_before(result, 'free path') + number + 1}"
     if surface.is_quad.all():
         return Candidate(name=name, paths=(path,), peaks=(number,))
     stops = _corners(surface.vertices[path], _STRAY * _diagonal(surface))
@@ -249,6 +251,75 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     except InputError:
         return Candidate(name=name, paths=(path,), peaks=(number,))
     return Candidate(name=name, drawn=(drawn,), peaks=(number,))
+
+
+def _ways_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candidate]:
+    """Straight cuts from the border near a peak towards where the piece is curved.
+
+    The cloth along a border is too long or too short because of the curvature behind it; that is what a cut has to reach.
+    """
+    surface = result.surface
+    outside = np.unique(border_edges(surface.faces))
+    start = int(
+        outside[np.argmin(np.linalg.norm(surface.vertices[outside] - surface.vertices[peaks.vertices[number]], axis=1))]
+    )
+    made = [path for one in result.cuts for path in one.paths]
+    if any(_distance(surface, path, start) < _REACH * _diagonal(surface) for path in made):
+        # It would leave a strip between itself and that cut.
+        return []
+    hearts = _hearts(surface)
+    if not hearts:
+        return []
+    nearest = np.argmin(np.linalg.norm(surface.vertices[hearts] - surface.vertices[start], axis=1))
+    found = []
+    for kind, share in _INWARDS.items():
+        try:
+            way = polyline_path(surface, [start, hearts[nearest]])
+            station = share * way.length
+            point = np.array([np.interp(station, chain_positions(way.points), x) for x in way.points.T])
+            tip = int(np.argmin(np.linalg.norm(surface.vertices - point, axis=1)))
+            drawn = polyline_path(surface, [start, tip])
+        except InputError:
+            continue
+        if drawn.length > _SHORTEST * _diagonal(surface):
+            name = f"{kind} {_made_before(result, 'inward') + number + 1}"
+            found.append(Candidate(name=name, drawn=(drawn,), peaks=(number,)))
+    return found
+
+
+def _hearts(surface: Surface) -> list[int]:
+    """The peaks of curvature times the distance to the border, highest first."""
+    size = _diagonal(surface)
+    tensor = curvature_tensors(surface)
+    trace = np.trace(tensor, axis1=1, axis2=2)
+    gauss = np.abs(0.5 * (trace**2 - np.einsum("vij,vji->v", tensor, tensor)))
+    used = surface.faces >= 0
+    of_faces = np.where(used, gauss[surface.faces], 0.0).sum(axis=1) / used.sum(axis=1)
+    curved = smooth_to_vertices(surface, of_faces, smoothing_length=2 * _SMOOTHING * size)
+    value = curved * distance_from(surface, np.unique(border_edges(surface.faces)))
+    # Only what is higher than its neighbours, not what lies high on the flank of a peak.
+    a, b = EdgeGraph(surface).edges.T
+    is_peak = np.ones(len(value), dtype=bool)
+    is_peak[a[value[a] < value[b]]] = is_peak[b[value[b] < value[a]]] = False
+    return _highest(surface, np.where(is_peak, value, 0.0), apart=_APART * size)
+
+
+def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]:
+    """The vertex where a positive value is highest, and others where it is nearly as high, so far apart [m]; highest first."""
+    chosen: list[int] = []
+    for vertex in np.argsort(-height, kind="stable").tolist():
+        if height[vertex] <= 0 or (chosen and height[vertex] < _NEARLY_AS_HIGH * height[chosen[0]]):
+            break
+        gap = [float(np.linalg.norm(surface.vertices[vertex] - surface.vertices[other])) for other in chosen]
+        if len(chosen) < _MOST_PEAKS and min(gap, default=np.inf) > apart:
+            chosen.append(vertex)
+    return chosen
+
+
+def _made_before(result: Flattening, kind: str) -> int:
+    """The highest number that a line or cut of a kind bears."""
+    names = " ".join([*result.surface.lines, *(made.name for made in result.cuts)])
+    return max((int(found) for found in re.findall(rf"\b{kind} (\d+)", names)), default=0)
 
 
 def _corners(points: FloatArray, stray: float) -> list[int]:

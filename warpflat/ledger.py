@@ -69,6 +69,11 @@ class LedgerEntry:
         """Released per centimetre cut [J/cm]."""
         return self.released / max(100.0 * self.length, np.finfo(float).tiny)
 
+    @property
+    def overlaps(self) -> bool:
+        """Whether cloth is missing there: no dart could be sewn."""
+        return self.angle < 0
+
     def as_dict(self) -> dict[str, Any]:
         """Plain data, SI units but for `released_j_per_cm`."""
         return {
@@ -156,10 +161,18 @@ def make_ledger(
         except InputError as reason:
             refused.append((candidate.name, str(reason)))
     if not entries:
-        why = f"; {refused[0][0]}: {refused[0][1]}" if refused else "; draw a line through the peak of its energy"
-        raise InputError(f"piece {result.surface.name!r} has no line to cut along{why}")
+        raise InputError(f"piece {result.surface.name!r} has no line to cut along: {_why_none(peaks, refused)}")
     entries.sort(key=lambda entry: (entry.flipped_faces > 0, -getattr(entry, by)))
     return Ledger(result=result, peaks=peaks, entries=tuple(entries), refused=tuple(refused))
+
+
+def _why_none(peaks: Peaks, refused: Sequence[tuple[str, str]]) -> str:
+    if refused:
+        return f"{refused[0][0]}: {refused[0][1]}"
+    return (
+        f"none passes near the peak of its energy ({peaks.words[0]}), and no way of any length leads there or inwards from the "
+        "border; draw a line through it"
+    )
 
 
 def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -> LedgerEntry:
@@ -259,7 +272,7 @@ def cut_automatically(
     callback: Callable[[Progress], None] | None = None,
     fully: bool = True,
 ) -> tuple[Flattening, tuple[Ledger, ...]]:
-    """Cut greedily: try all candidates, make the best cut, relax, and again until it is enough.
+    """Cut greedily: try all candidates, make the best that does not overlap, relax, and again until it is enough.
 
     Args:
         result: the flattened piece.
@@ -283,8 +296,8 @@ def cut_automatically(
             if not ledgers:
                 raise
             break
-        best = ledger.entries[0]
-        if best.released <= 0 or best.flipped_faces:
+        best = next((entry for entry in ledger.entries if not entry.overlaps), None)
+        if best is None or best.released <= 0 or best.flipped_faces:
             break
         ledgers.append(ledger)
         tried = best.result

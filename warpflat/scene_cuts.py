@@ -171,20 +171,28 @@ def plan_automatic_cuts(
         flatten: flattens a surface with the scene's other settings.
         relax: the scene's options.
 
+    Returns:
+        The cuts, none where there is nothing to cut for or no line to cut along, as a note then says; the ledger of each round.
+
     Raises:
-        InputError: the piece has no line to cut along.
+        InputError: a cut that is made before is refused.
     """
     from warpflat.cutting import replace_paths
+    from warpflat.errors import InputError
     from warpflat.ledger import AutoCut, coarse, cut_automatically
 
     auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
     search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
     result = flatten_and_cut(story, flatten=flatten, relax=coarse(relax))
-    result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
+    why = "none would release energy without overlapping"
+    try:
+        result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
+    except InputError as nowhere:
+        ledgers, why = (), str(nowhere)
     plans = tuple(replace_paths(made, made.paths) for made in result.cuts)
     found = [plan.name for plan in plans[len(story.plans) :]]
-    note = f"cuts found: {'; '.join(found)}" if found else "no cut was found that would release energy"
+    note = f"cuts found: {'; '.join(found)}" if found else f"no cut was found: {why}"
     planned = CutStory(
         surface=result.surface, plans=plans, auto=auto, first_auto=len(story.plans), notes=(*story.notes, note)
     )
