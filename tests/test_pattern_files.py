@@ -6,6 +6,7 @@ import json
 import shutil
 from datetime import datetime
 from pathlib import Path
+from xml.etree import ElementTree as ET
 
 import ezdxf
 import numpy as np
@@ -16,6 +17,7 @@ from warpflat.cli import main
 from warpflat.errors import InputError
 from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_json
+from warpflat.export.pdf import write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.flattening import flatten
 from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, draft_garment, draft_piece
@@ -270,6 +272,43 @@ def test_holes_have_both_lines_in_every_file(tmp_path: Path):
             if line.is_closed and line.dxf.layer in ("11", "14")
         }
         assert rings == {"11": pytest.approx(30.0**2), "14": pytest.approx(50.0**2)}
+
+
+def test_files_from_before_holes_had_allowances_are_read(tmp_path: Path):
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
+    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
+    vent = Hole(name="vent", points=0.1 + 0.05 * corners[:4])
+    data = json.loads(json.dumps(pattern_json(as_garment(Piece(name="p", edges=border, holes=[vent])))))
+    piece = data["sizes"][""]["p"]
+    del piece["cutout_sew_lines"], piece["cutout_allowances"], piece["label"]["angle"], piece["label"]["leader"]
+    (read,) = pattern_from_json(data).pieces[""]
+    assert read.cutouts["vent"].width == 0.0
+    np.testing.assert_array_equal(read.cutouts["vent"].sew_line, piece["cutouts"]["vent"])
+    assert read.label.leader is None
+    piece["holes"] = piece.pop("cutouts")
+    with pytest.raises(InputError, match="key 'cutouts' is missing"):
+        pattern_from_json(data)
+
+
+def test_a_label_beside_its_piece_is_in_every_file(tmp_path: Path):
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
+    border = [Edge(name=f"e{i}", points=0.2 * corners[i : i + 2]) for i in range(4)]
+    opening = Hole(name="opening", points=0.004 + 0.192 * corners[:4])
+    drafted = as_garment(Piece(name="rim", edges=border, holes=[opening]))
+    read = pattern_from_json(json.loads(json.dumps(pattern_json(drafted))))
+    assert pattern_json(read) == pattern_json(drafted)
+    write_svg(read, tmp_path / "p.svg")
+    root = ET.parse(tmp_path / "p.svg").getroot()
+    assert len(root.findall(".//{*}path[@class='leader']")) == 1
+    name = next(text for text in root.iter("{http://www.w3.org/2000/svg}text") if text.text == "RIM")
+    assert 210 < float(name.get("transform")[10:].split()[0]) < float(root.get("width")[:-2])
+    tiling = write_pdf(read, tmp_path / "p.pdf")
+    columns = {column for _, column in tiling.tiles}
+    assert columns == {0, 1}, "the label is printed too"
+
+
+def as_garment(piece: Piece) -> DraftedGarment:
+    return draft_garment(Garment(name="p", pieces={"": [piece]}))
 
 
 def test_rules_name_holes():

@@ -7,11 +7,15 @@ import pytest
 import shapely
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from matplotlib.font_manager import FontProperties
+from matplotlib.textpath import TextPath
 
 from warpflat.errors import InputError
 from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment, draft_piece
 from warpflat.pattern.curves import arc_lengths, fit_curve, turning_angles
+from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drawing import draw_piece
+from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40", "42", "44")
@@ -376,6 +380,77 @@ def test_labels_lie_inside_and_off_the_grain_line(dress):
         block = shapely.box(*low, *(2 * piece.label.at - low))
         assert shapely.Polygon(piece.sew_line).contains(block), piece.name
         assert not block.intersects(shapely.LineString(piece.grain)), piece.name
+
+
+def frame(rim, name="frame", size="", **options):
+    """A square of .2 by .3 m with a hole that leaves `rim` [m] around it."""
+    hole = np.array([(rim, rim), (0.2 - rim, rim), (0.2 - rim, 0.3 - rim), (rim, 0.3 - rim)])
+    piece = square(name, size, holes=[Hole(name="hole", points=hole)], **options)
+    return piece, shapely.Polygon(piece.outline, [hole])
+
+
+@pytest.mark.parametrize("rim", [0.08, 0.06, 0.03, 0.02, 0.012])
+def test_labels_stand_on_the_cloth_not_in_a_hole(rim):
+    piece, cloth = frame(rim)
+    drafted = draft_piece(piece, garment="a rather long name of a garment")
+    moved = shapely.transform(cloth, lambda points: points @ drafted.frame[:, :2].T + drafted.frame[:, 2])
+    assert drafted.label.leader is None
+    assert moved.covers(shapely.Polygon(drafted.label.box))
+    assert moved.covers(shapely.LineString(drafted.grain)), "nor does the grain line"
+    assert not shapely.Polygon(drafted.label.box).intersects(shapely.LineString(drafted.grain))
+
+
+def test_a_label_without_room_stands_beside_the_piece_with_a_leader_to_it():
+    piece, cloth = frame(0.004)
+    drafted = draft_piece(piece, garment="tiny")
+    moved = shapely.transform(cloth, lambda points: points @ drafted.frame[:, :2].T + drafted.frame[:, 2])
+    label, cut = drafted.label, shapely.Polygon(drafted.cut_line)
+    assert not cut.intersects(shapely.Polygon(label.box))
+    assert moved.buffer(0.01).covers(shapely.Point(label.leader[1]))
+    assert cut.covers(shapely.Point(label.leader[1]))
+    assert not cut.covers(shapely.Point(label.leader[0]))
+    assert [stroke.role for stroke in draw_piece(drafted).strokes].count("leader") == 1
+
+
+def test_a_label_beside_a_piece_has_its_room_on_the_sheet_and_stands_beside_all_sizes():
+    small = frame(0.004, size="38")[0]
+    edges = [Edge(name=e.name, points=e.points * [1.1, 1]) for e in small.edges]
+    wide = square("frame", "40", edges=edges, holes=small.holes)
+    drafted = draft_garment(Garment(name="frames", pieces={"40": [wide], "38": [small]}, seams=[]))
+    (placed,) = lay_out(nests(drafted), width=1.0).placed
+    label = nest_label(placed.pieces)
+    assert all(not shapely.Polygon(p.cut_line).intersects(shapely.Polygon(label.box)) for p in placed.pieces)
+    assert shapely.box(*placed.box.reshape(-1)).buffer(1e-9).covers(shapely.Polygon(label.box + placed.offset))
+
+
+@pytest.mark.parametrize(
+    ("name", "width", "height"),
+    [
+        ("crown_gore_lining_left", 0.07, 0.3),
+        ("Front_side_panel_lower_left_lining", 0.15, 0.2),
+        ("a_name_of_a_piece_that_is_so_long_that_it_ran_out_of_it_by_far_before", 0.2, 0.2),
+        ("onewordthatcannotbebrokenanywhereatallhoweverlongitis", 0.1, 0.1),
+        ("strap", 0.02, 0.5),
+        ("MWWMWWMWWM", 0.03, 0.03),
+    ],
+)
+def test_no_letter_leaves_the_piece_or_crosses_its_grain(name, width, height):
+    edges = [Edge(name=e.name, points=e.points * [width / 0.2, height / 0.3]) for e in square().edges]
+    drafted = draft_piece(square(name, edges=edges), garment="style")
+    sewn, grain = shapely.Polygon(drafted.sew_line), shapely.LineString(drafted.grain)
+    lines = [words for words in draw_piece(drafted).words if words.text not in {e.name for e in drafted.edges}]
+    assert " ".join(words.text for words in lines).startswith(name.replace("_", " ").upper())
+    for words in draw_piece(drafted).words:
+        # The letters themselves, as matplotlib draws them.
+        font = FontProperties(family="DejaVu Sans", weight="bold" if words.bold else "normal")
+        path = TextPath((0, 0), words.text, size=words.height / 0.729, prop=font)
+        low, high = np.array(path.get_extents().p0), np.array(path.get_extents().p1)
+        turn = np.array([[np.cos(words.angle), -np.sin(words.angle)], [np.sin(words.angle), np.cos(words.angle)]])
+        low[0], high[0] = np.array([-0.5, 0.5]) * (high[0] - low[0])
+        corners = np.array([low, (high[0], low[1]), high, (low[0], high[1])]) - [0, words.height / 2]
+        box = shapely.Polygon(words.at + corners @ turn.T)
+        assert sewn.covers(box), words.text
+        assert not box.intersects(grain), words.text
 
 
 def test_drafting_twice_gives_the_same_to_the_bit():

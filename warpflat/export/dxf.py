@@ -26,6 +26,7 @@ from warpflat.export.letters import titles
 from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
+from warpflat.pattern.lettering import text_width
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -40,6 +41,8 @@ DIALECTS = ("aama", "astm")
 UNITS = {"metric": 1000.0, "english": 1000.0 / 25.4}
 #: A boundary vertex that turns by more than this [rad] is a turn point, else a curve point.
 TURN = np.radians(12.0)
+#: Height [m] of a piece's texts where there is room, and the distance of their rows as a multiple of it.
+TEXT, ROW = 0.004, 1.75
 
 
 def write_dxf(
@@ -172,10 +175,14 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: flo
                 _polyline(block, edge.curve.sample(5e-6), scale, "87")
     texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
     texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
-    texts += [f"ANNOTATION: {text}" for text, _ in piece.label.lines[2:3]]
+    texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
+    # They stand where the label has its room; notes may run on to the right.
+    low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
+    widest = max(text_width(text, 1.0) for text in texts)
     texts += [f"ANNOTATION: {note}" for note in piece.notes]
+    height = min(TEXT, (high[0] - low[0]) / widest, (high[1] - low[1]) / len(texts) / ROW)
     for row, text in enumerate(texts):
-        _text(block, text, piece.label.at + np.array([-0.03, 0.02 - 0.007 * row]), scale, "1", 0.004)
+        _text(block, text, np.array([low[0], high[1] - ROW * height * (row + 0.8)]), scale, "1", height)
 
 
 def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime) -> None:

@@ -131,6 +131,8 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
             "at": piece.label.at.tolist(),
             "lines": [text for text, _ in piece.label.lines],
             "heights": [height for _, height in piece.label.lines],
+            "angle": piece.label.angle,
+            "leader": None if piece.label.leader is None else piece.label.leader.tolist(),
         },
         "notes": list(piece.notes),
     }

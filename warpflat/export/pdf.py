@@ -21,9 +21,10 @@ from warpflat.errors import InputError, nearest
 from warpflat.export.atomic import atomic_path
 from warpflat.export.pdf_legend import LEGEND_SIZE, draw_legend, legend_page
 from warpflat.export.svg import OF_SIZE, STYLE
-from warpflat.pattern.draft import DraftedGarment, DraftedPiece
-from warpflat.pattern.drawing import Stroke, Words, draw_nest
-from warpflat.pattern.layout import Sheet, lay_out, nests
+from warpflat.pattern.draft import DraftedGarment, DraftedPiece, nest_label
+from warpflat.pattern.drawing import Stroke, draw_nest
+from warpflat.pattern.layout import Sheet, lay_out, nests, taken_by
+from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -45,9 +46,6 @@ SIZE_DASHES: tuple[tuple[float, ...], ...] = (
     (14, 3),
 )
 SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a")
-FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
-#: Height of capitals over the font's size, for DejaVu Sans.
-CAPITALS = 0.729
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +156,7 @@ def write_pdf(
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
     """The layout that needs the fewest pages, over sheets of one to eight tiles' width."""
     step = paper.step
-    widest = max(float(np.ptp(np.concatenate([p.cut_line[:, 0] for p in group]))) for group in groups)
+    widest = max(float(np.ptp(taken_by(group)[:, 0])) for group in groups)
     best: tuple[Sheet, Tiling] | None = None
     for columns in range(1, 9 if paper.tiled else 2):
         width = columns * step[0] + paper.overlap
@@ -189,6 +187,8 @@ def _tiling(sheet: Sheet, paper: Paper) -> Tiling:
     rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
     tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
     shapes = [shapely.Polygon(piece.cut_line + placed.offset) for placed in sheet.placed for piece in placed.pieces]
+    labels = [(nest_label(placed.pieces), placed.offset) for placed in sheet.placed]
+    shapes += [shapely.Polygon(label.box + offset) for label, offset in labels if label.leader is not None]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
     tree = shapely.STRtree(shapes)
@@ -209,14 +209,12 @@ def _tiling(sheet: Sheet, paper: Paper) -> Tiling:
 
 
 def _register_fonts() -> None:
-    """DejaVu Sans, embedded: it knows most of the world's letters, and comes with matplotlib."""
-    import matplotlib
+    """They are embedded."""
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.ttfonts import TTFont
 
-    folder = Path(matplotlib.get_data_path()) / "fonts" / "ttf"
     for name in (FONT, BOLD):
-        pdfmetrics.registerFont(TTFont(name, str(folder / f"{name}.ttf")))
+        pdfmetrics.registerFont(TTFont(name, str(font_file(name))))
 
 
 def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Sequence[str], paper: Paper) -> None:

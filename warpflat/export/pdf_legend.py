@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from warpflat.export.svg import STYLE
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.layout import Sheet
+from warpflat.pattern.lettering import BOLD, FONT
 from warpflat.words import counted
 
 if TYPE_CHECKING:
@@ -26,7 +27,6 @@ LEGEND_SIZE = (0.180, 0.128)
 TEST_MM, TEST_INCHES = 0.050, 2 * 0.0254
 
 POINT = 72 / 0.0254
-FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 
 _KEY = (
     ("cut", "cutting line"),

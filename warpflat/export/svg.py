@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from warpflat.export.atomic import atomic_path
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import DraftedGarment
-from warpflat.pattern.drawing import Drawing, Stroke, Words, draw_nest, grain_strokes
-from warpflat.pattern.label import LEADING, LETTER
+from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
+from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
+from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
 from warpflat.words import counted
 
@@ -36,11 +37,10 @@ STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
     "notch": ("#000000", 0.6, ()),
     "drill": ("#000000", 0.25, ()),
     "cutout": ("#000000", 0.5, ()),
+    "leader": ("#7a7a7a", 0.2, ()),
 }
 #: What has the colour of its size in a nest.
 OF_SIZE = ("cut", "dart", "notch")
-#: Height of the letters' body over that of their capitals.
-BODY = 1.39
 
 
 def write_svg(
@@ -87,7 +87,8 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     cut = counted(len(marker.placements), "piece") + (f", size {', '.join(sizes)}" if sizes else "")
     cloth = f"{marker.length:.3f} m of cloth {marker.width:.3f} m wide, {marker.utilisation:.1%} used"
     rows = [name, cut, cloth]
-    height = min(0.014, marker.length / (LETTER * max(map(len, rows))))
+    widest = max(text_width(text, 1.0, bold=row == 0) for row, text in enumerate(rows))
+    height = min(0.014, 0.98 * marker.length / widest)
     band = (len(rows) + 0.5) * LEADING * height
     page = SvgPage(marker.length, marker.width + band, f"{name}: {cut}, {cloth}")
     for row, text in enumerate(rows):
@@ -179,7 +180,7 @@ class SvgPage:
         attributes = {
             "transform": f"translate({_number(x)} {_number(y)}) rotate({_number(turn)})",
             "y": _number(height / 2),
-            "font-size": _number(height * BODY),
+            "font-size": _number(height / CAPITALS),
         }
         if words.bold:
             attributes["font-weight"] = "bold"

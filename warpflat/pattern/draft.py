@@ -37,6 +37,7 @@ __all__ = [
     "draft_garment",
     "draft_piece",
     "eye_legs",
+    "nest_label",
 ]
 
 Vector = NDArray[np.float64]
@@ -265,10 +266,9 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
     internal = {name: smooth_line(line) if tolerance is None else line for name, line in internal.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
-    grain = default_grain(sew_line) if piece.grain is None else _moved(piece.grain, frame)
+    grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
     obstacles = [grain, *internal.values()]
     obstacles += [np.concatenate([_line(edges, d.left), _line(edges, d.right)]) for d in piece.darts]
-    obstacles += [np.concatenate([p, p[:1]]) for p in holes.values()]
     folds = [edge.line for edge in edges if edge.kind == "fold"]
     return DraftedPiece(
         piece=piece,
@@ -282,7 +282,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cutouts=cutouts,
         fisheyes=fisheyes,
         grain=grain,
-        label=place_label(piece, garment, sew_line, obstacles, folds),
+        label=place_label(piece, garment, (sew_line, cut.points), list(holes.values()), obstacles, folds),
         notes=tuple(notes),
     )
 
@@ -460,6 +460,17 @@ def _cutout(hole: Hole, points: Vector) -> DraftedCutout:
     if line is None:
         return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
     return DraftedCutout(sew_line=points, cut_line=line, width=hole.width)
+
+
+def nest_label(pieces: Sequence[DraftedPiece]) -> Label:
+    """What is written on sizes that lie upon each other: the middle one's label, beside all if it stands beside it."""
+    middle = pieces[len(pieces) // 2]
+    if middle.label.leader is None:
+        return middle.label
+    right = max(float(piece.cut_line[:, 0].max()) for piece in pieces)
+    away = np.array([right - float(middle.cut_line[:, 0].max()), 0.0])
+    start, end = middle.label.leader
+    return replace(middle.label, at=middle.label.at + away, leader=np.stack([start + away, end]))
 
 
 def _fisheye(points: Vector, tolerance: float | None) -> Vector:

@@ -4,13 +4,19 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import lru_cache
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
-from warpflat.pattern.draft import DraftedEdge, DraftedPiece, eye_legs
+from warpflat.pattern.draft import DraftedEdge, DraftedPiece, eye_legs, nest_label
+from warpflat.pattern.label import Label
+from warpflat.pattern.lettering import Words, text_width
 from warpflat.pattern.notches import Notch
+
+if TYPE_CHECKING:
+    from shapely import Polygon
 
 __all__ = ["Drawing", "Stroke", "Words", "draw_nest", "draw_piece", "grain_strokes"]
 
@@ -22,6 +28,8 @@ ARROW, BARB = 0.006, 0.002
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
 NAME, NAME_GAP = 0.0024, 0.0028
+#: Such a name keeps at least so far [m] from all else; height of letters with tails below, over that of capitals.
+CLEAR, CAPITALS_AND_TAILS = 0.0004, 1.6
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -31,7 +39,8 @@ class Stroke:
     """One line.
 
     Attributes:
-        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout".
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout",
+            "leader".
         name: what it is called in files, unique among the strokes of a piece; empty for mere decoration.
         points: #P by 2 [m].
         closed: the last point joins the first.
@@ -45,21 +54,6 @@ class Stroke:
     closed: bool = False
     curve: Curve | None = None
     hidden: bool = False
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Words:
-    """One line of text, centred on `at` [m]; `height` of its capitals [m], `angle` [rad] counter-clockwise.
-
-    A `tag` names a size on its own line: it takes that line's colour, on a white ground.
-    """
-
-    text: str
-    at: Vector
-    height: float
-    angle: float = 0.0
-    bold: bool = False
-    tag: bool = False
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -80,8 +74,9 @@ def draw_piece(piece: DraftedPiece) -> Drawing:
         *_details(piece),
         *grain_strokes(piece.grain),
         *_internal(piece),
+        *_leader(piece.label),
     ]
-    words = [*_label(piece, piece.size), *_line_names(piece)]
+    words = [*piece.label.words(), *_line_names(piece)]
     for edge in piece.fold_edges:
         fold_strokes, fold_words = _bracket(edge)
         strokes += fold_strokes
@@ -108,8 +103,10 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
         ]
         words: list[Words] = []
         if index == middle:
-            strokes += [*grain_strokes(piece.grain), *_internal(piece)]
-            words += [*_label(piece, ", ".join(p.size for p in pieces)), *_line_names(piece, borders=False)]
+            label = nest_label(pieces)
+            strokes += [*grain_strokes(piece.grain), *_internal(piece), *_leader(label)]
+            sizes = ", ".join(p.size for p in pieces)
+            words += [*_of_all_sizes(label, piece.size, sizes), *_line_names(piece, borders=False)]
             for fold in piece.fold_edges:
                 fold_strokes, fold_words = _bracket(fold)
                 strokes += fold_strokes
@@ -194,12 +191,11 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
     """
     import shapely
 
-    rows = np.array([[0.0, 0.5], [0.0, -0.5]]) * piece.label.height
     taken = [
-        shapely.LineString(piece.label.at + rows).buffer(0.03),
+        *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
         *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
-        shapely.LineString(piece.grain[1] + (piece.grain[0] - piece.grain[1]) * [[0.0], [0.05]]),
-        shapely.LineString(piece.grain[0] + (piece.grain[1] - piece.grain[0]) * [[0.0], [0.05]]),
+        *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
+        *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
     ]
     legs = {leg: dart.dart for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)}
     lines = [(name, line, False) for name, line in piece.internal_lines.items()]
@@ -211,22 +207,34 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
     drawn = {index: shapely.LineString(line) for index, (_, line, _) in enumerate(lines)}
     words = []
     for index, (name, line, border) in enumerate(lines):
-        arc, half = arc_lengths(line), len(name) * NAME * 0.4
+        arc, half = arc_lengths(line), text_width(name, NAME) / 2
         if arc[-1] < 2 * half + (0.008 if border else 0.02):
             continue
         others = shapely.union_all([*taken, *(other for key, other in drawn.items() if key != index)])
-        clear, share = -1.0, 0.5
+        clear, chosen = CLEAR, None
         for tried in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
             if not half <= tried * arc[-1] <= arc[-1] - half:
                 continue
-            distance = float(others.distance(shapely.Point(_at_share(line, tried))))
+            there = _words_along(name, line, tried, half, inwards=border)
+            distance = float(others.distance(_ground(there)))
             if distance > clear:
-                clear, share = distance, tried
-            if clear > half + 0.006:
+                clear, chosen = distance, there
+            if clear > 0.006:
                 break
-        words.append(_words_along(name, line, share, half, inwards=border))
-        taken.append(shapely.Point(words[-1].at).buffer(half))
+        if chosen is not None:
+            words.append(chosen)
+            taken.append(_ground(chosen))
     return words
+
+
+def _ground(words: Words) -> Polygon:
+    """The box that words cover."""
+    import shapely
+
+    half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * CAPITALS_AND_TAILS]) / 2
+    cosine, sine = np.cos(words.angle), np.sin(words.angle)
+    turn = np.array([[cosine, -sine], [sine, cosine]])
+    return shapely.Polygon(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T)
 
 
 def _words_along(name: str, line: Vector, share: float, half: float, *, inwards: bool) -> Words:
@@ -280,16 +288,18 @@ def _bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
     return strokes, [words]
 
 
-def _label(piece: DraftedPiece, sizes: str) -> list[Words]:
-    words = []
-    y = piece.label.at[1] + piece.label.height / 2
-    for index, (text, height) in enumerate(piece.label.lines):
-        step = height * piece.label.height / max(sum(h for _, h in piece.label.lines), 1e-12)
-        y -= step
-        if text == f"Size {piece.size}":
-            text = f"Size {sizes}" if sizes == piece.size else f"Sizes {sizes}"
-        at = np.array([piece.label.at[0], y + (step - height) / 2 + height / 2])
-        words.append(Words(text=text, at=at, height=height, bold=index == 0))
+def _leader(label: Label) -> list[Stroke]:
+    return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]
+
+
+def _of_all_sizes(label: Label, size: str, sizes: str) -> list[Words]:
+    """The label's words with all sizes for its own, no wider than the label is."""
+    words = label.words()
+    for index, row in enumerate(words):
+        if row.text == f"Size {size}":
+            text = f"Sizes {sizes}"
+            height = row.height * min(1.0, label.width / text_width(text, row.height))
+            words[index] = replace(row, text=text, height=height)
     return words
 
 

@@ -2,24 +2,40 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.pattern.lettering import Words, text_width, wrapped
 from warpflat.pattern.pieces import Piece
 
-__all__ = ["Label", "default_grain", "label_lines", "place_label"]
+if TYPE_CHECKING:
+    from shapely import Geometry, Polygon
+
+__all__ = ["LEADING", "Label", "default_grain", "fit_label", "label_lines", "place_label"]
 
 Vector = NDArray[np.float64]
 
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
-#: Mean width of a letter over the height of capitals.
-LETTER = 0.72
-#: Labels are wide: room is sought by an ellipse of this ratio of height to width.
-ELLIPSE = 0.4
+#: Labels keep so far [m] from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
+#: are 16 mm wide; the second where there is little room.
+CLEARANCES = ((0.004, 0.006, 0.022), (0.0015, 0.0025, 0.0165))
+#: Labels on a piece are at least so large, of their full size; below they stand beside it. With less room than
+#: ENOUGH asks for they come nearer to lines.
+LEAST, ENOUGH = 0.3, 0.6
+#: A label beside its piece: its size, its greatest width [m], its distance from the piece [m], and how far [m] its
+#: leader reaches into the cloth.
+BESIDE, BESIDE_WIDTH, BESIDE_GAP, LEADER = 0.6, 0.075, 0.010, 0.005
+#: Room is sought by ellipses of these ratios of height to width: labels are wide, wrapped ones less so.
+ELLIPSES = (0.4, 0.15, 1.0)
+#: How much larger a label must get by being turned, by one more line break, by a name no larger than the rest.
+TURNED, BROKEN, SMALL_TITLE = 1.25, 1.06, 1.15
+#: Lines may be broken at these shares of the widest one.
+BREAKS = (0.75, 0.55, 0.4, 0.28)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -28,16 +44,49 @@ class Label:
 
     Attributes:
         at: the centre [m].
-        lines: (text, height of capitals [m]) from top to bottom.
+        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts rows of one.
+        angle: [rad] counter-clockwise.
+        leader: where it stands beside its piece, 2 by 2 [m] from the label to the cloth; None where it stands on it.
     """
 
     at: Vector
     lines: tuple[tuple[str, float], ...]
+    angle: float = 0.0
+    leader: Vector | None = None
+
+    @property
+    def rows(self) -> list[tuple[str, float, bool]]:
+        """(text, height of capitals [m], whether it is bold) from top to bottom."""
+        return [(row, height, k == 0) for k, (text, height) in enumerate(self.lines) for row in text.split("\n")]
 
     @property
     def height(self) -> float:
-        """Of the whole block [m]."""
-        return sum(height * LEADING for _, height in self.lines)
+        """Of the whole block [m], along its own upright."""
+        return sum(height * LEADING for _, height, _ in self.rows)
+
+    @property
+    def width(self) -> float:
+        """Of the widest row [m]."""
+        return max(text_width(text, height, bold=bold) for text, height, bold in self.rows)
+
+    @property
+    def box(self) -> Vector:
+        """4 by 2 [m], the corners of the block."""
+        half = np.array([self.width, self.height]) / 2
+        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ _turn(self.angle).T
+
+    def words(self) -> list[Words]:
+        """Each row at its place."""
+        words, y = [], self.height / 2
+        for text, height, bold in self.rows:
+            y -= height * LEADING
+            at = self.at + _turn(self.angle) @ [0.0, y + height * LEADING / 2]
+            words.append(Words(text=text, at=at, height=height, angle=self.angle, bold=bold))
+        return words
+
+    def scaled(self, factor: float) -> Label:
+        """Of another size, about its centre."""
+        return replace(self, lines=tuple((text, height * factor) for text, height in self.lines))
 
 
 def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
@@ -67,37 +116,161 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
 
 
 def place_label(
-    piece: Piece, garment: str, sew_line: Vector, obstacles: Sequence[Vector], folds: Sequence[Vector]
+    piece: Piece,
+    garment: str,
+    lines: tuple[Vector, Vector],
+    holes: Sequence[Vector],
+    obstacles: Sequence[Vector],
+    folds: Sequence[Vector],
 ) -> Label:
-    """The label in the widest free place of the piece, smaller where there is little room."""
+    """The label on the widest free place of the piece, smaller where there is little room, beside it where none is.
+
+    Args:
+        piece: whose label it is.
+        garment: its name.
+        lines: #P by 2 [m], the sewing line and the cutting line.
+        holes: #P by 2 [m], the sewing lines of holes and the borders of fish-eye darts: no label stands in there.
+        obstacles: #P by 2 [m], lines that it does not cross.
+        folds: #P by 2 [m], the edges on the fold: there stands a bracket.
+    """
+    import shapely
+
+    sew, cut = (shapely.Polygon(line) for line in lines)
+    away = [shapely.Polygon(hole).buffer(0) for hole in holes]
+    texts = tuple((text, TITLE if k == 0 else TEXT) for k, text in enumerate(label_lines(piece, garment)))
+    found: list[Label] = []
+    for border, line, fold in CLEARANCES:
+        keep_off = [hole.buffer(border) for hole in away]
+        keep_off += [shapely.LineString(obstacle).buffer(line) for obstacle in obstacles]
+        keep_off += [shapely.LineString(edge).buffer(fold) for edge in folds]
+        label = fit_label(sew.buffer(-border).difference(shapely.union_all(keep_off)), texts)
+        found += [] if label is None else [label]
+        if label is not None and _size(label) >= ENOUGH:
+            break
+    return max(found, key=_size) if found else _beside(cut.buffer(0).difference(shapely.union_all(away)), texts)
+
+
+def _size(label: Label) -> float:
+    """That of its smallest line, of its full size."""
+    return min(height for _, height in label.lines) / TEXT
+
+
+def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: float = LEAST) -> Label | None:
+    """Lines (text, height of capitals [m]) where they get largest in an area [m], upright or turned, wrapped or not.
+
+    None where they would have to be smaller than `least` of their size. They are never larger than asked for.
+    """
+    import shapely
+
+    parts = sorted((p for p in shapely.get_parts(area) if p.geom_type == "Polygon"), key=lambda p: -p.area)[:6]
+    places = [place for part in parts if part.area > 1e-7 for place in _places(part)]
+    best, reached = None, 0.0
+    for label, harder in _ways(tuple(lines)):
+        shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
+        for part, at, angle in places:
+            worse = harder * (TURNED if angle else 1.0)
+            factor = _largest(part, shape @ _turn(angle).T, at, max(least, reached * worse * 1.001))
+            if factor > 0.0:
+                best, reached = replace(label.scaled(factor), at=at, angle=angle), factor / worse
+        if reached >= 1.0:
+            break
+    return best
+
+
+def _ways(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:
+    """Labels of full size around the origin, wrapped more and more, and how much harder each is to read."""
+    seen = set()
+    smallest = min(height for _, height in lines)
+    for heights, harder in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
+        plain = [(text, height) for (text, _), height in zip(lines, heights, strict=True)]
+        widest = Label(at=np.zeros(2), lines=tuple(plain)).width
+        for share in (1.0, *BREAKS):
+            rows = tuple(
+                # The size stays in one row: a nest replaces it by all sizes.
+                (text if text.startswith("Size ") else wrapped(text, h, share * widest * 1.001, bold=k == 0), h)
+                for k, (text, h) in enumerate(plain)
+            )
+            if rows not in seen:
+                seen.add(rows)
+                breaks = sum(text.count("\n") for text, _ in rows)
+                yield Label(at=np.zeros(2), lines=rows), harder * BROKEN**breaks
+
+
+def _corners(label: Label) -> Vector:
+    """Of the boxes of its rows [m]."""
+    corners = []
+    for words in label.words():
+        half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * LEADING]) / 2
+        corners.append(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]])
+    return np.concatenate(corners)
+
+
+def _places(part: Polygon) -> Iterator[tuple[Polygon, Vector, float]]:
+    """The polygon, the centre of a widest ellipse in it, and the angle of lines along that: lying ones, then upright."""
     import shapely
     from shapely.affinity import scale
 
-    inside = shapely.Polygon(sew_line).buffer(-0.004)
-    keep_off = [shapely.LineString(line).buffer(0.006) for line in obstacles]
-    keep_off += [shapely.LineString(line).buffer(0.022) for line in folds]
-    free = inside.difference(shapely.union_all(keep_off))
-    room = [part for part in shapely.get_parts(free) if part.geom_type == "Polygon" and part.area > 1e-5]
-    texts = label_lines(piece, garment)
-    lines = [(text, TITLE if i == 0 else TEXT) for i, text in enumerate(texts)]
-    if not room:
-        room = [shapely.Polygon(sew_line).buffer(0)]
-    circles = [shapely.maximum_inscribed_circle(scale(part, xfact=ELLIPSE, origin=(0, 0)), 5e-4) for part in room]
-    best = max(circles, key=lambda circle: circle.length)
-    centre = np.asarray(best.coords[0]) / [ELLIPSE, 1.0]
-    half_width = max(len(text) * height * LETTER for text, height in lines) / 2
-    half_height = sum(height * LEADING for _, height in lines) / 2
-    radius = max(float(best.length), 1e-4)
-    fit = 1.0 / float(np.hypot(half_width * ELLIPSE / radius, half_height / radius))
-    factor = float(np.clip(fit, 0.3, 1.0))
-    return Label(at=centre, lines=tuple((text, height * factor) for text, height in lines))
+    for angle, axis in ((0.0, 0), (np.pi / 2, 1)):
+        for ratio in ELLIPSES:
+            squeeze = np.where(np.arange(2) == axis, ratio, 1.0)
+            squeezed = scale(part, *squeeze, origin=(0, 0))
+            circle = shapely.maximum_inscribed_circle(squeezed, 5e-4 * min(1.0, squeezed.length))
+            yield part, np.asarray(circle.coords[0]) / squeeze, angle
 
 
-def default_grain(sew_line: Vector) -> Vector:
+def _largest(part: Polygon, shape: Vector, at: Vector, floor: float) -> float:
+    """How large, of its size and at most 1, a convex shape (#P by 2 [m]) fits in around a place; 0 below `floor`."""
+    import shapely
+
+    def fits(factor: float) -> bool:
+        return bool(part.covers(shapely.Polygon(shape * factor + at)))
+
+    if floor > 1.0 or not fits(floor):
+        return 0.0
+    if fits(1.0):
+        return 1.0
+    low, high = floor, 1.0
+    while high - low > 0.01:
+        middle = (low + high) / 2
+        low, high = (middle, high) if fits(middle) else (low, middle)
+    return low
+
+
+def _beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
+    """To the right of the cloth, with a leader to it at half its height."""
+    import shapely
+
+    left, bottom, right, top = cloth.bounds
+    rows = tuple(
+        (wrapped(text, height * BESIDE, BESIDE_WIDTH, bold=k == 0), height * BESIDE)
+        for k, (text, height) in enumerate(lines)
+    )
+    label = Label(at=np.zeros(2), lines=rows)
+    label = label.scaled(min(1.0, BESIDE_WIDTH / label.width))
+    middle = (bottom + top) / 2
+    across = shapely.LineString([(left - 1, middle), (right + 1, middle)]).intersection(cloth)
+    near = max(shapely.get_parts(across), key=lambda part: part.bounds[2] if part.length > 0 else -np.inf)
+    target = near.bounds[2] - min(LEADER, near.length / 2)
+    start = right + BESIDE_GAP
+    return replace(
+        label,
+        at=np.array([start + 0.001 + label.width / 2, middle]),
+        leader=np.array([[start, middle], [target, middle]]),
+    )
+
+
+def _turn(angle: float) -> Vector:
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([[cosine, -sine], [sine, cosine]])
+
+
+def default_grain(sew_line: Vector, holes: Sequence[Vector] = ()) -> Vector:
     """2 by 2 [m], upwards through the widest place, two thirds of the height there."""
     import shapely
 
     polygon = shapely.Polygon(sew_line)
+    if holes:
+        polygon = polygon.difference(shapely.union_all([shapely.Polygon(hole).buffer(0) for hole in holes]))
     centre = np.asarray(shapely.maximum_inscribed_circle(polygon, 1e-3).coords[0])
     low, high = polygon.bounds[1], polygon.bounds[3]
     ray = shapely.LineString([(centre[0], low - 1), (centre[0], high + 1)]).intersection(polygon)

@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.pattern.draft import DraftedGarment, DraftedPiece
+from warpflat.pattern.draft import DraftedGarment, DraftedPiece, nest_label
 
-__all__ = ["Placed", "Sheet", "lay_out", "nests"]
+__all__ = ["Placed", "Sheet", "lay_out", "nests", "taken_by"]
 
 Vector = NDArray[np.float64]
 
@@ -42,6 +42,12 @@ def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
     return [garment.all_sizes(piece.name) for piece in first]
 
 
+def taken_by(group: Sequence[DraftedPiece]) -> Vector:
+    """#P by 2 [m], the cut lines of pieces that lie upon each other, and the corners of a label beside them."""
+    label = nest_label(group)
+    return np.concatenate([*(piece.cut_line for piece in group), *([] if label.leader is None else [label.box])])
+
+
 def lay_out(
     groups: Sequence[tuple[DraftedPiece, ...]],
     *,
@@ -61,7 +67,7 @@ def lay_out(
     """
     boxes = []
     for group in groups:
-        points = np.concatenate([piece.cut_line for piece in group])
+        points = taken_by(group)
         boxes.append((points.min(axis=0), points.max(axis=0)))
     extents = [high - low for low, high in boxes] + ([np.array(reserved)] if reserved is not None else [])
     rows = _rows(extents, width, gap)

@@ -127,7 +127,6 @@ def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
         grain=_back(_points(data["grain"]), frame),
         holes=holes,
     )
-    label = data["label"]
     return DraftedPiece(
         piece=piece,
         frame=frame,
@@ -151,16 +150,28 @@ def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
         cutouts=cutouts,
         fisheyes={key: _points(line) for key, line in data["fisheye_darts"].items()},
         grain=_points(data["grain"]),
-        label=Label(at=np.array(label["at"]), lines=tuple(zip(label["lines"], label["heights"], strict=True))),
+        label=_label(data["label"]),
         notes=tuple(data["notes"]),
     )
 
 
+def _label(data: Mapping[str, Any]) -> Label:
+    leader = data.get("leader")
+    return Label(
+        at=np.array(data["at"]),
+        lines=tuple(zip(data["lines"], data["heights"], strict=True)),
+        angle=data.get("angle", 0.0),
+        leader=None if leader is None else _points(leader),
+    )
+
+
 def _cutout(data: Mapping[str, Any], name: str) -> DraftedCutout:
+    """Files that say nothing of allowances around holes are from when these had none: cut on the sewing line."""
+    line = data["cutouts"][name]
     return DraftedCutout(
-        sew_line=_points(data["cutout_sew_lines"][name]),
-        cut_line=_points(data["cutouts"][name]),
-        width=data["cutout_allowances"][name],
+        sew_line=_points(data.get("cutout_sew_lines", {}).get(name, line)),
+        cut_line=_points(line),
+        width=data.get("cutout_allowances", {}).get(name, 0.0),
     )
 
 
