@@ -9,7 +9,8 @@ import pytest
 import shapely
 
 from warpflat.errors import InputError
-from warpflat.pattern import Garment, draft_garment
+from warpflat.export.svg import write_marker_svg
+from warpflat.pattern import Edge, Garment, Hole, Piece, draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfolded
 from warpflat.pattern.sample import sample_dress
@@ -67,6 +68,43 @@ def test_utilisation_is_area_over_cloth(marker):
     area = sum(shapely.Polygon(c.cut_line).area for c in plan.placements)
     assert plan.utilisation == pytest.approx(area / (plan.length * plan.width))
     assert 0.6 < plan.utilisation < 1.0
+
+
+def frame(name, width, height, rim, *, fold=False):
+    """A piece with a hole `rim` [m] from its border."""
+    corners = np.array([(0, 0), (width, 0), (width, height), (0, height), (0, 0)])
+    edges = [Edge(name=f"e{i}", points=corners[i : i + 2]) for i in range(4)]
+    if fold:
+        edges[3] = Edge(name="fold", points=corners[3:], kind="fold")
+    hole = np.array([(rim, rim), (width - rim, rim), (width - rim, height - rim), (rim, height - rim)])
+    return Piece(name=name, edges=edges, holes=[Hole(name="hole", points=hole, allowance=0.0)])
+
+
+@pytest.mark.parametrize("fold", [False, True])
+def test_what_is_cut_out_is_drawn_and_is_not_used(fold, tmp_path):
+    garment = Garment(name="g", pieces={"": [frame("rim", 0.4, 0.5, 0.08, fold=fold)]})
+    plan = make_marker(draft_garment(garment), Cloth(width=1.4), seconds=1)
+    (copy,) = plan.placements
+    halves = 1 + fold
+    used = halves * ((0.40 + (0.01 if fold else 0.02)) * 0.52 - 0.24 * 0.34)
+    assert plan.utilisation * plan.length * plan.width == pytest.approx(used, rel=1e-3)
+    assert len(copy.cutouts) == halves
+    for line in copy.cutouts:
+        assert shapely.Polygon(copy.cut_line).contains(shapely.Polygon(line))
+        assert not shapely.Polygon(line).intersects(shapely.Polygon(copy.name.box))
+    write_marker_svg(plan, tmp_path / "m.svg")
+    assert (tmp_path / "m.svg").read_text().count('class="cutout"') == halves
+
+
+def test_names_stay_on_their_pieces():
+    long = frame("front_facing_of_the_placket", 0.3, 0.2, 0.03)
+    narrow = Piece(name="side panel.left", edges=frame("n", 0.04, 0.5, 0.01).edges)
+    plan = make_marker(draft_garment(Garment(name="g", pieces={"": [long, narrow]})), Cloth(width=1.0), seconds=1)
+    for copy in plan.placements:
+        cloth = shapely.Polygon(copy.cut_line, copy.cutouts)
+        assert cloth.covers(shapely.Polygon(copy.name.box))
+        assert not shapely.Polygon(copy.name.box).intersects(shapely.LineString(copy.grain))
+        assert copy.name.height > 0.006
 
 
 def test_a_half_on_the_fold_is_cut_whole(dress):

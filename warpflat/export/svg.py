@@ -196,23 +196,20 @@ class SvgPage:
         """Add one placed copy of a marker."""
         key = self._id(f"copy{index}-{copy.label}")
         group = ET.SubElement(self.root, "g", {"id": key, "data-piece": copy.piece.name, "data-size": copy.piece.size})
+        ET.SubElement(group, "title").text = copy.label
         self.stroke(group, Stroke(role="cut", name="cut", points=copy.cut_line, closed=True), key)
         group[-1].set("style", "fill: #f3efe6")
+        for line in copy.cutouts:
+            self.stroke(group, Stroke(role="cutout", name="", points=line, closed=True), key)
+            group[-1].set("style", "fill: #ffffff")
         for line in copy.fold_lines:
             self.stroke(group, Stroke(role="internal", name="", points=line), key)
         for line in copy.notches:
             self.stroke(group, Stroke(role="notch", name="", points=line), key)
         for stroke in grain_strokes(copy.grain):
             self.stroke(group, stroke, key)
-        texts = [
-            copy.piece.name.replace("_", " "),
-            f"size {copy.piece.size}" if copy.piece.size else "",
-            "mirrored" if copy.mirrored else "",
-        ]
-        for row, text in enumerate(t for t in texts if t):
-            height = 0.012 if row == 0 else 0.009
-            at = copy.label_at - [0, 0.016 * row - 0.008]
-            self.words(group, Words(text=text, at=at, height=height, bold=row == 0))
+        for words in [] if copy.name is None else copy.name.words():
+            self.words(group, words)
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the document; the file appears whole or not at all."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.pattern.label import Label, fit_label
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
@@ -18,6 +19,9 @@ Vector = NDArray[np.float64]
 
 #: Copies are nested as polygons that are larger by up to this [m], with far fewer corners.
 SIMPLER = 1e-3
+#: Height of capitals [m] of a copy's name and of what else is said of it, the least share of it, and the distances [m]
+#: that they keep from lines, the second where there is little room.
+NAME, MORE, LEAST, CLEARANCES = 0.012, 0.009, 0.1, (0.004, 0.001)
 #: Two placed copies may touch, but not share more than this area [m2].
 OVERLAP = 1e-8
 
@@ -49,7 +53,8 @@ class Cloth:
 class Copy:
     """One copy on the cloth, all lines placed [m]: warp along x, `matrix` 2 by 3 from the drafted piece.
 
-    A half on the fold is whole here: cut line and notches of both halves, `fold_lines` where they meet.
+    A half on the fold is whole here: cut line, cutouts and notches of both halves, `fold_lines` where they meet.
+    `name` says which piece it is, where it has room on it; None where it has none.
     """
 
     piece: DraftedPiece
@@ -57,9 +62,10 @@ class Copy:
     turned: bool
     matrix: Vector
     cut_line: Vector
+    cutouts: tuple[Vector, ...]
     fold_lines: tuple[Vector, ...]
     grain: Vector
-    label_at: Vector
+    name: Label | None
     notches: tuple[Vector, ...]
 
     @property
@@ -80,10 +86,13 @@ class Marker:
 
     @property
     def utilisation(self) -> float:
-        """Area of the pieces over the area of the cloth that they take."""
+        """Area of the pieces over the area of the cloth that they take: cloth that is cut out of a piece is waste."""
         import shapely
 
-        used = sum(float(shapely.Polygon(copy.cut_line).area) for copy in self.placements)
+        used = sum(
+            float(shapely.Polygon(copy.cut_line).area) - sum(float(shapely.Polygon(c).area) for c in copy.cutouts)
+            for copy in self.placements
+        )
         return used / (self.width * self.length)
 
 
@@ -118,7 +127,7 @@ def make_marker(
         tries.append([(piece, False) for piece, _ in copies])
     share = max(1, seconds // len(tries))
     plans = [_nest(garment.name, plan, cloth, share, seed) for plan in tries]
-    placements = min(plans, key=_length)
+    placements = [_named(copy) for copy in min(plans, key=_length)]
     marker = Marker(
         name=garment.name,
         fabric=fabric,
@@ -209,11 +218,15 @@ def _mirror(edge: DraftedEdge) -> Callable[[Vector], Vector]:
 
 
 def _slits(piece: DraftedPiece) -> list[Vector]:
-    """Every notch of the whole piece, 2 by 2 [m], from the cut line inwards."""
-    slits = [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
+    """Every notch, 2 by 2 [m], from the cut line inwards."""
+    return [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
+
+
+def _of_both_halves(piece: DraftedPiece, lines: list[Vector]) -> list[Vector]:
+    """Lines (#P by 2 [m]) of a piece, and of a half on the fold their mirror images."""
     for edge in piece.fold_edges:
-        slits += [_mirror(edge)(slit) for slit in slits]
-    return slits
+        lines = lines + [_mirror(edge)(line) for line in lines]
+    return lines
 
 
 def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:
@@ -266,8 +279,27 @@ def _placed(
         turned=abs(np.cos(angle) + 1) < 1e-6,
         matrix=matrix,
         cut_line=moved(unfolded(piece)),
+        cutouts=tuple(moved(line) for line in _of_both_halves(piece, [c.cut_line for c in piece.cutouts.values()])),
         fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
         grain=moved(piece.grain),
-        label_at=moved(piece.label.at[None])[0],
-        notches=tuple(moved(slit) for slit in _slits(piece)),
+        name=None,
+        notches=tuple(moved(slit) for slit in _of_both_halves(piece, _slits(piece))),
     )
+
+
+def _named(copy: Copy) -> Copy:
+    """With its name in the room between its lines."""
+    import shapely
+
+    piece = copy.piece
+    rows = [(piece.name.replace("_", " "), NAME)]
+    rows += [(f"size {piece.size}", MORE)] if piece.size else []
+    rows += [("mirrored", MORE)] if copy.mirrored else []
+    lines = [*copy.fold_lines, copy.grain, *copy.notches]
+    for clearance in CLEARANCES:
+        keep_off = [shapely.LineString(line).buffer(clearance) for line in lines]
+        keep_off += [shapely.Polygon(line).buffer(clearance) for line in copy.cutouts]
+        room = shapely.Polygon(copy.cut_line).buffer(-clearance).difference(shapely.union_all(keep_off))
+        if (name := fit_label(room, rows, least=LEAST)) is not None:
+            break
+    return replace(copy, name=name)
