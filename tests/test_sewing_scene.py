@@ -122,7 +122,20 @@ def test_a_contradiction_is_a_warning_that_names_it(tmp_path: Path):
     asked = [{"line": "bust", "length_mm": 300}, {"line": "bust", "length_mm": 310}]
     result = run_scene(scene(BODICE, constraints=asked, relax={"max_steps": 3000}), tmp_path)
     assert not result.metrics["sewing"]["converged"]
-    assert any("trial.bust length 310 mm is amiss by" in line for line in warnings_of(result.metrics))
+    assert result.metrics["sewing"]["contradictory"]
+    told = warnings_of(result.metrics)
+    assert any("trial.bust length 310 mm is amiss by" in line for line in told)
+    assert any("its seams and constraints ask for more than it can give" in line for line in told)
+    assert not any("raise max_steps" in line for line in told), "more steps end at the same one"
+
+
+def test_a_limit_that_is_too_low_is_told_apart_from_a_contradiction(tmp_path: Path):
+    result = run_scene(
+        scene(BODICE, constraints=[{"line": "bust", "length_mm": 300}], relax={"max_steps": 45}), tmp_path
+    )
+    assert not result.metrics["sewing"]["converged"]
+    assert not result.metrics["sewing"]["contradictory"]
+    assert any("raise max_steps" in line for line in warnings_of(result.metrics))
 
 
 @pytest.mark.parametrize(

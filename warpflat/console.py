@@ -133,12 +133,14 @@ def _price(joules: float | None) -> str:
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     """One line for each piece that did not converge or has flipped faces."""
     lines = []
+    given_up = metrics.get("sewing", {}).get("contradictory", False)
     for name, piece in metrics["pieces"].items():
         last = piece["stages"][-1]
         if not _converged(piece):
+            asked = given_up and last["name"] == "sew"
+            way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
             lines.append(
-                f"{name} did not converge within {_work(last)} ({_left(last)}); "
-                "the pattern is not final: raise max_steps"
+                f"{name} did not converge within {_work(last)} ({_left(last)}); the pattern is not final: {way_out}"
             )
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")

@@ -93,6 +93,7 @@ class Sewn:
     Attributes:
         pieces: by name, relaxed together.
         converged: whether all came to rest with the seams' sides equal and the constraints kept.
+        contradictory: whether it ended since seams and constraints came no nearer to agreeing: more steps do not help.
         steps: approximate implicit steps over all pieces.
         energy_before, energy_after: of all pieces, springs and guard [J].
         held: every seam, fold and constraint with its price, in the order in which they were given.
@@ -101,6 +102,7 @@ class Sewn:
 
     pieces: Mapping[str, Flattening]
     converged: bool
+    contradictory: bool
     steps: int
     energy_before: float
     energy_after: float
@@ -111,6 +113,7 @@ class Sewn:
         """As in `metrics.json`."""
         return {
             "converged": self.converged,
+            "contradictory": self.contradictory,
             "steps": self.steps,
             "seconds": self.seconds,
             "energy_before_j": self.energy_before,
@@ -173,13 +176,14 @@ def sew(
     # A piece with a guided line needs no other hold: the line cannot turn.
     upright = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
     state = Relaxation(network, options, start=start, upright=upright)
-    outcome, misses, kept = _relax_in_rounds(state, ties, options)
+    outcome, misses, kept, contradictory = _relax_in_rounds(state, ties, options)
     seconds = time.perf_counter() - begun
     converged = outcome.converged and kept
     sewn = whole.split(state, converged=converged, seconds=seconds, residual=outcome.residual)
     return Sewn(
         pieces=sewn,
         converged=converged,
+        contradictory=contradictory,
         steps=state.steps,
         energy_before=sum(_energy(piece.network, piece.positions) for piece in pieces.values()),
         energy_after=sum(_energy(piece.network, piece.positions) for piece in sewn.values()),
@@ -217,12 +221,12 @@ def _ties(
     return join_ties(ties), kinds, laid
 
 
-def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tuple[Outcome, FloatArray, bool]:
+def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tuple[Outcome, FloatArray, bool, bool]:
     """Relax, let the offsets grow, and again until all is at rest and the ties agree, twice in a row, since within the tolerances the
-    energy still changes; the outcome of the last round, the misses (#P [m]), and whether they agree."""
+    energy still changes; the outcome of the last round, the misses (#P [m]), whether they agree, and whether they contradict each other."""
     seams = state.network.seams
     if seams is None:
-        return relax(state), np.zeros(0), True
+        return relax(state), np.zeros(0), True, False
     amiss: list[float] = []
     while True:
         steps = _ROUND + len(amiss) // _LONGER * _ROUND // 4
@@ -230,8 +234,9 @@ def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tu
         outcome, misses = relax(state), _misses(state)
         amiss.append(ties.amiss(misses))
         done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
-        if done or _contradict(amiss) or state.steps >= options.max_steps:
-            return outcome, misses, amiss[-1] <= 1.0
+        contradictory = not done and _contradict(amiss)
+        if done or contradictory or state.steps >= options.max_steps:
+            return outcome, misses, amiss[-1] <= 1.0, contradictory
         seams.offset.assign(seams.offset.numpy() + np.where(ties.soft > 0, 0.0, misses))
 
 
