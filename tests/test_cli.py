@@ -231,7 +231,8 @@ def test_units_are_asked_for_and_checked(warpflat: Run):
         (["--frames", "-3"], "output.frames: should be greater than or equal to 0"),
         (["--component", "7"], "7"),
         (["--component", "large"], "component"),
-        (["--name", "a/b"], "name: .*should match pattern"),
+        (["--name", "a/b"], "name: 'a/b' cannot name files: .*only spaces and _ . -; 'a_b' would do"),
+        (["--name", "Ärmel links"], "name: 'Ärmel links' cannot name files: .*; 'Armel links' would do"),
         (["--device", "cuda:99"], "device|cuda:99"),
         (["--fabric-file", "none.toml"], "none.toml: no such file"),
         (["--untis", "m"], "'--untis'.*'--units'"),
@@ -241,6 +242,17 @@ def test_wrong_options_are_told_in_one_line(warpflat: Run, options: list[str], m
     Path("cloth.obj").write_text(SQUARE)
     told = mistake(warpflat("flatten", "cloth.obj", "--units", "m", *options))
     assert re.search(message, told), told
+
+
+@pytest.mark.parametrize(
+    ("file", "piece"),
+    [("Ärmel.obj", "Armel"), ("Łokieć (1).obj", "Lokiec_1"), ("Maß-Rücken.obj", "Mass-Rucken"), ("袖.obj", "piece")],
+)
+def test_a_file_names_its_piece_without_accents(warpflat: Run, file: str, piece: str):
+    Path(file).write_text(SQUARE)
+    code, _, _ = warpflat("flatten", file, "--units", "m", "--frames", "0", "--no-picture")
+    assert code == 0
+    assert (Path("out") / piece / f"{piece}.obj").exists()
 
 
 @pytest.mark.parametrize("value", ["0", "-100", "nan", "1e99", '"soft"'])

@@ -376,6 +376,16 @@ def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):
     assert "\n" not in str(caught.value)
 
 
+def test_a_size_of_a_pattern_without_sizes_is_told(tmp_path: Path):
+    corners = np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])
+    border = [Edge(name=f"e{i}", points=0.3 * corners[i : i + 2]) for i in range(4)]
+    drafted = as_garment(Piece(name="plain", edges=border))
+    (tmp_path / "pattern.json").write_text(json.dumps(pattern_json(drafted)))
+    for kind in ("dxf", "svg", "pdf"):
+        with pytest.raises(InputError, match="garment 'p' has no sizes: it is not graded"):
+            export_pattern(tmp_path, kind, sizes=["EU 38"])
+
+
 def test_a_folder_without_a_pattern_and_unknown_formats(tmp_path: Path):
     with pytest.raises(InputError, match="no such file"):
         export_pattern(tmp_path, "svg")

@@ -18,6 +18,7 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
+from warpflat.words import plain_letters
 
 if TYPE_CHECKING:
     from warpflat.scene import Scene
@@ -524,6 +525,6 @@ def _run(
 
 
 def _safe_name(mesh: Path) -> str:
-    """The file's name as a name for a piece and its files."""
-    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", mesh.stem).strip("_.-")
+    """The file's name as a name for a piece and its files: "Ärmel (1).obj" gives "Armel_1"."""
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-")
     return name or "piece"

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
@@ -49,6 +49,7 @@ from warpflat.surface import (
 )
 from warpflat.surface.border import SIDES
 from warpflat.toml_file import Table, check_table, read_toml
+from warpflat.words import checked_name
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening, Progress
@@ -78,7 +79,7 @@ _VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}|\$([A-Za-z_][A-Za-z0-9_]
 class SceneTable(Table):
     """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
 
-    name: Annotated[str, Field(pattern=r"^[A-Za-z0-9][A-Za-z0-9 _.-]*$", max_length=100)] | None = None
+    name: Annotated[str, Field(max_length=100), AfterValidator(checked_name)] | None = None
     fabric: Annotated[
         Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
         Discriminator(text_or_table),

@@ -11,7 +11,6 @@ from __future__ import annotations
 import logging
 import os
 import re
-import unicodedata
 from collections.abc import Sequence
 from datetime import datetime
 from typing import TYPE_CHECKING
@@ -27,6 +26,7 @@ from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
+from warpflat.words import plain_letters
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -124,8 +124,7 @@ def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
 
 def _ascii(text: str) -> str:
     """The standards allow 7 bits only: accents are dropped, what remains becomes "?"."""
-    plain = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
-    return "".join(c for c in plain if not unicodedata.combining(c)).encode("ascii", "replace").decode("ascii")
+    return plain_letters(text).encode("ascii", "replace").decode("ascii")
 
 
 def _is_written(name: str) -> bool:

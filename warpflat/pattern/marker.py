@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label
+from warpflat.pattern.pieces import unknown_size
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
@@ -233,7 +234,7 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
     copies = []
     for size, count in sizes.items():
         if size not in garment.pieces:
-            raise InputError(f"no size {size!r} in {garment.name!r}; {nearest(size, garment.pieces)}")
+            raise unknown_size(garment.name, size, garment.pieces)
         if count < 1:
             raise InputError(f"{count} garments of size {size}; it must be 1 or more")
         for piece in garment.pieces[size]:

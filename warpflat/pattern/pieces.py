@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -11,7 +11,18 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError, nearest
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
-__all__ = ["DEFAULT_ALLOWANCE", "EDGE_KINDS", "Dart", "Edge", "Garment", "Hole", "Piece", "Seam", "SeamSide"]
+__all__ = [
+    "DEFAULT_ALLOWANCE",
+    "EDGE_KINDS",
+    "Dart",
+    "Edge",
+    "Garment",
+    "Hole",
+    "Piece",
+    "Seam",
+    "SeamSide",
+    "unknown_size",
+]
 
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
@@ -275,9 +286,7 @@ class Garment:
                     raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
             self._check_seams(size)
         if self.sample_size is not None and self.sample_size not in self.pieces:
-            raise InputError(
-                f"garment {self.name!r} has no size {self.sample_size!r}; {nearest(self.sample_size, self.pieces)}"
-            )
+            raise unknown_size(self.name, self.sample_size, self.pieces)
         seen = [seam.name for seam in self.seams]
         if len(set(seen)) < len(seen):
             raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")
@@ -305,7 +314,7 @@ class Garment:
     def piece(self, name: str, size: str) -> Piece:
         """The piece of that name and size; InputError with the nearest name otherwise."""
         if size not in self.pieces:
-            raise InputError(f"garment {self.name!r} has no size {size!r}; {nearest(size, self.pieces)}")
+            raise unknown_size(self.name, size, self.pieces)
         for piece in self.pieces[size]:
             if piece.name == name:
                 return piece
@@ -314,6 +323,13 @@ class Garment:
     def __iter__(self) -> Iterator[Piece]:
         for pieces in self.pieces.values():
             yield from pieces
+
+
+def unknown_size(garment: str, size: str, sizes: Iterable[str]) -> InputError:
+    """For a size that is asked for and not there."""
+    if tuple(sizes) == ("",):
+        return InputError(f"garment {garment!r} has no sizes: it is not graded; leave {size!r} out")
+    return InputError(f"garment {garment!r} has no size {size!r}; {nearest(size, sizes)}")
 
 
 def _points(points: ArrayLike, where: str, *, at_least: int) -> NDArray[np.float64]:
