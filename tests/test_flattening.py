@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+from typing import Any
 
 import hypothesis
 import numpy as np
@@ -14,7 +17,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 import warpflat
+from warpflat.batch import flatten_all
 from warpflat.compare import laid_upon
+from warpflat.edits import change_fabric, change_surface
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, Progress, flatten
@@ -480,3 +485,41 @@ def test_steep_ones_on_needles_stay_unfolded_even_where_they_do_not_converge(see
     piece = flatten(surface, fabric=cloth(shear), device="cpu", relax=RelaxOptions(max_steps=600))
     assert piece.flipped_faces == 0
     assert np.isfinite(piece.positions).all()
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"relax": 3}, r"relax is of type int; it must be a RelaxOptions"),
+        ({"relax": {"max_steps": 9}}, r"relax is of type dict; it must be a RelaxOptions"),
+        ({"relax": RelaxOptions(max_steps=0)}, "max_steps"),
+        ({"wear": 0.1}, r"wear is of type float; it must be a Wear"),
+        ({"callback": 3}, r"callback is of type int; it must be a function, or None"),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_one_line(options: dict[str, Any], message: str):
+    dome = make_shape("dome", resolution=5)
+    flat = flatten(dome)
+    calls: list[Callable[[], object]] = [lambda: flatten(dome, **options), lambda: flatten_all([dome], **options)]
+    if "wear" not in options:
+        calls += [lambda: change_fabric(flat, "denim", **options), lambda: change_surface(flat, dome, **options)]
+    for call in calls:
+        with pytest.raises(InputError, match=message) as caught:
+            call()
+        assert "\n" not in str(caught.value)
+
+
+def test_what_is_no_surface_and_no_pattern_is_one_line():
+    dome = make_shape("dome", resolution=5)
+    wrong: list[tuple[Callable[..., object], tuple[Any, ...], str]] = [
+        (flatten, (3,), "surface is of type int; it must be a Surface or the path of a mesh file"),
+        (flatten_all, (3,), "surfaces is of type int; it must be a list"),
+        (flatten_all, ("front.obj",), "surfaces is of type str; it must be a list"),
+        (flatten_all, ([dome, None],), r"surfaces\[1\] is of type NoneType; it must be a Surface"),
+        (partial(flatten_all, datum=3), ([dome],), "datum is of type int; it must be a list"),
+        (change_fabric, (dome, "denim"), "result is of type Surface; it must be a Flattening"),
+        (change_surface, (None, dome), "result is of type NoneType; it must be a Flattening"),
+    ]
+    for call, arguments, message in wrong:
+        with pytest.raises(InputError, match=message):
+            call(*arguments)

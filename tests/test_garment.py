@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -201,3 +202,18 @@ def test_a_wrong_body_or_form_is_one_line(tmp_path: Path, text: str, message: st
     with pytest.raises(InputError, match=message) as caught:
         run_scene(load_scene(path), tmp_path / "out")
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "message"),
+    [
+        ({"form": 3}, "form is of type int; it must be what Mannequin.form gives"),
+        ({"mannequin": None}, "mannequin is of type NoneType; it must be a Mannequin"),
+        ({"wishes": "side"}, "wishes is of type str; it must be a list"),
+        ({"constraints": ["x"]}, r"constraints\[0\] is of type str; it must be a Straight, FixedLength or Symmetric"),
+        ({"callback": 3}, "callback is of type int"),
+    ],
+)
+def test_arguments_of_a_wrong_type_are_one_line(block: Garment, wrong: dict[str, Any], message: str):
+    with pytest.raises(InputError, match=message):
+        flatten_form(**{"mannequin": block.mannequin, "form": block.form, **wrong})

@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from functools import partial
+from os import PathLike
 from pathlib import Path
 
 from numpy.typing import ArrayLike
 
-from warpflat.errors import InputError
+from warpflat.errors import InputError, expect_callback, expect_each
 from warpflat.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flattening import Flattening, Progress, Started, check_settings, finish, start
+from warpflat.flattening import Flattening, Progress, Started, check_settings, finish, given_surface, start
 from warpflat.membrane import Model
 from warpflat.relax import RelaxOptions
-from warpflat.surface import Surface, read_surface
+from warpflat.surface import Surface
 from warpflat.tightness import Wear
 
 __all__ = ["flatten_all"]
@@ -52,8 +53,12 @@ def flatten_all(
     Raises:
         InputError: a piece cannot be flattened; one line says which, and why.
     """
+    expect_each(surfaces, (Surface, str, PathLike), "surfaces", "a Surface or the path of a mesh file")
+    expect_callback(callback)
     count = len(surfaces)
     named = datum is None or isinstance(datum, str)
+    if not named:
+        expect_each(datum, object, "datum", "for one surface, or one name for all")
     datums: Sequence[str | ArrayLike | None] = [datum] * count if named else list(datum)  # type: ignore[arg-type, list-item]
     if len(datums) != count:
         raise InputError(
@@ -62,7 +67,7 @@ def flatten_all(
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
 
     def started(number: int, surface: Surface | str | Path) -> Started:
-        own = surface if isinstance(surface, Surface) else read_surface(surface, units=units)
+        own = given_surface(surface, units)
         try:
             return start(own, datums[number], settings, None if callback is None else partial(callback, number))
         except InputError as error:

@@ -21,7 +21,7 @@ from warpflat.edits import relax_cut
 from warpflat.errors import InputError, nearest
 from warpflat.flattening import Flattening, Progress
 from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions
+from warpflat.relax import Relaxation, RelaxOptions, given_options
 from warpflat.strain import strain_energy
 from warpflat.surface.cut import Cut, Seam, cut_along_many
 from warpflat.surface.dart import dart_measure
@@ -141,7 +141,7 @@ def cut(
         positions,
         stage=f"cut:{plan.name}",
         cuts=made.cuts,
-        options=relax or RelaxOptions(),
+        options=given_options(relax),
         callback=callback,
     )
 
@@ -334,7 +334,7 @@ def move_dart(
         positions,
         stage=f"close:{close}",
         cuts=made.cuts,
-        options=relax or RelaxOptions(),
+        options=given_options(relax),
         callback=callback,
     )
     return DartMove(

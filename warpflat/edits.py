@@ -14,11 +14,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
-from warpflat.errors import InputError
+from warpflat.errors import InputError, expect, expect_callback
 from warpflat.fabric import Fabric, as_fabric
 from warpflat.flattening import Flattening
 from warpflat.progress import Progress
-from warpflat.relax import RelaxOptions
+from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Run, relax_runs
 from warpflat.surface import Surface, degenerate_faces
 from warpflat.surface.mend import checked_positions
@@ -51,8 +51,9 @@ def change_fabric(
     Raises:
         InputError: an unknown fabric or an option out of its bounds.
     """
+    expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     cloth = as_fabric(fabric)
-    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", relax or RelaxOptions(), callback)
+    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback)
     return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
 
 
@@ -78,7 +79,9 @@ def change_surface(
     Raises:
         InputError: the mesh is another one, a vertex is not finite, a face has collapsed, or an option out of its bounds.
     """
-    before = result.surface
+    expect(result, Flattening, "result", "a Flattening, as flatten gives it")
+    before, options = result.surface, given_options(relax)
+    expect_callback(callback)
     # What the faces tell is known of the ones before.
     surface = replace(_moved(before, surface), faces=before.faces, of_faces=before.of_faces)
     cut = result.network.surface
@@ -94,7 +97,7 @@ def change_surface(
             input_index=surface.input_index[origin],
         )
     inherit_levels(moved, cut)
-    run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", relax or RelaxOptions(), callback)
+    run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     gone_on = _gone_on(result, run, result.positions, measure_again=run.directions_matter())
     return replace(gone_on, surface=surface, cuts=cuts)
@@ -173,7 +176,7 @@ def _later_run(
     callback: Callable[[Progress], None] | None,
 ) -> Run:
     """A run that goes on from a result."""
-    options.validate()
+    expect_callback(callback)
     datum = result.datum
     if surface is not result.surface:
         # A cut may part the datum: then the first part of it stays upright.

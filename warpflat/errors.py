@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
-__all__ = ["InputError", "nearest"]
+__all__ = ["InputError", "expect", "expect_callback", "expect_each", "nearest"]
 
 
 class InputError(ValueError):
@@ -13,6 +13,50 @@ class InputError(ValueError):
 
     The command line prints it and exits with code 2; scripts catch it as a ``ValueError``.
     """
+
+
+def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
+    """See that an argument is of the type that it must be.
+
+    Args:
+        value: what was given.
+        kind: the type, or several.
+        name: of the argument.
+        right: what would be right, in words.
+
+    Raises:
+        InputError: it is of another type.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name} is of type {type(value).__name__}; it must be {right}")
+
+
+def expect_each(values: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
+    """See that an argument is a list of what it must hold.
+
+    Args:
+        values: what was given.
+        kind: the type of each, or several.
+        name: of the argument.
+        right: what each must be, in words.
+
+    Raises:
+        InputError: it is no list, or one of its entries is of another type.
+    """
+    if isinstance(values, (str, bytes)) or not isinstance(values, Collection):
+        raise InputError(f"{name} is of type {type(values).__name__}; it must be a list, each of its entries {right}")
+    for number, value in enumerate(values):
+        expect(value, kind, f"{name}[{number}]", right)
+
+
+def expect_callback(callback: object) -> None:
+    """See that a callback can be called, or is None.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if callback is not None and not callable(callback):
+        raise InputError(f"callback is of type {type(callback).__name__}; it must be a function, or None")
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:

@@ -7,6 +7,7 @@ from collections.abc import Callable, Sequence
 from contextlib import nullcontext
 from dataclasses import dataclass
 from functools import cached_property
+from os import PathLike
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,12 +18,12 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.coarsen import levels_meanwhile
 from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, choose_datum, develop
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
-from warpflat.relax import RelaxOptions
+from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Relaxed, Run, relax_runs
 from warpflat.strain import LayoutErrors, WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
@@ -227,10 +228,22 @@ def flatten(
     Raises:
         InputError: what was given cannot be flattened; one line says what, where, and what would be right.
     """
-    if not isinstance(surface, Surface):
-        surface = read_surface(surface, units=units)
+    surface = given_surface(surface, units)
+    expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
     return finish([start(surface, datum, settings, callback)])[0]
+
+
+def given_surface(surface: Surface | str | Path, units: str | None) -> Surface:
+    """The surface, read if it is a file's path.
+
+    Raises:
+        InputError: it is neither, or cannot be read.
+    """
+    if isinstance(surface, Surface):
+        return surface
+    expect(surface, (str, PathLike), "surface", "a Surface or the path of a mesh file")
+    return read_surface(surface, units=units)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -260,8 +273,9 @@ def check_settings(
         InputError: an unknown name, or a number out of its bounds.
     """
     cloth = as_fabric(fabric)
-    options = relax or RelaxOptions()
-    options.validate()
+    options = given_options(relax)
+    if wear is not None:
+        expect(wear, Wear, "wear", "a Wear, of warpflat.tightness")
     angle = np.asarray(grain_angle)
     if angle.ndim or angle.dtype.kind not in "iuf" or not np.isfinite(angle):
         raise InputError(f"grain_angle = {grain_angle!r} is not a number of degrees")

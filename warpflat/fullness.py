@@ -21,7 +21,7 @@ from warpflat.flattening import Flattening
 from warpflat.membrane import step_matrix
 from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
-from warpflat.relax import Relaxation, RelaxOptions, relax
+from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
 from warpflat.springs import SpringArrays, with_stiffness
 from warpflat.strain import strain_energy
 from warpflat.surface.topology import border_loops, mesh_edges
@@ -60,7 +60,7 @@ def give_fullness(
         plain: vertices along each of its edges that are sewn without fullness.
         options: of the relaxation.
     """
-    options = options or RelaxOptions()
+    options = given_options(options)
     full = fullness_of(piece, edges, plain)
     network = _widened(piece.network, piece.positions, full)
     warp, weft = grain_axes(piece.grain_angle)

@@ -11,8 +11,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.batch import flatten_all
-from warpflat.constraints import Constraint
-from warpflat.errors import InputError, nearest
+from warpflat.constraints import Constraint, FixedLength, Straight, Symmetric
+from warpflat.errors import InputError, expect, expect_callback, expect_each, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening import Flattening, Progress
 from warpflat.fullness import FullEdge, give_fullness
@@ -188,6 +188,11 @@ def flatten_form(
     Raises:
         InputError: a piece cannot be flattened, or a wish or constraint names what there is not; one line says which and why.
     """
+    expect(form, FormResult, "form", "what Mannequin.form gives")
+    expect(mannequin, Mannequin, "mannequin", "a Mannequin")
+    expect_callback(callback)
+    expect_each(wishes, SeamWish, "wishes", "a SeamWish")
+    expect_each(constraints, (FixedLength, Straight, Symmetric), "constraints", "a Straight, FixedLength or Symmetric")
     wished = wished_seams(form, wishes)
     names = list(form.pieces)
 

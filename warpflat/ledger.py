@@ -15,7 +15,7 @@ from warpflat.darts import seam_kind
 from warpflat.edits import relax_cut
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening, Progress
-from warpflat.relax import RelaxOptions
+from warpflat.relax import RelaxOptions, given_options
 from warpflat.surface.dart import dart_measure, fish_eye_measure
 from warpflat.surface.paths import path_length
 
@@ -121,7 +121,7 @@ class Ledger:
 
 def coarse(options: RelaxOptions | None = None) -> RelaxOptions:
     """Options for ranking: tolerances ten times looser, and few steps."""
-    given = options or RelaxOptions()
+    given = given_options(options)
     return replace(
         given,
         energy_tolerance=_LOOSER * given.energy_tolerance,
@@ -308,7 +308,7 @@ def cut_automatically(
                 tried.positions,
                 stage=tried.stages[-1].name,
                 cuts=tried.cuts,
-                options=relax or RelaxOptions(),
+                options=given_options(relax),
                 callback=callback,
             )
         result = tried

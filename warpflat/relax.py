@@ -22,7 +22,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, expect, nearest
 from warpflat.joined import begins, join_networks
 from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
@@ -40,6 +40,7 @@ __all__ = [
     "Relaxation",
     "Solver",
     "Watch",
+    "given_options",
     "relax",
 ]
 
@@ -95,6 +96,19 @@ class RelaxOptions:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
         if self.solver not in SOLVERS:
             raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
+
+
+def given_options(options: RelaxOptions | None) -> RelaxOptions:
+    """The options of a relaxation, or those that it has if none are given.
+
+    Raises:
+        InputError: they are something else, or a value is out of its bounds.
+    """
+    if options is None:
+        return RelaxOptions()
+    expect(options, RelaxOptions, "relax", "a RelaxOptions, such as RelaxOptions(max_steps=5000)")
+    options.validate()
+    return options
 
 
 @dataclass

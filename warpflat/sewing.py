@@ -27,7 +27,7 @@ from warpflat.flattening import Flattening
 from warpflat.kernels.seams import compute_seam_misses
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions, relax
+from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
 from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together
 
@@ -159,7 +159,7 @@ def sew(
         InputError: a constraint names what there is not, or a piece cannot be laid with its fold straight.
     """
     begun = time.perf_counter()
-    options = options or RelaxOptions()
+    options = given_options(options)
     whole = Together(pieces)
     folds = folds or {}
     alone = np.concatenate([piece.positions for piece in pieces.values()])
