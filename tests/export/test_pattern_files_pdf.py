@@ -14,7 +14,7 @@ from PIL import Image
 from warpflat.errors import InputError
 from warpflat.export.pdf import PAPERS, write_pdf
 from warpflat.export.pdf_legend import LEGEND_SIZE, TEST_INCHES, TEST_MM
-from warpflat.pattern import draft_garment
+from warpflat.pattern import Edge, Garment, Piece, draft_garment
 from warpflat.pattern.sample import sample_dress
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
@@ -181,6 +181,37 @@ def test_the_same_pattern_gives_the_same_bytes(dress, tmp_path):
     for name in ("a.pdf", "b.pdf"):
         write_pdf(dress, tmp_path / name, sizes=["36", "38"])
     assert (tmp_path / "a.pdf").read_bytes() == (tmp_path / "b.pdf").read_bytes()
+
+
+@needs_poppler
+@pytest.mark.skipif(shutil.which("pdftotext") is None, reason="pdftotext (poppler) is not installed")
+def test_names_on_the_first_page_stay_on_it_and_on_their_pieces(tmp_path):
+    """By the boxes of words that poppler finds: what has no room in the overview is a number of the list above it."""
+    corners = np.array([(0, 0), (1, 0), (1, 1), (0, 1), (0, 0)])
+    shapes = {"tab_of_the_left_front": (0.01, 0.01), "front": (0.3, 0.6), "waistband_facing": (0.5, 0.05)}
+    pieces = [
+        Piece(name=name, edges=[Edge(name=f"e{i}", points=corners[i : i + 2] * size) for i in range(4)])
+        for name, size in shapes.items()
+    ]
+    name = "a_garment_with_a_name_that_is_far_too_long_for_the_width_of_the_page"
+    write_pdf(draft_garment(Garment(name=name, pieces={"": pieces})), tmp_path / "p.pdf")
+    told = subprocess.run(
+        ["pdftotext", "-f", "1", "-l", "1", "-bbox", str(tmp_path / "p.pdf"), "-"],
+        check=True,
+        capture_output=True,
+        text=True,
+    ).stdout
+    found = re.findall(r'<word xMin="(.*?)" yMin="(.*?)" xMax="(.*?)" yMax="(.*?)">(.*?)</word>', told)
+    right = (PAPERS["A4"].width - PAPERS["A4"].margin) / 0.0254 * 72
+    assert all(float(word[2]) < right for word in found)
+    words = [word[4] for word in found]
+    listed = words.index("facing:")
+    assert words[listed - 2 : listed] == ["3", "waistband"]
+    below = words[listed + 1 :]
+    assert "front" in below
+    assert "waistband" in below
+    assert "tab" not in below
+    assert "1" in below, "its number in the list"
 
 
 def test_unknown_paper_is_refused(dress, tmp_path):

@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from warpflat.export.svg import STYLE
 from warpflat.pattern.draft import DraftedGarment
-from warpflat.pattern.layout import Sheet
-from warpflat.pattern.lettering import BOLD, FONT
+from warpflat.pattern.label import fit_label
+from warpflat.pattern.layout import Placed, Sheet
+from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width
 from warpflat.words import counted
 
 if TYPE_CHECKING:
@@ -27,6 +28,8 @@ LEGEND_SIZE = (0.180, 0.128)
 TEST_MM, TEST_INCHES = 0.050, 2 * 0.0254
 
 POINT = 72 / 0.0254
+#: Height of capitals [m] of the names in the overview.
+NAME_HEIGHT = 0.00155
 
 _KEY = (
     ("cut", "cutting line"),
@@ -94,9 +97,10 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
         _text(canvas, float(low[0]), y, line, 7.5)
         y -= 0.0042
     pieces = next(iter(garment.pieces.values()))
-    for piece in pieces:
-        cut = next((text for text, _ in piece.label.lines if text.startswith("Cut ")), "")
-        _text(canvas, float(low[0]), y - 0.002, f"{piece.name.replace('_', ' ')}: {cut[0].lower() + cut[1:]}", 7.5)
+    for number, piece in enumerate(pieces, 1):
+        cut = next((text.replace("\n", " ") for text, _ in piece.label.lines if text.startswith("Cut ")), "")
+        entry = f"{number}  {piece.name.replace('_', ' ')}: {cut[:1].lower() + cut[1:]}"
+        _text(canvas, float(low[0]), y - 0.002, entry, 7.5)
         y -= 0.0042
     _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
     canvas.showPage()
@@ -121,19 +125,41 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
         canvas.drawString(*(name_at * POINT), tiling.name(row, column))
     canvas.setStrokeColor("#000000")
     canvas.setLineWidth(0.6)
-    for placed in sheet.placed:
+    for number, placed in enumerate(sheet.placed, 1):
         for piece in placed.pieces:
-            points = (origin + scale * (piece.cut_line + placed.offset)) * POINT
-            path = canvas.beginPath()
-            path.moveTo(*points[0])
-            for point in points[1:]:
-                path.lineTo(*point)
-            path.close()
-            canvas.drawPath(path)
-        middle = origin + scale * (placed.pieces[len(placed.pieces) // 2].label.at + placed.offset)
-        canvas.setFillColor("#000000")
-        canvas.setFont(FONT, 6)
-        canvas.drawCentredString(*(middle * POINT), placed.pieces[0].name.replace("_", " "))
+            for line in (piece.cut_line, *(cutout.cut_line for cutout in piece.cutouts.values())):
+                points = (origin + scale * (line + placed.offset)) * POINT
+                path = canvas.beginPath()
+                path.moveTo(*points[0])
+                for point in points[1:]:
+                    path.lineTo(*point)
+                path.close()
+                canvas.drawPath(path)
+        _name(canvas, placed, number, origin + scale * placed.offset, scale)
+
+
+def _name(canvas: Any, placed: Placed, number: int, origin: Vector, scale: float) -> None:
+    """The piece's name in what is drawn of it, or its number in the list above where there is no room."""
+    import shapely
+
+    piece = placed.pieces[len(placed.pieces) // 2]
+    holes = [shapely.Polygon(cutout.cut_line).buffer(0) for cutout in piece.cutouts.values()]
+    cloth = shapely.Polygon(piece.cut_line).buffer(-0.0005 / scale).difference(shapely.union_all(holes))
+    for text, least in ((piece.name.replace("_", " "), 0.7), (str(number), 0.5)):
+        label = fit_label(cloth, [(text, NAME_HEIGHT / scale)], least=least)
+        if label is not None:
+            break
+    else:
+        return
+    canvas.setFillColor("#000000")
+    for words in label.words():
+        canvas.saveState()
+        canvas.translate(*((origin + scale * words.at) * POINT))
+        canvas.rotate(np.degrees(words.angle))
+        size = words.height * scale * POINT / CAPITALS
+        canvas.setFont(FONT, size)
+        canvas.drawCentredString(0, -words.height * scale * POINT / 2, words.text)
+        canvas.restoreState()
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
@@ -155,6 +181,8 @@ def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: 
 
 
 def _text(canvas: Any, x: float, y: float, text: str, size: float, *, bold: bool = False) -> None:
+    """Smaller where it would be wider than the legend."""
+    wide = text_width(text, size * CAPITALS / POINT, bold=bold)
     canvas.setFillColor("#000000")
-    canvas.setFont(BOLD if bold else FONT, size)
+    canvas.setFont(BOLD if bold else FONT, size * min(1.0, LEGEND_SIZE[0] / max(wide, 1e-9)))
     canvas.drawString(x * POINT, y * POINT, text)

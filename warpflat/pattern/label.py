@@ -163,7 +163,7 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
     import shapely
 
     parts = sorted((p for p in shapely.get_parts(area) if p.geom_type == "Polygon"), key=lambda p: -p.area)[:6]
-    places = [place for part in parts if part.area > 1e-7 for place in _places(part)]
+    places = list(_places([part for part in parts if part.area > 1e-7]))
     best, reached = None, 0.0
     for label, harder in _ways(tuple(lines)):
         shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
@@ -205,17 +205,19 @@ def _corners(label: Label) -> Vector:
     return np.concatenate(corners)
 
 
-def _places(part: Polygon) -> Iterator[tuple[Polygon, Vector, float]]:
-    """The polygon, the centre of a widest ellipse in it, and the angle of lines along that: lying ones, then upright."""
+def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, Vector, float]]:
+    """Centres of widest ellipses with the polygon that they lie in and the angle of lines along them: those that lie
+    flat before those that stand, the roomiest first."""
     import shapely
     from shapely.affinity import scale
 
     for angle, axis in ((0.0, 0), (np.pi / 2, 1)):
         for ratio in ELLIPSES:
             squeeze = np.where(np.arange(2) == axis, ratio, 1.0)
-            squeezed = scale(part, *squeeze, origin=(0, 0))
-            circle = shapely.maximum_inscribed_circle(squeezed, 5e-4 * min(1.0, squeezed.length))
-            yield part, np.asarray(circle.coords[0]) / squeeze, angle
+            squeezed = [scale(part, *squeeze, origin=(0, 0)) for part in parts]
+            circles = [shapely.maximum_inscribed_circle(part, 5e-4 * min(1.0, part.length)) for part in squeezed]
+            for number in np.argsort([-circle.length for circle in circles], kind="stable"):
+                yield parts[number], np.asarray(circles[number].coords[0]) / squeeze, angle
 
 
 def _largest(part: Polygon, shape: Vector, at: Vector, floor: float) -> float:
