@@ -151,7 +151,7 @@ def test_a_hem_turned_up_covers_its_side_seams_exactly(slant):
     assert turned.symmetric_difference(above).area < 1e-7
 
 
-def dart_sides(depth, opening, lean, slope_left, slope_right, fold_to="left", width=0.01):
+def dart_sides(depth, opening, lean, slope_left, slope_right, fold_to="left", width=0.01, kind="seam"):
     """A block whose lower border has a dart; `lean` tilts the dart, the slopes tilt the border beside it."""
     tip = np.array([0.2, depth])
     left = tip + depth * np.array([np.sin(lean - opening / 2), -np.cos(lean - opening / 2)])
@@ -161,8 +161,8 @@ def dart_sides(depth, opening, lean, slope_left, slope_right, fold_to="left", wi
     top = max(start[1], end[1], depth) + 0.2
     wedge = Wedge(name="dart", left=np.stack([left, tip]), right=np.stack([tip, right]), fold_to=fold_to)
     chain = [end, np.array([end[0], top]), np.array([start[0], top]), start]
-    sides = [Side(name="a", points=np.stack([start, left]), width=width, kind="seam"), wedge]
-    sides.append(Side(name="b", points=np.stack([right, end]), width=width, kind="seam"))
+    sides = [Side(name="a", points=np.stack([start, left]), width=width, kind=kind), wedge]
+    sides.append(Side(name="b", points=np.stack([right, end]), width=width, kind=kind))
     for i, (a, b) in enumerate(pairwise(chain)):
         sides.append(Side(name=f"c{i}", points=np.stack([a, b]), width=width, kind="seam"))
     body = shapely.Polygon([start, left, tip, right, *chain[:-1]])
@@ -242,6 +242,56 @@ def test_a_plain_dart_gets_a_roof_of_known_height():
     distance = 0.1 * np.cos(half) + 0.01
     along_leg = distance / np.cos(half)
     assert fold.length == pytest.approx(along_leg * np.cos(half) / np.cos(2 * half), rel=1e-5)
+
+
+def test_a_slanted_dart_is_caught_in_the_seam():
+    # As a French dart: 23 degrees open, its leg 32 degrees off the border; what lay 40 mm past the mouth was cut off.
+    opening, angle, leg = np.radians(23), np.radians(32), 0.14
+    sides, wedge, _ = dart_sides(leg, opening, 0.0, opening / 2 + angle - np.pi / 2, np.radians(70))
+    outline = cut_outline(sides)
+    fold = shapely.LineString([wedge.tip, wedge.tip + wedge.middle]).intersection(shapely.Polygon(outline.points))
+    # The border, mirrored on the leg, meets the fold in a triangle whose angles are known; 10 mm past that it is cut.
+    beyond = (leg * np.sin(angle) + 0.01) / np.sin(angle - opening / 2)
+    assert fold.length == pytest.approx(beyond, abs=1e-5)
+    assert outline.notes == ()
+
+
+def test_a_dart_almost_along_the_border_is_not_prolonged_for_ever():
+    opening, angle, leg = np.radians(23), np.radians(14), 0.06
+    sides, wedge, _ = dart_sides(leg, opening, 0.0, opening / 2 + angle - np.pi / 2, np.radians(70))
+    outline = cut_outline(sides)
+    fold = shapely.LineString([wedge.tip, wedge.tip + wedge.middle]).intersection(shapely.Polygon(outline.points))
+    assert fold.length < leg + 0.05
+    assert any("dart dart" in note and "not caught in the seam" in note for note in outline.notes)
+
+
+@pytest.mark.parametrize("fold_to", ["left", "right"])
+@pytest.mark.parametrize(
+    ("lean", "slope_left", "slope_right"), [(0, 0, 0), (0.2, 0, 0), (0, 0.2, 0.2), (-0.3, 0.1, -0.2), (0, -0.15, -0.1)]
+)
+def test_a_hem_with_a_dart_turns_up_flat(lean, slope_left, slope_right, fold_to):
+    """Around the mouth the cloth that is turned up has the angles of the cloth that it is turned up on."""
+    sides, wedge, body = dart_sides(0.25, 0.2, lean, slope_left, slope_right, fold_to, width=0.04, kind="hem")
+    outline = cut_outline(sides)
+    cut = shapely.Polygon(outline.points)
+    assert cut.is_valid
+    assert body.difference(cut.buffer(1e-6)).area < 1e-9
+    mouths = wedge.left[0], wedge.right[-1]
+    hems = sides[0].points[0] - mouths[0], sides[2].points[1] - mouths[1]
+    above = [wedge.tip - mouth for mouth in mouths]
+    assert angle_sum(hems, outline.prolonged["dart"]) == pytest.approx(angle_sum(hems, above), abs=1e-6)
+    # Folded on its middle the wedge lies with both bent legs on each other, and under the hem beside it.
+    (on_left, on_right), middle = outline.prolonged["dart"], wedge.middle
+    assert 2 * (on_left @ middle) * middle - on_left == pytest.approx(on_right, abs=1e-9)
+    mouth, on = (mouths[0], on_left) if fold_to == "left" else (mouths[1], on_right)
+    half = shapely.Polygon([mouth, mouth + 0.07 * on, wedge.tip + 0.34 * middle, wedge.tip + 0.26 * middle])
+    folded = reflected(cut.intersection(half), mouth, on)
+    assert folded.difference(cut.buffer(1e-5)).area < 1e-8
+
+
+def angle_sum(hems, legs):
+    pairs = [(a / np.linalg.norm(a), b / np.linalg.norm(b)) for a, b in zip(hems, legs, strict=True)]
+    return sum(float(np.arccos(a @ b)) for a, b in pairs)
 
 
 def test_two_darts_that_share_a_mouth_are_refused():

@@ -234,6 +234,17 @@ def test_darts_get_a_drill_hole_at_the_tip_and_a_notch_at_each_leg(dress):
     assert front.darts[1].fold_to == "left", "downwards: the left leg is the lower one"
 
 
+def test_notches_of_a_dart_through_a_straight_hem_stand_as_its_legs_do_above_it():
+    corners = np.array([(0, 0), (0.15, 0), (0.18, 0.2), (0.21, 0), (0.36, 0), (0.36, 0.3), (0, 0.3), (0, 0)])
+    kinds = ("hem", "dart", "dart", "hem", "seam", "seam", "seam")
+    edges = [Edge(name=f"e{i}", points=corners[i : i + 2], kind=k, allowance=0.04) for i, k in enumerate(kinds)]
+    piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="e1", right="e2")]))
+    left, right = (next(n.base[0] for n in piece.notches if n.edge == leg) for leg in ("e1", "e2"))
+    assert left[1] == pytest.approx(-0.04, abs=1e-6)
+    # 60 mm at the hem, 48 mm 40 mm above it, and as much where that much is turned up.
+    assert right[0] - left[0] == pytest.approx(0.048, abs=1e-5)
+
+
 def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
     corners = np.array([(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float)
     names = ("a", "l", "r", "b", "right", "top", "left")

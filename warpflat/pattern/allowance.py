@@ -6,14 +6,15 @@ a cap over every dart. A union cannot cross itself, whatever the angles.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
+from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.pieces import FOLD_STRAIGHT
 
 if TYPE_CHECKING:
@@ -33,6 +34,8 @@ LOST = 1e-5
 MITRE_REACH = 1.75
 #: A hem folds up along itself; its ends mirror the side seams if these meet it at 90 degrees, give or take this [rad].
 HEM_SLANT = np.radians(40.0)
+#: The fold of a dart that meets the border at a slant reaches past the mouth to be caught there, up to this many legs.
+WEDGE_REACH = 2.0
 #: A dart that opens wider than this [rad] cannot be pressed to one side: it is cut out with allowances on its legs.
 WIDEST_DART = np.radians(90.0)
 
@@ -75,10 +78,14 @@ class Wedge:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CutOutline:
-    """The cut line, #P by 2 [m] counter-clockwise and closed (first point not repeated), and what is odd about it."""
+    """The cut line, #P by 2 [m] counter-clockwise and closed (first point not repeated), and what is odd about it.
+
+    `prolonged` has, by dart, the unit vectors in which its left and its right leg run on through the allowance.
+    """
 
     points: Vector
     notes: tuple[str, ...]
+    prolonged: Mapping[str, tuple[Vector, Vector]] = field(default_factory=dict)
 
 
 def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
@@ -99,12 +106,15 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     body = shapely.Polygon(np.concatenate([_leading(side) for side in sides]))
     parts: list[Geometry] = [body]
     strips = [_strip(side, body) if isinstance(side, Side) else shapely.Polygon() for side in sides]
+    prolonged: dict[str, tuple[Vector, Vector]] = {}
     count = len(sides)
     for index, side in enumerate(sides):
         before, after = (index - 1) % count, (index + 1) % count
         follows = sides[after]
         if isinstance(side, Wedge):
-            parts += _dart_parts(sides, strips, index, before, after, body)
+            prolonged[side.name], own, told = _dart_parts(sides, strips, index, before, after, body)
+            parts += own
+            notes += told
         elif isinstance(follows, Side):
             parts += _corner_parts(side, follows, strips, index, after, body)
     whole = _union([*parts, *strips])
@@ -125,7 +135,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
         notes.append("allowances on two sides of a narrow gap meet and close it: make them narrower there")
     ring = shapely.simplify(shapely.Polygon(polygon.exterior), 2e-6)
     points = np.asarray(shapely.orient_polygons(ring).exterior.coords)[:-1]
-    return CutOutline(points=points, notes=tuple(notes))
+    return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
 
 
 def cut_hole(ring: Vector, width: float) -> Vector | None:
@@ -310,32 +320,78 @@ def _folded_hem(
 
 def _dart_parts(
     sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, before: int, after: int, body: Polygon
-) -> list[Geometry]:
-    """The cap over a dart: the neighbour's cut line mirrored on the leg, then on the fold, so that it folds flat."""
-    import shapely
+) -> tuple[tuple[Vector, Vector], list[Geometry], list[str]]:
+    """How the legs run on, and the cap over a dart: the neighbour's cut line mirrored on the leg, then on the fold.
 
+    So it folds flat. A note says where the cap would have to reach too far for that.
+    """
     wedge, left, right = sides[index], sides[before], sides[after]
     if not isinstance(wedge, Wedge) or not isinstance(left, Side) or not isinstance(right, Side):
         raise InputError("two darts meet in one point of the border: leave an edge between them")
-    tip, mouth_left, mouth_right = wedge.tip, wedge.left[0], wedge.right[-1]
-    to_left, to_right = _unit(mouth_left - tip), _unit(mouth_right - tip)
+    mouth_left, mouth_right = wedge.left[0], wedge.right[-1]
+    on_left, on_right = _prolonged(wedge, left, right)
     along_left, along_right = _unit(left.points[-1] - left.points[-2]), -_unit(right.points[1] - right.points[0])
-    strips[before], end_left = _at_leg(strips[before], left.width, mouth_left, to_left, along_left, mouth_right)
-    strips[after], end_right = _at_leg(strips[after], right.width, mouth_right, to_right, along_right, mouth_left)
-    parts: list[Geometry] = [end_left, end_right]
+    strips[before], end_left = _at_leg(strips[before], left.width, mouth_left, on_left, along_left, mouth_right)
+    strips[after], end_right = _at_leg(strips[after], right.width, mouth_right, on_right, along_right, mouth_left)
     # A curved leg leaves its chord, on which the wedge is folded.
     lobes = [_lobes(wedge.left), _lobes(wedge.right)]
-    parts += lobes
-    leg = max(float(np.linalg.norm(mouth_left - tip)), float(np.linalg.norm(mouth_right - tip)))
-    radius = leg + 4 * max(left.width, right.width)
     if wedge.fold_to == "left":
-        covered, near, line = _union([body, strips[before], end_left, lobes[0]]), to_left, mouth_left
+        covered, mouth, beyond = _union([body, strips[before], end_left, lobes[0]]), mouth_left, on_left
     else:
-        covered, near, line = _union([body, strips[after], end_right, lobes[1]]), to_right, mouth_right
-    half = shapely.Polygon([tip, tip + radius * near, tip + radius * wedge.middle])
-    cap = _common(_reflect(covered, line, near), half)
-    cap = _union([part for part in shapely.get_parts(cap) if part.distance(shapely.Point((line + tip) / 2)) < 1e-6])
-    return [*parts, cap, _reflect(cap, tip, wedge.middle)]
+        covered, mouth, beyond = _union([body, strips[after], end_right, lobes[1]]), mouth_right, on_right
+    leg = max(float(np.linalg.norm(mouth_left - wedge.tip)), float(np.linalg.norm(mouth_right - wedge.tip)))
+    spare = 4 * max(left.width, right.width)
+    notes: list[str] = []
+    cap, whole = _cap(wedge, body, covered, mouth, beyond, WEDGE_REACH * leg + spare)
+    if not whole:
+        cap, _ = _cap(wedge, body, covered, mouth, beyond, leg + spare)
+        notes.append(
+            f"dart {wedge.name} meets the border at so low an angle that its wedge is not caught in the seam: "
+            "turn the dart, or open it less"
+        )
+    return (on_left, on_right), [end_left, end_right, *lobes, cap, _reflect(cap, wedge.tip, wedge.middle)], notes
+
+
+def _prolonged(wedge: Wedge, left: Side, right: Side) -> tuple[Vector, Vector]:
+    """Unit vectors in which the legs run on through the allowance: straight, but bent at a hem so that it folds up flat.
+
+    What is turned up is then as long, from side to side, as what it lies on. Both legs bend alike, so that the wedge can
+    be folded on its middle.
+    """
+    to_left, to_right = _unit(wedge.left[0] - wedge.tip), _unit(wedge.right[-1] - wedge.tip)
+    if not left.kind == right.kind == "hem":
+        return to_left, to_right
+    depth = max(left.width, right.width)
+    hem_left, hem_right = _secant(left.points[::-1], depth), _secant(right.points, depth)
+    above = _between(hem_left, _secant(wedge.left, depth)) + _between(hem_right, _secant(wedge.right[::-1], depth))
+    bend = (_between(hem_left, to_left) + _between(hem_right, to_right) - above) / 2
+    if abs(bend) > HEM_SLANT:
+        return to_left, to_right
+    return _turned(to_left, -bend), _turned(to_right, bend)
+
+
+def _cap(
+    wedge: Wedge, body: Polygon, covered: Geometry, mouth: Vector, beyond: Vector, radius: float
+) -> tuple[Geometry, bool]:
+    """Half a dart's wedge: what it covers, mirrored on the leg at `mouth` and, past it, on its course `beyond`.
+
+    No farther than `radius` [m] from the tip; False where that cuts it off.
+    """
+    import shapely
+
+    tip, near = wedge.tip, _unit(mouth - wedge.tip)
+    ends = [tip + radius * near, tip + radius * wedge.middle]
+    half: Geometry = shapely.Polygon([tip, *ends])
+    outwards = np.array([-near[1], near[0]])
+    outwards = outwards if outwards @ wedge.middle < 0 else -outwards
+    if beyond @ outwards > 0:
+        half = _union([half, shapely.Polygon([mouth, mouth + radius * near, mouth + radius * beyond])])
+    elif beyond @ outwards < 0:
+        half = _without_beyond(half, mouth, beyond, outwards, radius)
+    turned = _union([_reflect(covered, mouth, beyond), _reflect(body, mouth, near)])
+    cap = _common(turned, half)
+    cap = _union([part for part in shapely.get_parts(cap) if part.distance(shapely.Point((mouth + tip) / 2)) < 1e-6])
+    return cap, cap.distance(shapely.LineString(ends)) > GRID
 
 
 def _lobes(leg: Vector) -> Geometry:
@@ -403,6 +459,23 @@ def _half_plane(start: Vector, end: Vector, body: Polygon) -> Polygon:
     size = 2 * (x1 - x0 + y1 - y0) + 2.0
     a, b = start - size * direction, start + size * direction
     return shapely.Polygon([a, b, b + size * inwards, a + size * inwards])
+
+
+def _secant(line: Vector, length: float) -> Vector:
+    """Unit vector from a line's first point to that at `length` [m] along it, or its last."""
+    arc = arc_lengths(line)
+    return _unit(np.array([np.interp(length, arc, line[:, k]) for k in (0, 1)]) - line[0])
+
+
+def _between(a: Vector, b: Vector) -> float:
+    """Angle [rad] between two unit vectors."""
+    return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
+
+
+def _turned(vector: Vector, angle: float) -> Vector:
+    """Counter-clockwise by `angle` [rad]."""
+    cosine, sine = np.cos(angle), np.sin(angle)
+    return np.array([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
 
 
 def _unit(vector: Vector) -> Vector:

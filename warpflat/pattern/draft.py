@@ -277,7 +277,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cut_line=cut.points,
         darts=drafted_darts,
         drill_holes=tuple(drills),
-        notches=dart_notches(piece, wedges, cut.points),
+        notches=dart_notches(piece, wedges, cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
@@ -419,7 +419,7 @@ def _dart_lines(
     opening = float(np.linalg.norm(left[0] - right[-1]))
     if wedge is None:
         return DraftedDart(dart=dart, tip=left[-1], fold=None, fold_to="", opening=opening)
-    reach = max(float(np.linalg.norm(leg - wedge.tip)) for leg in (left[0], right[-1])) + 0.2
+    reach = float(np.linalg.norm(cut_line - wedge.tip, axis=1).max()) + 0.01
     ray = shapely.LineString([wedge.tip, wedge.tip + reach * wedge.middle]).intersection(shapely.Polygon(cut_line))
     parts = [part for part in shapely.get_parts(ray) if part.length > 0]
     first = min(parts, key=lambda part: part.distance(shapely.Point(wedge.tip)))

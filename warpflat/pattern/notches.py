@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.pattern.allowance import Wedge
+from warpflat.pattern.allowance import CutOutline, Wedge
 from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
@@ -275,16 +275,17 @@ def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
     ]
 
 
-def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut_line: Vector) -> tuple[Notch, ...]:
-    """A single notch at the end of each leg of every folded dart, in the direction of the leg."""
+def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> tuple[Notch, ...]:
+    """A single notch at the end of each leg of every folded dart, in the direction in which the leg runs on."""
     notches = []
     for dart in piece.darts:
         wedge = wedges.get(dart.name)
         if wedge is None:
             continue
-        for name, mouth in ((dart.left, wedge.left[0]), (dart.right, wedge.right[-1])):
-            inwards = (wedge.tip - mouth) / max(float(np.linalg.norm(wedge.tip - mouth)), 1e-12)
-            base = _base(mouth, inwards, 0.05, cut_line)
+        mouths = ((dart.left, wedge.left[0]), (dart.right, wedge.right[-1]))
+        for (name, mouth), outwards in zip(mouths, cut.prolonged[dart.name], strict=True):
+            inwards = -outwards
+            base = _base(mouth, inwards, 0.05, cut.points)
             if base is None:
                 continue
             width = float(np.linalg.norm(base - mouth))
