@@ -298,3 +298,13 @@ def test_two_darts_that_share_a_mouth_are_refused():
     sides, wedge, _ = dart_sides(0.1, 0.3, 0.0, 0.0, 0.0)
     with pytest.raises(InputError, match="leave an edge between"):
         cut_outline([sides[0], wedge, wedge, *sides[2:]])
+
+
+@pytest.mark.parametrize("taper", [-0.05, 0.0, 0.05, 0.2])
+@pytest.mark.parametrize("hem", [0.045, 0.05, 0.06, 0.08])
+def test_a_hem_deeper_than_its_edge_is_long_has_no_slits(hem, taper):
+    corners = np.array([(0, 0), (0.051, 0), (0.051 + 0.4 * taper, 0.4), (-0.4 * taper, 0.4)])
+    sides = polygon_sides(corners, [hem, 0.01, 0.01, 0.01], ["hem", "seam", "seam", "seam"])
+    cut = shapely.Polygon(cut_outline(sides).points)
+    turned = reflected(cut.intersection(shapely.box(-1, -1, 1, 0)), np.zeros(2), np.array([1.0, 0.0]))
+    assert turned.symmetric_difference(cut.intersection(shapely.box(-1, 0, 1, hem))).area < 1e-7

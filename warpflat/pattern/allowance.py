@@ -110,13 +110,12 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     count = len(sides)
     for index, side in enumerate(sides):
         before, after = (index - 1) % count, (index + 1) % count
-        follows = sides[after]
         if isinstance(side, Wedge):
             prolonged[side.name], own, told = _dart_parts(sides, strips, index, before, after, body)
             parts += own
             notes += told
-        elif isinstance(follows, Side):
-            parts += _corner_parts(side, follows, strips, index, after, body)
+        else:
+            parts += _corner_parts(sides, strips, index, after, body)
     whole = _union([*parts, *strips])
     whole = _closed(whole)
     for side in sides:
@@ -262,9 +261,12 @@ def _corner_fill(corner: Vector, a: Vector, b: Vector, width_a: float, width_b: 
 
 
 def _corner_parts(
-    side: Side, follows: Side, strips: list[Geometry], index: int, after: int, body: Polygon
+    sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, after: int, body: Polygon
 ) -> list[Geometry]:
     """What is added where two edges meet; a hem's strip is trimmed in place."""
+    side, follows = sides[index], sides[after]
+    if not isinstance(side, Side) or not isinstance(follows, Side):
+        return []
     a, b = _unit(side.points[-1] - side.points[-2]), _unit(follows.points[1] - follows.points[0])
     corner = side.points[-1]
     turn = float(np.arctan2(a[0] * b[1] - a[1] * b[0], a @ b))
@@ -279,9 +281,24 @@ def _corner_parts(
         beside = (follows if hem == index else side).points
         room = float(np.linalg.norm(np.diff(beside, axis=0), axis=1).sum())
         if width > 0 and 0 < hem_width <= room:
-            return _folded_hem(corner, inwards, beyond, hem, seam, width, hem_width, strips, body)
+            far = index - 1 if hem == index else (after + 1) % len(sides)
+            return _folded_hem(
+                corner, inwards, beyond, hem, seam, width, hem_width, strips, body, _cloth(sides, strips, far)
+            )
     fill = _corner_fill(corner, a, b, side.width, follows.width)
     return [] if fill is None else [fill]
+
+
+def _cloth(sides: Sequence[Side | Wedge], strips: Sequence[Geometry], index: int) -> Geometry:
+    """What lies outside the outline there: an edge's strip, or a dart's wedge."""
+    import shapely
+
+    side = sides[index]
+    return (
+        strips[index]
+        if isinstance(side, Side)
+        else shapely.Polygon(np.concatenate([side.left, side.right[1:]])).buffer(0)
+    )
 
 
 def _folded_hem(
@@ -294,10 +311,12 @@ def _folded_hem(
     hem_width: float,
     strips: list[Geometry],
     body: Polygon,
+    far: Geometry,
 ) -> list[Geometry]:
     """The end of a hem, mirrored on the hem line, so that turned up it covers the seam allowance exactly.
 
-    `inwards` runs from the corner along the hem, `beyond` from the corner along the seam, away from the piece.
+    `inwards` runs from the corner along the hem, `beyond` from the corner along the seam, away from the piece; `far` is
+    the cloth beside the edge at the hem's other end, which a short hem is turned up on, too.
     """
     down = np.array([inwards[1], -inwards[0]])
     down = down if down @ beyond > 0 else -down
@@ -307,7 +326,7 @@ def _folded_hem(
     run_on = _box(corner, beyond, (0, reach), out, (0, width))
     run_on = _common(run_on, _box(corner, inwards, (-3 * reach, reach), -down, (0, 3 * reach)))
     strips[seam] = _without_beyond(strips[seam], corner, inwards, down, 3 * width)
-    worn = _union([body, strips[seam], run_on])
+    worn = _union([body, strips[seam], run_on, far])
     # A slightly curved hem leaves the mirror line; the first millimetres below it are hem in any case.
     core = _common(_box(corner, inwards, (0, reach), down, (0, 0.003)), strips[hem])
     turned = _union([_reflect(worn, corner, inwards), core])
