@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from shapely.affinity import affine_transform
 
 from warpflat.errors import InputError
-from warpflat.pattern.allowance import MITRE_REACH, Side, Wedge, cut_outline
+from warpflat.pattern.allowance import MITRE_REACH, Side, Wedge, cut_hole, cut_outline
 
 WIDTHS = st.sampled_from([0.0, 0.005, 0.010, 0.015, 0.030, 0.050])
 
@@ -308,3 +308,20 @@ def test_a_hem_deeper_than_its_edge_is_long_has_no_slits(hem, taper):
     cut = shapely.Polygon(cut_outline(sides).points)
     turned = reflected(cut.intersection(shapely.box(-1, -1, 1, 0)), np.zeros(2), np.array([1.0, 0.0]))
     assert turned.symmetric_difference(cut.intersection(shapely.box(-1, 0, 1, hem))).area < 1e-7
+
+
+@pytest.mark.parametrize("arm", [0.02 - 1e-9, 0.02, 0.02 + 1e-9, 0.0209])
+def test_a_hole_s_narrow_bays_leave_no_slits_in_its_cut_line(arm):
+    """A plus whose arms are as wide as its two allowances."""
+    plus = shapely.box(-arm / 2, -0.06, arm / 2, 0.06).union(shapely.box(-0.05, -0.045, 0.05, 0.045))
+    line = cut_hole(np.asarray(shapely.orient_polygons(plus).exterior.coords)[:-1], 0.01)
+    assert shapely.Polygon(line).equals_exact(shapely.box(-0.04, -0.035, 0.04, 0.035), 2e-6, normalize=True)
+
+
+@pytest.mark.parametrize("corners", [3, 4, 7, 60])
+def test_a_hole_keeps_its_corners(corners):
+    angles = 2 * np.pi * np.arange(corners) / corners
+    ring = 0.05 * np.column_stack([np.cos(angles), np.sin(angles)])
+    line = cut_hole(ring, 0.01)
+    shrunk = (0.05 - 0.01 / np.cos(np.pi / corners)) / 0.05
+    assert shapely.Polygon(line).equals_exact(shapely.Polygon(shrunk * ring), 3e-6, normalize=True)

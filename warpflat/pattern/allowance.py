@@ -30,6 +30,8 @@ GRID = 1e-7
 CLOSE = 2e-6
 #: Closing them changes the area by less than this [m2].
 LOST = 1e-5
+#: What a hole's allowance leaves of a bay narrower than this [m] is a slit, which nobody could cut, nor turn.
+BAY = 2e-3
 #: A mitre may run this many (wider) allowances past the corner; beyond it the corner is squared off.
 MITRE_REACH = 1.75
 #: A hem folds up along itself; its ends mirror the side seams if these meet it at 90 degrees, give or take this [rad].
@@ -152,6 +154,8 @@ def cut_hole(ring: Vector, width: float) -> Vector | None:
     if width <= 0:
         return ring
     inner = shapely.Polygon(ring).buffer(0).buffer(-width, join_style="mitre", mitre_limit=MITRE_REACH)
+    wide = inner.buffer(-BAY / 2, join_style="mitre").buffer(BAY / 2, join_style="mitre")
+    inner = _common(inner, wide)
     if inner.geom_type != "Polygon" or inner.area <= LOST:
         return None
     return np.asarray(shapely.orient_polygons(shapely.simplify(inner, 2e-6)).exterior.coords)[:-1]
