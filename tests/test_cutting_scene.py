@@ -92,7 +92,8 @@ def test_the_pattern_draws_darts_as_they_are_measured_with_their_tips_moved_back
 ):
     back = 0.02
     surface = {"shape": shape, "resolution": 33}
-    made = scene(surface=surface, cuts=[{"name": "d", "tip_back": back, **table}], **QUIET)
+    pattern = {"allowance_mm": 12.0, "allowances_mm": {} if curved is None else {"d.left": 8.0}}
+    made = scene(surface=surface, cuts=[{"name": "d", "tip_back": back, **table}], pattern=pattern, **QUIET)
     (seam,) = run_scene(made, tmp_path).metrics["pieces"]["trial"]["cuts"][0]["seams"]
     (piece,) = json.loads((tmp_path / "pattern.json").read_text())["sizes"][""].values()
     drawn, measured = [np.array(hole["at"]) for hole in piece["drill_holes"]], seam["drawn"]
@@ -105,6 +106,8 @@ def test_the_pattern_draws_darts_as_they_are_measured_with_their_tips_moved_back
     (dart,) = piece["darts"]
     assert measured["curved"] is curved
     assert (dart["fold"] is None) is curved
+    widths = {edge["name"]: edge["allowance"] for edge in piece["edges"] if edge["kind"] == "dart"}
+    assert widths == ({"d.left": 0.008, "d.right": 0.012} if curved else {"d.left": 0.0, "d.right": 0.0})
     assert dart["length_mm"] == pytest.approx([1e3 * measured["leg_m"]] * 2, abs=1.0)
     assert abs(dart["length_mm"][0] - dart["length_mm"][1]) < 0.5
     assert dart["opening"] == pytest.approx(measured["intake_m"], abs=1e-3)

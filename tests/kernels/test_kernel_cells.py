@@ -317,7 +317,8 @@ def test_without_viscosity_none_is_written_and_all_else_is_the_same():
     network = small_network()
     velocities = np.random.default_rng(3).normal(size=(network.vertex_count, 2))
     with_it, without = (
-        Launched(network, shaken(network, scale=0.8), velocities, pace=pace).evaluate_guard() for pace in (STEADY, STILL)
+        Launched(network, shaken(network, scale=0.8), velocities, pace=pace).evaluate_guard()
+        for pace in (STEADY, STILL)
     )
     for name in ("face_acting", "face_clearance", "face_force", "face_stiffness"):
         np.testing.assert_array_equal(with_it[name], without[name])

@@ -270,6 +270,8 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     obstacles = [grain, *internal.values()]
     obstacles += [np.concatenate([_line(edges, d.left), _line(edges, d.right)]) for d in piece.darts]
     folds = [edge.line for edge in edges if edge.kind == "fold"]
+    # Whether a dart's legs have an allowance is known only now.
+    widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     return DraftedPiece(
         piece=piece,
         frame=frame,
@@ -282,7 +284,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         cutouts=cutouts,
         fisheyes=fisheyes,
         grain=grain,
-        label=place_label(piece, garment, (sew_line, cut.points), list(holes.values()), obstacles, folds),
+        label=place_label(widened, garment, (sew_line, cut.points), list(holes.values()), obstacles, folds),
         notes=tuple(notes),
     )
 

@@ -194,7 +194,8 @@ def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:
 
 def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
     if edge.kind == "dart":
-        return edge
+        # For a dart that is cut away, not folded.
+        return replace(edge, allowance=rules.allowance(piece, edge.name, "seam"))
     kind = rules.kind(piece, edge.name, edge.kind)
     return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
 

@@ -90,7 +90,10 @@ class Label:
 
 
 def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
-    """Name, size, how to cut it, cloth, garment and which allowances are included."""
+    """Name, size, how to cut it, cloth, garment and which allowances are included.
+
+    Legs of darts that have an allowance are cut, and sewn as a seam.
+    """
     if piece.on_fold:
         cut = f"Cut {piece.quantity} on fold"
     elif piece.quantity % 2 == 0 and piece.paired:
@@ -104,7 +107,8 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     lines.append(cut + (f" - {piece.fabric}" if piece.fabric else ""))
     widths = {}
     for kind in ("seam", "hem"):
-        values = sorted({round(e.width * 1000, 1) for e in piece.edges if e.kind == kind})
+        own = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
+        values = sorted({round(e.width * 1000, 1) for e in own})
         if values:
             widths[kind] = "/".join(f"{v:g}" for v in values) + " mm"
     if widths:
