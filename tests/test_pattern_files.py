@@ -158,6 +158,21 @@ def test_a_misspelt_edge_of_a_surface_is_told_before_anything_is_flattened(
     assert main(["run", str(tmp_path / "trial.toml"), "--out", str(tmp_path / "out")]) == 2
 
 
+def test_an_edge_that_the_plane_does_not_show_is_a_note_and_all_else_is_drawn(tmp_path: Path):
+    corners = np.array([(0, 0, 0), (0.2, 0, 0), (0.2, 0.3, 0), (0, 0.3, 0)], dtype=float)
+    flat = flatten(make_surface(corners, np.array([[0, 1, 2, 3]], dtype=np.int32), name="cloth"))
+    rules = EdgeRules(kinds={"edge_7": "hem", "edge_1": "hem"}, allowances={"cloth.edge_9": 0.02, "edge_2": 0.007})
+    check_edge_names([flat.surface], rules)
+    written = surface_files([flat], tmp_path, name="cloth", options=PatternOptions(formats=("json",), rules=rules))
+    assert written.files == ("pattern.json",)
+    assert [note for note in written.notes if "kinds: no piece has an edge 'edge_7'; " in note and "edge_4" in note]
+    assert [note for note in written.notes if "allowances_mm: no piece has an edge 'cloth.edge_9'" in note]
+    ((piece,),) = read_pattern_json(tmp_path / "pattern.json").pieces.values()
+    assert {edge.name: edge.width for edge in piece.edges} == {
+        "edge_1": 0.03, "edge_2": 0.007, "edge_3": 0.01, "edge_4": 0.01
+    }  # fmt: skip
+
+
 def test_every_edge_that_a_cut_surface_has_may_be_named(tmp_path: Path):
     (tmp_path / "trial.toml").write_text(PARTED)
     run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")

@@ -75,15 +75,33 @@ class EdgeRules:
         Raises:
             InputError: a name that no piece has (gives the nearest), or an unknown kind.
         """
-        known = {f"{piece}.{edge}" for piece, names in edges.items() for edge in names}
-        known |= {edge for names in edges.values() for edge in names}
-        for key, mapping in (("kinds", self.kinds), ("allowances_mm", self.allowances)):
-            for name in mapping:
-                if name not in known:
-                    raise InputError(f"{key}: no piece has an edge {name!r}; {nearest(name, known)}")
+        for said in self._unknown(edges).values():
+            raise InputError(said)
         for name, kind in self.kinds.items():
             if kind not in EDGE_KINDS:
                 raise InputError(f"kinds.{name}: unknown kind {kind!r}; {nearest(kind, EDGE_KINDS)}")
+
+    def known(self, edges: Mapping[str, Sequence[str]]) -> tuple[EdgeRules, tuple[str, ...]]:
+        """The rules without names that no piece has, and a sentence about each of these.
+
+        For names that show in the plane only; `edges` as for :meth:`check`.
+        """
+        unknown = self._unknown(edges)
+        kinds = {name: kind for name, kind in self.kinds.items() if ("kinds", name) not in unknown}
+        allowances = {name: width for name, width in self.allowances.items() if ("allowances_mm", name) not in unknown}
+        notes = tuple(f"left out of the pattern: {said}" for said in unknown.values())
+        return replace(self, kinds=kinds, allowances=allowances), notes
+
+    def _unknown(self, edges: Mapping[str, Sequence[str]]) -> dict[tuple[str, str], str]:
+        """Names that no piece has, with the table that has each, and what to say of it."""
+        known = {f"{piece}.{edge}" for piece, names in edges.items() for edge in names}
+        known |= {edge for names in edges.values() for edge in names}
+        return {
+            (key, name): f"{key}: no piece has an edge {name!r}; {nearest(name, known)}"
+            for key, mapping in (("kinds", self.kinds), ("allowances_mm", self.allowances))
+            for name in mapping
+            if name not in known
+        }
 
     def kind(self, piece: str, edge: str, default: str) -> str:
         """The kind of an edge."""

@@ -84,16 +84,18 @@ def pattern_of_surface(
         seams: of the border, by the lines that are sewn to each other.
 
     Returns:
-        The pattern, and what was chosen on the way, one sentence each.
+        The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
 
     Raises:
-        InputError: the rules name an edge that does not exist, a border crosses itself, a crack overlaps, its tip
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip
             is moved back too far, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
     named = [_named(seam, results, pieces) for seam in seams]
-    rules.check({p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces})
+    names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
+    rules, notes = rules.known(names)
+    rules.check(names)
     pieces = [
         replace(
             piece,
@@ -102,7 +104,7 @@ def pattern_of_surface(
         )
         for piece in pieces
     ]
-    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules, named)), ()
+    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules, named)), notes
 
 
 def _piece(result: Flattening, size: str) -> Piece:
