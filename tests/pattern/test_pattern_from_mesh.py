@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import shapely
+from shapely.affinity import scale
 
 from warpflat.errors import InputError
 from warpflat.pattern import draft_piece
@@ -210,3 +211,21 @@ def test_unknown_names_and_bad_layouts_are_refused():
     tetrahedron = np.array([[0, 1, 2, -1], [0, 2, 3, -1], [0, 3, 1, -1], [1, 3, 2, -1]], dtype=np.int32)
     with pytest.raises(InputError, match="no border"):
         piece_from_mesh(tetrahedron, np.random.default_rng(0).random((4, 2)), name="p")
+
+
+@pytest.mark.parametrize("rows", [30, 60])
+def test_a_narrow_hollow_tip_has_its_corner_where_the_border_turns_and_an_even_allowance(rows):
+    """Both corners of the tip lie in one window, in which the border turns most between them."""
+    faces, flat, _, index = grid(columns=8, rows=rows)
+    share = np.linspace(-1, 1, 9)
+    half = 0.0008 + 0.03 * np.sin(np.pi * np.arange(rows + 1) / rows)
+    flat[:, 0] = np.tile(share, rows + 1) * np.repeat(half, 9)
+    # A tenth of a millimetre, as deep as a gore's tip comes out in woven cloth.
+    hollow = 1e-4 * (1 - share**4)
+    flat[index[0], 1] += hollow
+    flat[index[-1], 1] -= hollow
+    piece = piece_from_mesh(faces, flat, name="gore")
+    ends = {int(edge.vertices[0]) for edge in piece.edges}
+    assert ends <= {int(index[row, column]) for row in (0, -1) for column in (0, -1)}
+    cut = shapely.Polygon(draft_piece(piece).cut_line)
+    assert cut.symmetric_difference(scale(cut, xfact=-1, origin=(0, 0))).area < 1e-5
