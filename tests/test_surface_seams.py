@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -13,13 +14,16 @@ from warpflat.errors import InputError
 from warpflat.flattening import Flattening, flatten
 from warpflat.pattern import draft_garment
 from warpflat.pattern.from_surface import pattern_of_surface
+from warpflat.relax import RelaxOptions
 from warpflat.scene import make_scene, run_scene
 from warpflat.sew_surface import sew_surface
+from warpflat.shapes import make_shape
 from warpflat.surface import Surface, with_lines
 from warpflat.surface_seams import NamedSeam, surface_seams
 
 QUIET = {"output": {"frames": 0, "picture": False}, "pattern": {"formats": ["json"]}}
 UNDERARM = NamedSeam(name="underarm", sides=("front", "back"))
+CENTRE_BACK = NamedSeam(name="centre back", sides=("left", "right"))
 
 
 def sleeve(turn: float = 2 * np.pi, counts: tuple[int, int] = (13, 20)) -> Surface:
@@ -164,6 +168,27 @@ def test_a_wrong_seam_is_told_in_one_line(tmp_path: Path, seams: list[dict[str, 
     with pytest.raises(InputError, match=message) as caught:
         run_scene(scene(seams=seams), tmp_path)
     assert "\n" not in str(caught.value)
+
+
+@pytest.fixture(scope="module")
+def band() -> Flattening:
+    cone = make_shape("cone", bottom=0.16, top=0.145, height=0.04, angle=355.0, resolution=41)
+    return flatten(cone, fabric="woven", datum="centre", grain_angle=90.0)
+
+
+def test_a_band_free_of_strain_is_at_rest_when_it_is_sewn(band: Flattening):
+    found = sew_surface(band, seams=[CENTRE_BACK], options=RelaxOptions(max_steps=500))
+    assert found is not None
+    assert found.sewn.converged
+    assert found.sewn.largest_difference < 1e-6
+
+
+def test_a_band_free_of_strain_is_not_at_rest_while_a_seam_pulls(band: Flattening):
+    found = sew_surface(band, seams=[replace(CENTRE_BACK, factor=1.001)])
+    assert found is not None
+    assert found.sewn.converged
+    left, right = (lengths(found.result, side) for side in CENTRE_BACK.sides)
+    assert right / left == pytest.approx(1.001, abs=2e-5)
 
 
 def test_ease_on_a_cut_piece_is_refused(tmp_path: Path):

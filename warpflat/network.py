@@ -39,7 +39,7 @@ from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
-from warpflat.kernels.seams import Seams
+from warpflat.kernels.seams import Seams, compute_seam_misses
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
 from warpflat.kernels.thread_lines import ThreadLines
@@ -304,6 +304,20 @@ class SpringNetwork:
         slot, offset = order_by(np.ascontiguousarray(ends, dtype=np.int32).ravel(), self.vertex_count)
         self.bonds.offset = _on(device, offset, wp.int32)
         self.bonds.slot = _on(device, slot, wp.int32)
+
+    def seam_misses(self, position: wp.array) -> FloatArray:
+        """#P, c of each tie [m] in a layout (#V vec2d [m])."""
+        miss = wp.zeros(self.seam_count, dtype=wp.float64, device=self.device)
+        if self.seams is not None:
+            launch_each(compute_seam_misses, self.seam_count, [position, self.seams], [miss], device=self.device)
+        return np.array(miss.numpy(), dtype=np.float64)
+
+    def seam_energy(self, position: wp.array) -> float:
+        """What all ties pull with, 1/2 k (c + offset)^2, in a layout (#V vec2d [m]) [J]."""
+        if self.seams is None:
+            return 0.0
+        stretch = self.seam_misses(position) + self.seams.offset.numpy()
+        return 0.5 * float(self.seams.stiffness.numpy() @ stretch**2)
 
     def guide(self, vertices: IntArray) -> None:
         """Let these vertices move up and down only, as on a fold or a straight centre front."""

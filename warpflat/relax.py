@@ -319,8 +319,11 @@ class Relaxation:
         return self._say(energies, residual=residual, gain=gain, change=change, at_rest=at_rest)
 
     def _without_strain(self, potential: FloatArray) -> BoolArray:
-        """#P, whether nothing is left to release: what a vertex is pulled by then is rounding, unless by a seam."""
-        return np.asarray((potential <= self.negligible_energy) & (self.network.seams is None))
+        """#P, whether nothing is left to release, in the cloth or in its seams: what a vertex is pulled by then is rounding."""
+        negligible = np.asarray(potential <= self.negligible_energy)
+        if self.network.seams is None or not negligible.any():
+            return negligible
+        return np.asarray(potential + self.network.seam_energy(self.position) <= self.negligible_energy)
 
     def _say(
         self, energies: FloatArray, *, residual: FloatArray, gain: FloatArray, change: FloatArray, at_rest: BoolArray

@@ -24,7 +24,6 @@ from numpy.typing import NDArray
 from warpflat.constraints import Constraint, constraint_ties, piece_of
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening
-from warpflat.kernels.seams import compute_seam_misses
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
@@ -312,12 +311,4 @@ def _misses(state: Relaxation, positions: FloatArray | None = None) -> FloatArra
     """#P, c of each tie [m], in the present layout or another one."""
     network = state.network
     at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
-    miss = wp.zeros(network.seam_count, dtype=wp.float64, device=network.device)
-    wp.launch(
-        compute_seam_misses,
-        dim=network.seam_count,
-        inputs=[at, network.seams, 0],
-        outputs=[miss],
-        device=network.device,
-    )
-    return np.array(miss.numpy(), dtype=np.float64)
+    return network.seam_misses(at)
