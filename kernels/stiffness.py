@@ -149,14 +149,15 @@ class Lattice:
 
     direction: of the quads' first edges on the whole, unit vector in the plane. along, across: K of those edges and of the others. shear: G
     [N/m].
-    least: share of K that a structural spring keeps.
+    most_along, most_across: what the diagonals of a quad may take over of `along` and `across` [N/m].
     """
 
     direction: wp.vec2d
     along: wp.float64
     across: wp.float64
     shear: wp.float64
-    least: wp.float64
+    most_along: wp.float64
+    most_across: wp.float64
 
 
 @wp.kernel
@@ -175,7 +176,7 @@ def weigh_quads(
     """Stiffness [N/m] that a quad gives to the springs along its sides and to both its diagonals.
 
     A cell a by b of springs K b/a, less what its diagonals G (a2 + b2)/2ab take over, and half of them to each of two sides. Which
-    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that next to nothing would be left along it, its
+    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that too little would be left along it, its
     diagonals are weaker.
 
     side: #Q, the first of each quad's half-edges. stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as
@@ -186,9 +187,13 @@ def weigh_quads(
     d = first_direction(position, quad)
     ka = lattice.along
     kb = lattice.across
+    most_a = lattice.most_along
+    most_b = lattice.most_across
     if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
         ka = lattice.across
         kb = lattice.along
+        most_a = lattice.most_across
+        most_b = lattice.most_along
     p0 = vertices[quad[0]]
     p1 = vertices[quad[1]]
     p2 = vertices[quad[2]]
@@ -197,8 +202,7 @@ def weigh_quads(
     a = half * (wp.length(p1 - p0) + wp.length(p3 - p2))
     b = half * (wp.length(p2 - p1) + wp.length(p0 - p3))
     ratio = b / a
-    most = (wp.float64(1.0) - lattice.least) * wp.min(ka * ratio * ratio, kb / (ratio * ratio))
-    shear = wp.min(lattice.shear, most)
+    shear = wp.min(lattice.shear, wp.min(most_a * ratio * ratio, most_b / (ratio * ratio)))
     half_a = half * (ka - shear / (ratio * ratio)) * ratio
     half_b = half * (kb - shear * ratio * ratio) / ratio
     lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))

@@ -107,6 +107,17 @@ def test_seams_of_every_size_match_at_the_usual_resolution(size: str):
     assert all(piece.flipped_faces == 0 for piece in garment.pieces.values())
 
 
+def test_the_waist_of_a_small_body_does_not_zigzag_in_knitwear():
+    """Quads of 7 by 10 mm: shear springs of all of G left nothing to hold a vertex against its four neighbours."""
+    body = Mannequin.from_measurements(bust=0.70, waist=0.60, hip=0.74, stature=1.40)
+    back = flatten_form(body, body.form("bodice"), fabric="interlock").pieces["back"]
+    waist = back.positions[back.surface.lines["waist"]]
+    bend = waist[1:-1, 1] - 0.5 * (waist[:-2, 1] + waist[2:, 1])
+    assert np.abs(bend).max() < 3e-4
+    last = back.stages[-1]
+    assert back.measures["strain_energy_j"] < 2.0 * (last.spring_energy_j + last.guard_energy_j)
+
+
 def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
     names = {seam.name for seam in block.seams}
     assert {"side left", "side right", "shoulder left", "waist"} <= names

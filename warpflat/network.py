@@ -15,9 +15,9 @@ with F from the plane to the surface and a the flat area. It is zero below the o
 kinks (its sideways stiffness outweighs the springs' loss), and it grows without bound as a cell collapses, so that no
 face can be mirrored. Its share is reported as `guard_energy_j`.
 
-**Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs of all of G would be stiffer than the fabric, and
-hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a 1/2 G' (F s . F t)^2
-for what is missing, s along the quad and t across; it counts among the guard's.
+**Long quads are sheared as a whole.** Along a quad longer than wide, shear springs of all of G would take over most of what its structural
+springs hold, or more, and hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a
+1/2 G' (F s . F t)^2 for what is missing, s along the quad and t across; it counts among the guard's.
 
 **Or a membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`):
 exact on any mesh, and without a guard. The springs then pull at nothing; their k_ij, set so that they bound the membrane's

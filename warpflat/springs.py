@@ -43,9 +43,10 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# A shear spring stiffens tension too; a cell so long that nothing would be left for the structural spring keeps this share of it, has
-# weaker shear springs, and is sheared as a whole against what they lack.
-_LEAST_STRUCTURAL_SHARE = 0.05
+# A shear spring stiffens tension too, and what it takes over from a structural spring holds no vertex against its four neighbours. So a
+# structural spring keeps the first of these shares of its K, or what it keeps in a square cell where that is less, as off the grain, but
+# no less than the second; a cell too long for that has weaker shear springs, and is sheared as a whole against what they lack.
+_STRUCTURAL_SHARE, _LEAST_STRUCTURAL_SHARE = 0.4, 0.05
 # Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
 # guard begins at this share of it.
 _HOLD_SHARE = 0.75
@@ -232,6 +233,11 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
     return float(along), float(across), float(turned)
 
 
+def _most_taken_over(stiffness: float, shear: float) -> float:
+    """What shear springs may take over from a structural spring of K [N/m], where those of a square cell take G [N/m]."""
+    return float(np.clip(shear, (1.0 - _STRUCTURAL_SHARE) * stiffness, (1.0 - _LEAST_STRUCTURAL_SHARE) * stiffness))
+
+
 def _off_threads(angle: float) -> float:
     """How far a direction at `angle` [rad] from the warp is from the nearer of warp and weft [rad]."""
     return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
@@ -259,7 +265,8 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
     lattice = Lattice()
     lattice.direction = wp.vec2d(*(np.cos(angle) * warp + np.sin(angle) * across))
     lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, angle)
-    lattice.least = _LEAST_STRUCTURAL_SHARE
+    lattice.most_along = _most_taken_over(lattice.along, lattice.shear)
+    lattice.most_across = _most_taken_over(lattice.across, lattice.shear)
     return lattice, angle
 
 
