@@ -166,6 +166,7 @@ def weigh_quads(
     position: wp.array(dtype=wp.vec2d),
     quads: wp.array(dtype=wp.vec4i),
     side: wp.array(dtype=wp.int32),
+    wider: wp.array(dtype=wp.vec2d),
     lattice: Lattice,
     first: int,
     # outputs
@@ -179,7 +180,8 @@ def weigh_quads(
     pair of edges is nearer to the warp is each quad's own. Where a quad is so long that too little would be left along it, its
     diagonals are weaker.
 
-    side: #Q, the first of each quad's half-edges. stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as
+    side: #Q, the first of each quad's half-edges. wider: #Q, how many times as long as on the body a and b are in the cloth.
+    stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as
     `cells.Cells.shear` has it.
     """
     q = wp.tid() + first
@@ -199,8 +201,8 @@ def weigh_quads(
     p2 = vertices[quad[2]]
     p3 = vertices[quad[3]]
     half = wp.float64(0.5)
-    a = half * (wp.length(p1 - p0) + wp.length(p3 - p2))
-    b = half * (wp.length(p2 - p1) + wp.length(p0 - p3))
+    a = half * (wp.length(p1 - p0) + wp.length(p3 - p2)) * wider[q][0]
+    b = half * (wp.length(p2 - p1) + wp.length(p0 - p3)) * wider[q][1]
     ratio = b / a
     shear = wp.min(lattice.shear, wp.min(most_a * ratio * ratio, most_b / (ratio * ratio)))
     half_a = half * (ka - shear / (ratio * ratio)) * ratio

@@ -6,13 +6,16 @@ import numpy as np
 import pytest
 
 from warpflat.errors import InputError
+from warpflat.fabric import find_fabric
 from warpflat.flattening import flatten
 from warpflat.fullness import FullEdge, fullness_of, give_fullness
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import FormResult, Mannequin
+from warpflat.membrane import Model
 from warpflat.pattern import draft_garment
 from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.from_garment import EdgeRules, pattern_of_garment
+from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.seam_wishes import SeamWish, wished_seams
 from warpflat.shapes import make_shape
 
@@ -209,3 +212,37 @@ def test_a_plane_with_fullness_is_a_wider_plane_without_energy(model: str):
     assert wide.stages[-1].converged
     assert wide.stages[-1].spring_energy_j < 1e-9
     assert wide.stages[-1].strain_energy_j < 1e-9
+
+
+@pytest.mark.parametrize("factor", [1.0, 1.5, 3.0])
+def test_a_plane_with_fullness_stores_what_its_fabric_does(factor: float):
+    """Its quads are wider than they are on the body, and shear springs hold the less of them along their short sides."""
+    fabric = find_fabric("interlock")
+    piece = flatten(make_shape("strip", resolution=9), datum="centre", fabric=fabric)
+    wide = give_fullness(piece, [FullEdge(vertices=piece.surface.lines["top"], factor=factor, gathered=True)], [])
+    area = float(np.prod(np.ptp(wide.positions, axis=0)))
+    for strain, stiffness in (
+        ([[1.0, 0.0], [0.0, 0.0]], fabric.stiffness_weft),
+        ([[0.0, 0.0], [0.0, 1.0]], fabric.stiffness_warp),
+        ([[0.0, 0.5], [0.5, 0.0]], fabric.shear_stiffness),
+    ):
+        worn = wide.positions @ np.linalg.inv(np.eye(2) + 1e-4 * np.array(strain))
+        stored = Relaxation(wide.network, RelaxOptions(), start=worn).energies().potential
+        assert stored == pytest.approx(0.5 * stiffness * 1e-8 * area, rel=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("factor", "fabric", "model", "noted"),
+    [
+        (3.0, "woven", "springs", True),
+        (3.0, "woven", "membrane", False),
+        (1.5, "woven", "springs", False),
+        (2.0, "interlock", "springs", False),
+    ],
+)
+def test_springs_that_gathers_slant_off_the_grain_are_noted(factor: float, fabric: str, model: Model, noted: bool):
+    body = Mannequin.from_measurements(bust=1.24, waist=1.1, hip=1.3, stature=1.55, resolution_mm=25.0)
+    gathers = [SeamWish(name="waist", factor=factor, gathered=True)]
+    form = body.form("basic_block", half=True)
+    skirt = flatten_form(body, form, fabric=fabric, model=model, wishes=gathers).pieces["front_skirt"]
+    assert any("slant the mesh's edges off the grain" in note for note in skirt.notes) == noted

@@ -15,22 +15,29 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.cells import CellArrays
+from warpflat.cells import CellArrays, first_of_faces
 from warpflat.fabric import grain_axes
 from warpflat.flattening import Flattening
 from warpflat.membrane import step_matrix
 from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
 from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
-from warpflat.springs import SpringArrays, with_stiffness
+from warpflat.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.strain import strain_energy
-from warpflat.surface.topology import border_loops, mesh_edges
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import border_loops, half_edges_of, mesh_edges
 from warpflat.upright import Upright
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
 
 FloatArray = NDArray[np.float64]
+BoolArray = NDArray[np.bool_]
 IntArray = NDArray[np.int32]
+
+
+# What the cloth stores beyond what the springs of a gathered piece tell of is worth a note from what so much strain everywhere along the
+# softer thread stores, if it is so many times as much as before it was gathered.
+_FELT, _MUCH_MORE = 0.01, 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,9 +90,30 @@ def give_fullness(
     )
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
-    return replace(
-        piece, network=network, positions=positions, stages=(*piece.stages, stage), notes=(*piece.notes, note)
-    )
+    notes = (*piece.notes, note, *_slanted(network, piece.stages[-1], stage))
+    return replace(piece, network=network, positions=positions, stages=(*piece.stages, stage), notes=notes)
+
+
+def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
+    """What is to be said of springs that are not the cloth any more: gathers slant the edges, along which they run, off the threads."""
+    # As it is meant to be worn, cloth is under tension, of which springs know nothing.
+    if network.model != "springs" or network.stretch is not None:
+        return []
+    missed, missed_before = _missed(stage), _missed(before)
+    thread = min(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
+    felt = 0.5 * thread * _FELT**2 * float(network.cell_arrays.area.sum())
+    if missed < max(felt, _MUCH_MORE * missed_before):
+        return []
+    stored = 1e3 * stage.strain_energy_j
+    return [
+        f"its gathers slant the mesh's edges off the grain, and springs along them tell of {stored - 1e3 * missed:.3g} mJ where "
+        f'{network.fabric.name} stores {stored:.3g}; model = "membrane" measures that exactly'
+    ]
+
+
+def _missed(stage: Stage) -> float:
+    """What the cloth stores and springs do not tell of [J]."""
+    return stage.strain_energy_j - stage.spring_energy_j - stage.guard_energy_j
 
 
 def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
@@ -150,7 +178,7 @@ def _faded(
 
 def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
     axes = grain_axes(network.grain_angle)
-    springs = _wider_springs(network.spring_arrays, positions, axes, full)
+    springs = _wider_springs(network, positions, axes, full)
     cells = _wider_cells(network.cell_arrays, positions, axes, full)
     if network.model == "springs":
         return replace(network, spring_arrays=springs, cell_arrays=cells)
@@ -161,23 +189,51 @@ def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) ->
 
 
 def _wider_springs(
-    springs: SpringArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+    network: SpringNetwork, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> SpringArrays:
-    """Longer springs, of the stiffness that cells of the new sides have: K b/a of a structural spring, G (a2 + b2)/2ab of a
-    diagonal, for a cell a by b."""
-    d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
+    """Longer springs, of the stiffness that cells of the new sides have: along a triangle's side a, K b/a."""
+    springs, surface = network.spring_arrays, network.surface
+    before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
-    before = np.stack([d @ axes[0], d @ axes[1]], axis=1)
-    length = np.maximum(np.linalg.norm(before, axis=1), np.finfo(np.float64).tiny)
-    longer = np.linalg.norm(before * here, axis=1) / length
-    wider = np.linalg.norm(before[:, ::-1] * here, axis=1) / length
-    diagonal = np.arange(springs.count) >= springs.edge_count
-    factor = np.where(diagonal, longer**2 / (here[:, 0] * here[:, 1]), wider / longer)
+    longer = _times(before, here)
+    stiffness, lack = springs.stiffness * _times(before[:, ::-1], here) / longer, None
+    if surface.is_quad.any():
+        wider = _wider_quads(surface, positions, axes, full)
+        made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
+        of_quads = _beside_quads(surface, springs)
+        stiffness[of_quads], lack = made.stiffness[of_quads], made.lack
     return replace(
         springs,
         listed_length=springs.listed(springs.rest_length * longer),
-        listed_stiffness=springs.listed(springs.stiffness * factor),
+        listed_stiffness=springs.listed(stiffness),
+        lack=lack,
     )
+
+
+def _beside_quads(surface: Surface, springs: SpringArrays) -> BoolArray:
+    """#S, which springs are a quad's sides or diagonals."""
+    beside = np.arange(springs.count) >= springs.edge_count
+    halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
+    beside[halves.edge[first[:, None] + np.arange(4)]] = True
+    return np.asarray(beside)
+
+
+def _wider_quads(
+    surface: Surface, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> FloatArray:
+    """#F by 2, how many times as long a quad's first edges and its others become; 1 of triangles."""
+    wider = np.ones((len(surface.faces), 2))
+    corners = surface.faces[surface.is_quad]
+    here, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
+    for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
+        wider[surface.is_quad, k] = _times(sides, here)
+    return wider
+
+
+def _times(way: FloatArray, full: FloatArray) -> FloatArray:
+    """How many times as long a way (along warp and weft) is once each of both has been made so many times as long."""
+    length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
+    return np.asarray(np.linalg.norm(way * full, axis=1) / length)
 
 
 def _wider_cells(

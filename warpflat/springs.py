@@ -163,7 +163,14 @@ class SpringArrays:
         return 0 if self.lack is None else int(np.count_nonzero(self.lack.any(axis=1)))
 
 
-def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain_angle: float = 0.0) -> SpringArrays:
+def springs_of(
+    surface: Surface,
+    fabric: Fabric,
+    positions: FloatArray,
+    *,
+    grain_angle: float = 0.0,
+    wider: FloatArray | None = None,
+) -> SpringArrays:
     """Springs with rest lengths from space and stiffnesses from the fabric.
 
     Args:
@@ -172,6 +179,8 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         positions: #V by 2, a layout [m]: directions are measured in the plane against the grain, since threads are
             straight in the cloth and not on the body.
         grain_angle: of the warp against +y, degrees.
+        wider: #F by 2, how many times as long as on the body a quad's first edges and its others are meant to be: its stiffnesses are those
+            of such a quad. Rest lengths are the body's all the same.
     """
     own, faces, is_quad = _unweighed(surface), surface.faces, surface.is_quad
     warp, _ = grain_axes(grain_angle)
@@ -190,7 +199,16 @@ def springs_of(surface: Surface, fabric: Fabric, positions: FloatArray, *, grain
         lattice, angle = _lattice(fabric, quads, position, warp)
         aligned = _off_threads(angle) <= _OFF_GRAIN
         shear_excess = lattice.shear / fabric.shear_stiffness
-        given = [surface.vertices, position, quads, rows_of(first, is_quad), lattice]
+        # One number for all, where they are as on the body.
+        times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else rows_of(wider, is_quad)
+        given = [
+            surface.vertices,
+            position,
+            quads,
+            rows_of(first, is_quad),
+            wp.array(times, dtype=wp.vec2d, copy=False),
+            lattice,
+        ]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
         if short.any():
