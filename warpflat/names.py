@@ -6,8 +6,9 @@ import re
 import unicodedata
 
 from warpflat.errors import InputError
+from warpflat.words import plain_letters
 
-__all__ = ["checked_name", "fitted_name", "same_file"]
+__all__ = ["checked_name", "fitted_name", "plain_name", "same_file"]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
 _FORBIDDEN = '/\\:*?"<>|'
@@ -35,6 +36,22 @@ def fitted_name(name: str, otherwise: str = "piece") -> str:
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
     return f"_{short}" if _is_device(short) else short or otherwise
+
+
+def plain_name(name: str, others: str = " _.-") -> str:
+    """The name of a scene or cut, if it is of plain letters: it is typed in a shell, and part of other names.
+
+    Raises:
+        ValueError: it has letters beyond A to Z, a to z, 0 to 9 and `others`, or does not begin with one of the former.
+    """
+    if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
+        return name
+    better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
+    hint = f"; {better!r} would do" if better else ""
+    raise ValueError(
+        f"{name!r} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
+        f"{'spaces and ' if ' ' in others else ''}{' '.join(others.strip())}{hint}"
+    )
 
 
 def same_file(name: str) -> str:

@@ -18,7 +18,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
 from warpflat.mannequin.table import MannequinTable
-from warpflat.names import checked_name, fitted_name
+from warpflat.names import checked_name, fitted_name, plain_name
 from warpflat.relax import RelaxOptions
 from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
 from warpflat.scene_files import FrameSchedule, SceneResult, write_surface
@@ -49,7 +49,6 @@ from warpflat.surface import (
 )
 from warpflat.surface.border import SIDES
 from warpflat.toml_file import Table, check_table, read_toml
-from warpflat.words import checked_name
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening, Progress
@@ -79,7 +78,7 @@ _VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}|\$([A-Za-z_][A-Za-z0-9_]
 class SceneTable(Table):
     """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
 
-    name: Annotated[str, Field(max_length=100), AfterValidator(checked_name)] | None = None
+    name: Annotated[str, Field(max_length=100), AfterValidator(plain_name)] | None = None
     fabric: Annotated[
         Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
         Discriminator(text_or_table),

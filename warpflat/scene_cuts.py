@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from warpflat.names import plain_name
 from warpflat.scene_types import PlaneTable, Point, PointOrVertex
 from warpflat.toml_file import Table
-from warpflat.words import checked_name
 
 if TYPE_CHECKING:
     import numpy as np
@@ -45,7 +45,7 @@ class CutTable(Table):
     between points or along a plane runs through are divided. Tables with one `name` are one cut.
     """
 
-    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: checked_name(name, " _.+-"))] | None = None
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
     line: str | None = None
     part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
     from_: PointOrVertex | None = Field(default=None, alias="from")
