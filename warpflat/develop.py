@@ -55,6 +55,8 @@ _LEVEL = 1e-6
 _AS_LONG = 0.05
 # A piece is flat if it strays no further from its plane, to this share of its size: single precision leaves that much.
 _FLAT = 1e-5
+_FEW_VERTICES = 100
+_GOLDEN = 0.6180339887498949
 # A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
 _LEAST_AREA = 0.01
 # Up to this share of the faces may be mirrored for a development to be mended rather than given up.
@@ -320,6 +322,11 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
 
 def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """A piece that lies in a plane already, as it lies there: #V by 2 [m], the datum's chord upwards; None if it does not."""
+    # Most do not, and a few of their vertices tell: by golden sections of their number, since every so many are one row or column.
+    some = surface.vertices[(np.arange(_FEW_VERTICES) * _GOLDEN % 1.0 * len(surface.vertices)).astype(int)]
+    strays = np.linalg.svd(some - some.mean(axis=0), compute_uv=False)[-1]
+    if strays > np.sqrt(_FEW_VERTICES) * 4 * _FLAT * np.linalg.norm(np.ptp(some, axis=0)):
+        return None
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
     facing = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]).sum(axis=0)
