@@ -1,4 +1,4 @@
-"""What is minimised, springs and guard, in NumPy: the one measure for every solver, and what L-BFGS is given."""
+"""What is minimised, springs, guard, and what else holds quads, in NumPy: the one measure for every solver, and what L-BFGS is given."""
 
 from __future__ import annotations
 
@@ -38,6 +38,11 @@ class LayoutEnergy:
         here = csr_matrix((ones, (rows, corner[:, 0])), shape)
         self._sides = [csr_matrix((ones, (rows, corner[:, k])), shape) - here for k in (1, 2)]
         self._edges, self._weight = cells.edges, cells.weight
+        self._shear = None if springs.lack is None else springs.lack[cells.face]
+        wave = np.zeros((0, 4)) if springs.wave is None else springs.wave
+        held = np.flatnonzero(wave.any(axis=1))
+        at = (np.repeat(np.arange(len(held)), 4), cells.faces[held].ravel())
+        self._waves = csr_matrix((wave[held].ravel(), at), (len(held), self.count))
         warp, weft = grain_axes(network.grain_angle)
         # One piece has one onset for all its cells.
         onset_warp, onset_weft = network.cells.onset.numpy()[0].tolist()
@@ -65,8 +70,8 @@ class LayoutEnergy:
         return self._along.T @ (scale[:, None] * d)
 
     def laplacian(self) -> csr_matrix:
-        """#V by #V, of the stiffnesses [N/m]."""
-        return (self._along.T @ self._along.multiply(self.stiffness[:, None])).tocsr()
+        """#V by #V, of the stiffnesses of springs and against waves [N/m]."""
+        return (self._along.T @ self._along.multiply(self.stiffness[:, None]) + self._waves.T @ self._waves).tocsr()
 
     def _lengths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         d = self._along @ positions
@@ -74,7 +79,8 @@ class LayoutEnergy:
 
     def _evaluate(self, positions: FloatArray, *, gradient: bool) -> tuple[float, FloatArray]:
         d, length = self._lengths(positions)
-        energy = 0.5 * float(self.stiffness @ (length - self.rest_length) ** 2)
+        waves = self._waves @ positions
+        energy = 0.5 * float(self.stiffness @ (length - self.rest_length) ** 2) + 0.5 * float(np.square(waves).sum())
         slope = np.zeros_like(positions)
         a, b = (side @ positions for side in self._sides)
         det = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
@@ -82,20 +88,26 @@ class LayoutEnergy:
             return math.inf, slope
         if gradient:
             scale = self.stiffness * (1.0 - self.rest_length / np.maximum(length, 1e-300))
-            slope += self._along.T @ (scale[:, None] * d)
+            slope += self._along.T @ (scale[:, None] * d) + self._waves.T @ waves
         # Columns of D^-1 times a thread e: how much of the edges 0-1 and 0-2 runs along it.
         density = np.zeros(len(det))
         pulls = []
+
+        def wear(x: FloatArray | float, y: FloatArray | float) -> tuple[FloatArray, FloatArray]:
+            share = np.column_stack([x * b[:, 1] - y * b[:, 0], y * a[:, 0] - x * a[:, 1]]) / det[:, None]
+            return share, np.einsum("cij,cj->ci", self._edges, share)
+
         for thread, stiffness, onset in self._threads:
-            share = np.column_stack(
-                [thread[0] * b[:, 1] - thread[1] * b[:, 0], thread[1] * a[:, 0] - thread[0] * a[:, 1]]
-            )
-            share /= det[:, None]
-            worn = np.einsum("cij,cj->ci", self._edges, share)
+            share, worn = wear(*thread)
             stretch = np.sqrt(np.einsum("ij,ij->i", worn, worn))
             excess = np.maximum(stretch - 1.0 - onset, 0.0)
             density += 0.5 * stiffness * excess**2
             pulls.append((share, worn, stiffness * excess / stretch))
+        if self._shear is not None:
+            (share, worn), (across, turned) = wear(*self._shear.T), wear(-self._shear[:, 1], self._shear[:, 0])
+            angle = np.einsum("ij,ij->i", worn, turned)
+            density += 0.5 * angle**2
+            pulls += [(share, turned, angle), (across, worn, angle)]
         area = 0.5 * det * self._weight
         energy += float(area @ density)
         acting = np.flatnonzero(density) if gradient else np.empty(0, dtype=int)

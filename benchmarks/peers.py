@@ -149,6 +149,12 @@ def lscm(problem: Problem) -> FloatArray:
     return np.ascontiguousarray(layout * (area / abs(flat)) ** 0.5)
 
 
+def upright(layout: FloatArray, datum: IntArray) -> FloatArray:
+    """A layout (#V by 2 [m]) turned so that the chord of the datum, vertex indices, points up."""
+    across, up = (layout[datum[-1]] - layout[datum[0]]) / np.linalg.norm(layout[datum[-1]] - layout[datum[0]])
+    return layout @ np.array([[up, across], [-across, up]])
+
+
 def _singular_values(problem: Problem) -> Callable[[FloatArray], tuple[FloatArray, FloatArray]]:
     """Of the triangles' deformations from space to the plane, and the triangles' areas."""
     v, t = problem.vertices, problem.triangles

@@ -28,6 +28,7 @@ class Cells:
     onset: #F, worn stretch along warp and weft at which the guard begins to act.
     shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad lack there [N/m];
         zero of any other face.
+    wave: #F, weights of a quad's corners, by which it is held against waves (`stiffness.weigh_waves`) [(N/m)^1/2]; zero of most.
     """
 
     face: wp.array(dtype=wp.vec4i)
@@ -38,6 +39,7 @@ class Cells:
     slack: wp.array(dtype=wp.vec2d)
     onset: wp.array(dtype=wp.vec2d)
     shear: wp.array(dtype=wp.vec2d)
+    wave: wp.array(dtype=wp.vec4d)
 
 
 @wp.struct
@@ -247,7 +249,7 @@ def evaluate_guard(
     stiffness: wp.array(dtype=wp.float64),
 ):
     """Forces of the thread guard: minus the gradient of a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft], and of what long
-    quads lack in shear, a 1/2 (F s . F s')^2, with s' at right angles to s = `Cells.shear`.
+    quads lack in shear, a 1/2 (F s . F s')^2, with s' at right angles to s = `Cells.shear`, and of waves, 1/2 |sum of wave_k p_k|^2.
 
     a is the flat area of the cell. The energy grows without bound as the cell collapses. Its viscosity, the share of the
     guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
@@ -270,7 +272,9 @@ def evaluate_guard(
     begin = cells.first[f]
     height2, acts = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
-    if lacks_shear:
+    wave = cells.wave[f]
+    is_held = wp.dot(wave, wave) > wp.float64(0.0)
+    if lacks_shear or is_held:
         acts = int(1)
     acting[f] = acts
     clearance[f] = wp.sqrt(height2)
@@ -350,6 +354,20 @@ def evaluate_guard(
                     viscosity[slot + at[0]] += (time_step * k0) * (v_cell - v0)
                     viscosity[slot + at[1]] += (time_step * k1) * (v_cell - v1)
                     viscosity[slot + at[2]] += (time_step * k2) * (v_cell - v2)
+        if is_held:
+            amplitude = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+            moving = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+            total = wp.float64(0.0)
+            for k in range(4):
+                amplitude += wave[k] * position[face[k]]
+                total += wp.abs(wave[k])
+                if viscous:
+                    moving += wave[k] * velocity[face[k]]
+            for k in range(4):
+                force[slot + k] -= wave[k] * amplitude
+                stiffness[slot + k] += wp.abs(wave[k]) * total
+                if viscous:
+                    viscosity[slot + k] -= (time_step * wave[k]) * moving
 
 
 @wp.func
@@ -419,8 +437,8 @@ def compute_guard_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """Energy of the thread guard per face, and of what long quads lack in shear. position: #V [m]. energy: #F [J], infinite where a cell
-    is collapsed or mirrored."""
+    """Energy of the thread guard per face, of what long quads lack in shear, and of waves. position: #V [m]. energy: #F [J], infinite
+    where a cell is collapsed or mirrored."""
     f = wp.tid() + first
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
@@ -442,6 +460,10 @@ def compute_guard_energy(
             + guard_energy(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset, s, t, guard)
             + guard_energy(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset, s, t, guard)
         )
+        wave = cells.wave[f]
+        if wp.dot(wave, wave) > wp.float64(0.0):
+            amplitude = wave[0] * p0 + wave[1] * p1 + wave[2] * p2 + wave[3] * p3
+            energy[f] += wp.float64(0.5) * wp.dot(amplitude, amplitude)
 
 
 @wp.func

@@ -5,6 +5,10 @@ import warp as wp
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
+# The share of a membrane's hold on a wave from vertex to vertex that quads have.
+HELD = wp.constant(wp.float64(0.25))
+# A quad whose middle lines are parallel but for this square of a sine has no shape to be kept.
+FLAT = wp.constant(wp.float64(1.0e-12))
 
 
 @wp.kernel
@@ -149,15 +153,22 @@ class Lattice:
 
     direction: of the quads' first edges on the whole, unit vector in the plane. along, across: K of those edges and of the others. shear: G
     [N/m].
-    most_along, most_across: what the diagonals of a quad may take over of `along` and `across` [N/m].
+    least: share of K that a structural spring keeps.
     """
 
     direction: wp.vec2d
     along: wp.float64
     across: wp.float64
     shear: wp.float64
-    most_along: wp.float64
-    most_across: wp.float64
+    least: wp.float64
+
+
+@wp.func
+def wave_hold(k: wp.float64, lattice: Lattice, ratio: wp.float64):
+    """What a quad should hold a wave from vertex to vertex by [N/m], along the sides of K = k: a quarter of what a membrane does, or the
+    share of that by which structural springs do in a square, where it is less, as off the grain. ratio: of the other sides to these."""
+    in_square = wp.max(k - lattice.shear, lattice.least * k) / (k + lattice.shear)
+    return wp.min(HELD, in_square) * (k * ratio + lattice.shear / ratio)
 
 
 @wp.kernel
@@ -173,29 +184,26 @@ def weigh_quads(
     stiffness: wp.array(dtype=wp.float64),
     diagonal: wp.array(dtype=wp.float64),
     lack: wp.array(dtype=wp.vec2d),
+    hold: wp.array(dtype=wp.float64),
 ):
     """Stiffness [N/m] that a quad gives to the springs along its sides and to both its diagonals.
 
     A cell a by b of springs K b/a, less what its diagonals G (a2 + b2)/2ab take over, and half of them to each of two sides. Which
-    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that too little would be left along it, its
+    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that next to nothing would be left along it, its
     diagonals are weaker.
 
     side: #Q, the first of each quad's half-edges. wider: #Q, how many times as long as on the body a and b are in the cloth.
-    stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as
-    `cells.Cells.shear` has it.
+    stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as `cells.Cells.shear` has it. hold: #Q, what a wave from vertex to
+    vertex along rows and columns alike, in which no diagonal is strained, has to be held by besides [N/m] (`weigh_waves`).
     """
     q = wp.tid() + first
     quad = quads[q]
     d = first_direction(position, quad)
     ka = lattice.along
     kb = lattice.across
-    most_a = lattice.most_along
-    most_b = lattice.most_across
     if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
         ka = lattice.across
         kb = lattice.along
-        most_a = lattice.most_across
-        most_b = lattice.most_along
     p0 = vertices[quad[0]]
     p1 = vertices[quad[1]]
     p2 = vertices[quad[2]]
@@ -204,18 +212,64 @@ def weigh_quads(
     a = half * (wp.length(p1 - p0) + wp.length(p3 - p2)) * wider[q][0]
     b = half * (wp.length(p2 - p1) + wp.length(p0 - p3)) * wider[q][1]
     ratio = b / a
-    shear = wp.min(lattice.shear, wp.min(most_a * ratio * ratio, most_b / (ratio * ratio)))
+    most = (wp.float64(1.0) - lattice.least) * wp.min(ka * ratio * ratio, kb / (ratio * ratio))
+    shear = wp.min(lattice.shear, most)
     half_a = half * (ka - shear / (ratio * ratio)) * ratio
     half_b = half * (kb - shear * ratio * ratio) / ratio
     lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if shear < lattice.shear:
         lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
+    # A wave of 1 m strains a side by 2 m, and what holds the quad against it by 4 m.
+    short = wp.max(
+        wave_hold(ka, lattice, ratio) - wp.float64(2.0) * half_a,
+        wave_hold(kb, lattice, wp.float64(1.0) / ratio) - wp.float64(2.0) * half_b,
+    )
+    hold[q] = wp.float64(0.25) * wp.max(short, wp.float64(0.0))
     h = side[q]
     stiffness[h] = half_a
     stiffness[h + 1] = half_b
     stiffness[h + 2] = half_a
     stiffness[h + 3] = half_b
     diagonal[q] = shear * (a * a + b * b) / (wp.float64(2.0) * a * b)
+
+
+@wp.kernel
+def weigh_waves(
+    vertices: wp.array(dtype=wp.vec3d),
+    quads: wp.array(dtype=wp.vec4i),
+    hold: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    wave: wp.array(dtype=wp.vec4d),
+):
+    """What a quad is held by against a wave from corner to corner, 1/2 |sum of wave_k p_k|^2 of its corners' places p in the plane.
+
+    The weights are +1, -1, +1, -1, less what a quad with its shape on the body has of the like, so that this shape and all that uniform
+    strains make of it store nothing (Flanagan and Belytschko 1981), times the root of `hold`, #Q [N/m]. wave: #Q.
+    """
+    q = wp.tid() + first
+    quad = quads[q]
+    wave[q] = wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if hold[q] > wp.float64(0.0):
+        p0 = vertices[quad[0]]
+        p1 = vertices[quad[1]]
+        p2 = vertices[quad[2]]
+        p3 = vertices[quad[3]]
+        half = wp.float64(0.5)
+        u = half * ((p1 - p0) + (p2 - p3))
+        v = half * ((p3 - p0) + (p2 - p1))
+        h = (p0 - p1) + (p2 - p3)
+        uu = wp.dot(u, u)
+        vv = wp.dot(v, v)
+        uv = wp.dot(u, v)
+        det = uu * vv - uv * uv
+        if det > FLAT * uu * vv:
+            along_u = half * (wp.dot(h, u) * vv - wp.dot(h, v) * uv) / det
+            along_v = half * (wp.dot(h, v) * uu - wp.dot(h, u) * uv) / det
+            one = wp.float64(1.0)
+            wave[q] = wp.sqrt(hold[q]) * wp.vec4d(
+                one + along_u + along_v, -one - along_u + along_v, one - along_u - along_v, -one + along_u - along_v
+            )
 
 
 @wp.kernel

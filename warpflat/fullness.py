@@ -196,17 +196,18 @@ def _wider_springs(
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
     longer = _times(before, here)
-    stiffness, lack = springs.stiffness * _times(before[:, ::-1], here) / longer, None
+    stiffness, lack, wave = springs.stiffness * _times(before[:, ::-1], here) / longer, None, None
     if surface.is_quad.any():
         wider = _wider_quads(surface, positions, axes, full)
         made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
         of_quads = _beside_quads(surface, springs)
-        stiffness[of_quads], lack = made.stiffness[of_quads], made.lack
+        stiffness[of_quads], lack, wave = made.stiffness[of_quads], made.lack, made.wave
     return replace(
         springs,
         listed_length=springs.listed(springs.rest_length * longer),
         listed_stiffness=springs.listed(stiffness),
         lack=lack,
+        wave=wave,
     )
 
 

@@ -54,7 +54,7 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
         surface=join_surfaces([net.surface for net in networks]),
         fabric=first.fabric,
         grain_angle=first.grain_angle,
-        spring_arrays=_join_springs([net.spring_arrays for net in networks], vertex, _join_lacks(networks)),
+        spring_arrays=_join_springs(networks, vertex),
         cell_arrays=_join_cells(networks, vertex),
         device=first.device,
         model=first.model,
@@ -65,18 +65,19 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     )
 
 
-def _join_lacks(networks: Sequence[SpringNetwork]) -> NDArray[np.float64] | None:
-    """#F by 2, what long quads lack in shear; None where no piece has one."""
-    lacks = [net.spring_arrays.lack for net in networks]
-    if not any(lack is not None for lack in lacks):
+def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> NDArray[np.float64] | None:
+    """#F by so many, what `SpringArrays` have of their faces under a name; None where no piece has any."""
+    arrays = [getattr(net.spring_arrays, name) for net in networks]
+    if not any(array is not None for array in arrays):
         return None
     return np.concatenate(
-        [np.zeros((net.face_count, 2)) if lack is None else lack for net, lack in zip(networks, lacks, strict=True)]
+        [np.zeros((net.face_count, depth)) if of is None else of for net, of in zip(networks, arrays, strict=True)]
     )
 
 
-def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray, lack: NDArray[np.float64] | None) -> SpringArrays:
-    """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering. lack: of all."""
+def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> SpringArrays:
+    """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
+    springs = [net.spring_arrays for net in networks]
     edge = begins([s.edge_count for s in springs])
     diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
@@ -94,7 +95,8 @@ def _join_springs(springs: Sequence[SpringArrays], vertex: IntArray, lack: NDArr
         listed_length=np.concatenate([s.listed_length for s in springs]),
         listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
         edge_count=int(edge[-1]),
-        lack=lack,
+        lack=_join_of_faces(networks, "lack", 2),
+        wave=_join_of_faces(networks, "wave", 4),
     )
 
 

@@ -15,9 +15,10 @@ with F from the plane to the surface and a the flat area. It is zero below the o
 kinks (its sideways stiffness outweighs the springs' loss), and it grows without bound as a cell collapses, so that no
 face can be mirrored. Its share is reported as `guard_energy_j`.
 
-**Long quads are sheared as a whole.** Along a quad longer than wide, shear springs of all of G would take over most of what its structural
-springs hold, or more, and hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a
-1/2 G' (F s . F t)^2 for what is missing, s along the quad and t across; it counts among the guard's.
+**Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs of all of G would be stiffer than the fabric, and
+hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a 1/2 G' (F s . F t)^2
+for what is missing, s along the quad and t across; it counts among the guard's. And where too little of the structural springs is left to
+hold a vertex against its four neighbours, quads are held against such waves (`SpringArrays.wave`).
 
 **Or a membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`):
 exact on any mesh, and without a guard. The springs then pull at nothing; their k_ij, set so that they bound the membrane's
@@ -181,6 +182,8 @@ class SpringNetwork:
         cells.onset = _on(device, np.broadcast_to(onset, (self.face_count, 2)), wp.vec2d)
         lack = np.broadcast_to(np.zeros(2), (self.face_count, 2)) if s.lack is None else s.lack
         cells.shear = _on(device, lack, wp.vec2d)
+        wave = np.broadcast_to(np.zeros(4), (self.face_count, 4)) if s.wave is None else s.wave
+        cells.wave = _on(device, wave, wp.vec4d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = _on(device, np.broadcast_to(np.zeros(1, dtype=np.int32), count + 1), wp.int32)

@@ -24,6 +24,7 @@ from warpflat.kernels.stiffness import (
     pick_values,
     weigh_quads,
     weigh_triangles,
+    weigh_waves,
 )
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
@@ -43,10 +44,9 @@ __all__ = [
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# A shear spring stiffens tension too, and what it takes over from a structural spring holds no vertex against its four neighbours. So a
-# structural spring keeps the first of these shares of its K, or what it keeps in a square cell where that is less, as off the grain, but
-# no less than the second; a cell too long for that has weaker shear springs, and is sheared as a whole against what they lack.
-_STRUCTURAL_SHARE, _LEAST_STRUCTURAL_SHARE = 0.4, 0.05
+# A shear spring stiffens tension too; a cell so long that nothing would be left for the structural spring keeps this share of it, has
+# weaker shear springs, and is sheared as a whole against what they lack.
+_LEAST_STRUCTURAL_SHARE = 0.05
 # Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
 # guard begins at this share of it.
 _HOLD_SHARE = 0.75
@@ -109,6 +109,7 @@ class SpringArrays:
         listed_length, listed_stiffness: 2 #S, rest length [m] and stiffness [N/m] of each entry.
         edge_count: #E; the first springs are the mesh edges.
         lack: #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None where there are none.
+        wave: #F by 4, what else holds quads against waves, likewise.
         aligned: whether there are quads, and their edges carry the threads.
         shear_excess: how many times as stiff in shear as the cloth the quads are whose edges lie across its threads; 1 without quads.
     """
@@ -118,6 +119,7 @@ class SpringArrays:
     listed_stiffness: FloatArray
     edge_count: int
     lack: FloatArray | None = None
+    wave: FloatArray | None = None
     aligned: bool = False
     shear_excess: float = 1.0
 
@@ -187,7 +189,7 @@ def springs_of(
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
     of_side, stiffness = np.empty(len(sides)), np.empty(own.around.count)
-    position, lack = np.ascontiguousarray(positions, dtype=np.float64), None
+    position, lack, wave = np.ascontiguousarray(positions, dtype=np.float64), None, None
     aligned, shear_excess = False, 1.0
     if not is_quad.all():
         triangles = rows_of(faces, ~is_quad)
@@ -195,7 +197,7 @@ def springs_of(
         launch_each(weigh_triangles, len(triangles), given, [of_side])
     if is_quad.any():
         quads = rows_of(faces, is_quad)
-        diagonal, short = np.empty(len(quads)), np.empty((len(quads), 2))
+        diagonal, short, hold = np.empty(len(quads)), np.empty((len(quads), 2)), np.empty(len(quads))
         lattice, angle = _lattice(fabric, quads, position, warp)
         aligned = _off_threads(angle) <= _OFF_GRAIN
         shear_excess = lattice.shear / fabric.shear_stiffness
@@ -206,15 +208,21 @@ def springs_of(
             position,
             quads,
             rows_of(first, is_quad),
-            wp.array(times, dtype=wp.vec2d, copy=False),
+            wp.array(times, dtype=wp.vec2d, device="cpu", copy=False),
             lattice,
         ]
-        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short])
+        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short, hold])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
+        # Most have none: what is not written to takes no memory.
+        number = np.flatnonzero(is_quad)
         if short.any():
-            # Most have none: what is not written to takes no memory.
             lacks, lack = short.any(axis=1), np.zeros((len(faces), 2))
-            lack[np.flatnonzero(is_quad)[lacks]] = short[lacks]
+            lack[number[lacks]] = short[lacks]
+        held = np.flatnonzero(hold)
+        if len(held):
+            weights, wave = np.empty((len(held), 4)), np.zeros((len(faces), 4))
+            launch_each(weigh_waves, len(held), [surface.vertices, quads[held], hold[held]], [weights])
+            wave[number[held]] = weights
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,
@@ -222,6 +230,7 @@ def springs_of(
         listed_stiffness=own.around.listed(stiffness),
         edge_count=own.edge_count,
         lack=lack,
+        wave=wave,
         aligned=aligned,
         shear_excess=shear_excess,
     )
@@ -251,11 +260,6 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
     return float(along), float(across), float(turned)
 
 
-def _most_taken_over(stiffness: float, shear: float) -> float:
-    """What shear springs may take over from a structural spring of K [N/m], where those of a square cell take G [N/m]."""
-    return float(np.clip(shear, (1.0 - _STRUCTURAL_SHARE) * stiffness, (1.0 - _LEAST_STRUCTURAL_SHARE) * stiffness))
-
-
 def _off_threads(angle: float) -> float:
     """How far a direction at `angle` [rad] from the warp is from the nearer of warp and weft [rad]."""
     return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
@@ -283,8 +287,7 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
     lattice = Lattice()
     lattice.direction = wp.vec2d(*(np.cos(angle) * warp + np.sin(angle) * across))
     lattice.along, lattice.across, lattice.shear = quad_stiffness(fabric, angle)
-    lattice.most_along = _most_taken_over(lattice.along, lattice.shear)
-    lattice.most_across = _most_taken_over(lattice.across, lattice.shear)
+    lattice.least = _LEAST_STRUCTURAL_SHARE
     return lattice, angle
 
 
@@ -351,7 +354,7 @@ def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray
     """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
     side = springs_of_sides(springs, cells)
     stiffness = np.bincount(side, weights.ravel(), minlength=springs.count).astype(np.float64)
-    return replace(springs, listed_stiffness=springs.listed(stiffness), lack=None)
+    return replace(springs, listed_stiffness=springs.listed(stiffness), lack=None, wave=None)
 
 
 def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:

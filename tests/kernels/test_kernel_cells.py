@@ -44,7 +44,9 @@ def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64])
             t = np.array([-s[1], s[0]])
             density += 0.5 * lack * ((deformation @ s) @ (deformation @ t)) ** 2
         energies.append(weight * area * density)
-    return np.bincount(cells.face, energies)
+    wave = network.spring_arrays.wave
+    waves = 0.0 if wave is None else np.einsum("fk,fkd->fd", wave, positions[network.surface.faces])
+    return np.bincount(cells.face, energies) + 0.5 * np.square(waves).sum(axis=-1)
 
 
 def lacking(network: SpringNetwork, shear: float) -> SpringNetwork:
@@ -52,7 +54,18 @@ def lacking(network: SpringNetwork, shear: float) -> SpringNetwork:
     angle = np.random.default_rng(6).uniform(0.0, 2.0 * np.pi, network.face_count)
     lack = shear**0.25 * np.column_stack([np.cos(angle), np.sin(angle)])
     lack[2::3] = 0.0
-    return replace(network, spring_arrays=replace(network.spring_arrays, lack=lack))
+    return replace(network, spring_arrays=replace(network.spring_arrays, lack=lack, wave=None))
+
+
+def held(network: SpringNetwork) -> SpringNetwork:
+    """The same whose quads are held against waves, every third by nothing."""
+    rng = np.random.default_rng(8)
+    wave = rng.uniform(5.0, 20.0, (network.face_count, 1)) * rng.normal(
+        [1.0, -1.0, 1.0, -1.0], 0.2, (network.face_count, 4)
+    )
+    wave[2::3] = 0.0
+    wave[~network.surface.is_quad] = 0.0
+    return replace(network, spring_arrays=replace(network.spring_arrays, wave=wave))
 
 
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
@@ -105,6 +118,32 @@ def test_forces_are_minus_the_gradient_of_the_energy(active: str, grain_angle: f
         assert not force.any()
     else:
         assert np.abs(force).max() > (0.1 if active == "none" else 1.0)
+
+
+@pytest.mark.parametrize("scale", [1.0, 0.8])
+def test_waves_store_their_amplitude_squared_and_pull_back(scale: float):
+    network = held(small_network())
+    rng = np.random.default_rng(2)
+    positions, velocities = shaken(network, scale=scale), rng.normal(size=(network.vertex_count, 2))
+    np.testing.assert_allclose(
+        Launched(network, positions).guard_energy(), guard_energy_by_hand(network, positions), rtol=1e-10, atol=1e-15
+    )
+    without = replace(network, spring_arrays=replace(network.spring_arrays, wave=None))
+    here, there = (Launched(net, positions, velocities, time_step=0.02).evaluate_guard() for net in (network, without))
+    wave, faces = network.spring_arrays.wave, network.surface.faces
+    is_held = wave.any(axis=1)
+    assert is_held.any()
+    assert (here["face_acting"][is_held] == 1).all()
+    amplitude, moving = (np.einsum("fk,fkd->fd", wave, values[faces]) for values in (positions, velocities))
+    expected = {
+        "face_force": -wave[:, :, None] * amplitude[:, None],
+        "face_viscosity": -0.02 * wave[:, :, None] * moving[:, None],
+        "face_stiffness": np.abs(wave) * np.abs(wave).sum(axis=1, keepdims=True),
+    }
+    for name, more in expected.items():
+        shape = more.shape
+        before = there[name].reshape(shape) * (there["face_acting"] != 0).reshape(-1, *[1] * (len(shape) - 1))
+        np.testing.assert_allclose(here[name].reshape(shape)[is_held], (before + more)[is_held], rtol=1e-9, atol=1e-9)
 
 
 def test_each_direction_acts_alone():

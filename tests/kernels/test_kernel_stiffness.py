@@ -58,9 +58,8 @@ def stiffness(
         if np.round((next(of_quad) - mean) / (np.pi / 2)) % 2 == 1:
             ka, kb = kb, ka
         a, b, _, _ = 0.5 * (norm(side) + norm(np.roll(side, -2, axis=0)))
-        # What the diagonals take of the stiffness along the quad's edges leaves four tenths of it, or what is left in a square.
-        most_a, most_b = (np.clip(shear, 0.6 * k, 0.95 * k) for k in (ka, kb))
-        held = min(shear, most_a * b**2 / a**2, most_b * a**2 / b**2)
+        # What the diagonals take of the stiffness along the quad's edges leaves a twentieth of it.
+        held = min(shear, 0.95 * ka * b**2 / a**2, 0.95 * kb * a**2 / b**2)
         half_a = 0.5 * (ka - held * a**2 / b**2) * b / a
         half_b = 0.5 * (kb - held * b**2 / a**2) * a / b
         k_ij[rows] += [half_a, half_b, half_a, half_b]
