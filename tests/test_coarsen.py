@@ -227,7 +227,7 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
     all can be halved."""
     surface = sheet(columns, rows)
-    found = spread_surface(surface)
+    found = spread_surface(surface, fine=True)
     assert found is not None
     small, carry, face_of = found
     grid = rows_and_columns(small)
@@ -238,7 +238,17 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     assert (there.min(axis=1) - 1e-9 <= middle).all()
     assert (middle <= there.max(axis=1) + 1e-9).all()
     np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
-    assert spread_surface(surface) is found
+    assert spread_surface(surface, fine=True) is found
+
+
+def test_stiff_cloth_has_a_coarser_one():
+    surface = sheet(101, 101)
+    sizes = []
+    for fine in (True, False):
+        found = spread_surface(surface, fine=fine)
+        assert found is not None
+        sizes.append(len(found[0].vertices))
+    assert sizes == [57**2, 49**2]
 
 
 def test_rows_much_farther_apart_than_columns_all_stay():
@@ -273,8 +283,9 @@ def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
 
 
 def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
-    assert spread_surface(sheet(2_000, 4)) is None
-    assert spread_surface(sheet(21, 21, triangles=True)) is None
+    for fine in (True, False):
+        assert spread_surface(sheet(2_000, 4), fine=fine) is None
+        assert spread_surface(sheet(21, 21, triangles=True), fine=fine) is None
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

@@ -147,11 +147,24 @@ def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
     return tuple(steps)
 
 
-@once_per_surface
-def spread_surface(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
+def spread_surface(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArray] | None:
     """The small grid that is spread over a large one (`warpflat.thinning.spread_of`), what carries layouts up from it, and #G, for each of
     its faces one of the large grid's that lies in it; None of any other surface. Made once for each."""
-    spread = spread_of(surface)
+    return _fine_spread(surface) if fine else _coarse_spread(surface)
+
+
+@once_per_surface
+def _coarse_spread(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
+    return _spread(surface, fine=False)
+
+
+@once_per_surface
+def _fine_spread(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
+    return _spread(surface, fine=True)
+
+
+def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArray] | None:
+    spread = spread_of(surface, fine=fine)
     if spread is None:
         return None
     carry = spread.carry(surface.vertices)

@@ -115,7 +115,7 @@ class FarBelow:
 def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow | None:
     """The small grid that is spread over a grid, or the largest coarser one of any other lattice that has at most so many vertices; None
     if there is none, or where it would be mirrored."""
-    spread = spread_surface(network.surface)
+    spread = spread_surface(network.surface, fine=network.goes_along_lines)
     if spread is not None:
         surface, carry, face_of = spread
         found = _network_below(network, surface, carry.sample(layout), face_of, mend=True)
