@@ -4,7 +4,6 @@ body."""
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,12 +46,14 @@ class CellArrays:
     laid: FloatArray
     around: ByVertex
 
-    @cached_property
+    # Seldom asked for, and not kept: they take as much memory as what a relaxation needs of the cells.
+
+    @property
     def of_face(self) -> IntArray:
         """#F+1, where the cells of each face begin."""
         return np.append(self.first, np.int32(len(self.laid)))
 
-    @cached_property
+    @property
     def _corners(self) -> tuple[IntArray, IntArray, FloatArray]:
         return corner_triangles(self.faces)
 
@@ -71,14 +72,14 @@ class CellArrays:
         """#C, 1 for a triangle, 1/2 for each of a quad's four corner triangles."""
         return self._corners[2]
 
-    @cached_property
+    @property
     def edges(self) -> FloatArray:
         """#C by 2 by 2, the edges of the laid cells from corner 0 to corners 1 and 2, as columns [m]."""
         edges = np.zeros((len(self.laid), 2, 2))
         edges[:, 0, 0], edges[:, 0, 1], edges[:, 1, 1] = self.laid.T
         return edges
 
-    @cached_property
+    @property
     def area(self) -> FloatArray:
         """#C, weighted areas on the body [m2]."""
         return np.asarray(0.5 * self.weight * self.laid[:, 0] * self.laid[:, 2])

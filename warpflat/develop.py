@@ -25,6 +25,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
 from warpflat.surface.topology import (
     border_loops,
+    corner_triangles,
     euler_characteristic,
     half_edges,
     half_edges_of,
@@ -293,7 +294,8 @@ def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
     """The cells that are mirrored or as good as that."""
     if (cells.least_shares(positions) > _LEAST_AREA).all():
         return np.empty(0, dtype=np.int64)
-    return np.flatnonzero(signed_cell_areas(cells.corner, positions) * cells.weight <= _LEAST_AREA * cells.area)
+    corner, _, weight = corner_triangles(cells.faces)
+    return np.flatnonzero(signed_cell_areas(corner, positions) * weight <= _LEAST_AREA * cells.area)
 
 
 def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
@@ -302,21 +304,22 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
     Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
     """
     he = half_edges_of(surface)
+    corner, _, weight = corner_triangles(cells.faces)
     # Around an inner vertex, once is one corner through which a ray to the right passes.
     in_question = np.zeros(len(positions), dtype=bool)
     in_question[he.edges[he.count == 1]] = True
-    y = positions[:, 1][cells.corner]
+    y = positions[:, 1][corner]
     ahead, behind = np.roll(y, -1, axis=1) - y, np.roll(y, 1, axis=1) - y
-    whole = np.column_stack([cells.weight == 1.0, np.ones(len(y), dtype=bool), cells.weight == 1.0])
-    passed = cells.corner[whole & (ahead < 0) & (behind >= 0)]
+    whole = np.column_stack([weight == 1.0, np.ones(len(y), dtype=bool), weight == 1.0])
+    passed = corner[whole & (ahead < 0) & (behind >= 0)]
     in_question |= np.bincount(passed, minlength=len(positions)) > 1
     turn = np.zeros(len(positions))
     for k in range(3):
-        rows = np.flatnonzero(in_question[cells.corner[:, k]] & whole[:, k])
-        p = positions[np.roll(cells.corner[rows], -k, axis=1)]
+        rows = np.flatnonzero(in_question[corner[:, k]] & whole[:, k])
+        p = positions[np.roll(corner[rows], -k, axis=1)]
         u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
         angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))
-        turn += np.bincount(cells.corner[rows, k], angle, minlength=len(turn))
+        turn += np.bincount(corner[rows, k], angle, minlength=len(turn))
     return bool((turn > 2 * np.pi + 1e-6).any())
 
 

@@ -19,7 +19,7 @@ from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges_of
+from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.untangle import signed_cell_areas
 
 __all__ = [
@@ -131,17 +131,18 @@ def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArra
     he = half_edges_of(surface)
     edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
-    signed = signed_cell_areas(cells.corner, positions)
+    corner, face, weight = corner_triangles(cells.faces)
+    signed = signed_cell_areas(corner, positions)
     faces = len(surface.faces)
-    flat = np.bincount(cells.face, cells.weight * signed, minlength=faces)
-    body = np.bincount(cells.face, cells.area, minlength=faces)
+    flat = np.bincount(face, weight * signed, minlength=faces)
+    body = np.bincount(face, cells.area, minlength=faces)
     border = he.count == 1
     border_space, border_plane = in_space[border].sum(), in_plane[border].sum()
     return LayoutErrors(
         length_error=float(np.abs(in_plane - in_space).sum() / in_space.sum()),
         area_error=float(np.abs(flat - body).sum() / body.sum()),
         boundary_error=float(abs(border_plane - border_space) / border_space),
-        flipped_faces=len(np.unique(cells.face[signed <= 0])),
+        flipped_faces=len(np.unique(face[signed <= 0])),
     )
 
 

@@ -238,7 +238,8 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArr
 def _curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """#C each: curvature of the body along the worn warp, along the worn weft, and the twist between them [1/m]."""
     cells, surface = network.cell_arrays, network.surface
-    p = positions[cells.corner]
+    corner = cells.corner
+    p = positions[corner]
     D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
     det = D[:, 0, 0] * D[:, 1, 1] - D[:, 0, 1] * D[:, 1, 0]
     inverse = (
@@ -246,12 +247,12 @@ def _curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[Flo
         / np.where(det > 0.0, det, 1.0)[:, None, None]
     )
     deformation = np.where((det > 0.0)[:, None, None], cells.edges @ inverse, 0.0)
-    q = surface.vertices[cells.corner]
+    q = surface.vertices[corner]
     a, b = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
     x = a / np.maximum(np.linalg.norm(a, axis=1), 1e-300)[:, None]
     across = b - np.einsum("ij,ij->i", b, x)[:, None] * x
     y = across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
-    bend = curvature_tensors(surface)[cells.corner].mean(axis=1)
+    bend = curvature_tensors(surface)[corner].mean(axis=1)
     trace = float((np.einsum("ijj->i", bend) * cells.area).sum())
     if trace < 0.0:
         # Wound the other way round: a body is convex on the whole.
