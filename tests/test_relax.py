@@ -354,3 +354,16 @@ def test_a_start_of_another_mesh_is_refused():
     network, start = developed(make_shape("dome", resolution=9), 200.0)
     with pytest.raises(InputError, match=r"\(80, 2\); must be \(81, 2\)"):
         Relaxation(network, RelaxOptions(), start=start[:-1])
+
+
+@pytest.mark.parametrize(
+    ("options", "told"),
+    [
+        ({"max_steps": 1.5}, "max_steps = 1.5 is not a whole number"),
+        ({"check_every": 2.5}, "check_every = 2.5 is not a whole number"),
+        ({"kinetic_damping": "no"}, "kinetic_damping = 'no' is neither True nor False"),
+    ],
+)
+def test_options_of_a_wrong_type_are_refused(options: dict[str, object], told: str) -> None:
+    with pytest.raises(InputError, match=told):
+        RelaxOptions(**options).validate()  # type: ignore[arg-type]

@@ -94,6 +94,10 @@ class RelaxOptions:
                 raise InputError(f"relax: {key} = {value!r} is not a number")
             if not low <= value <= high:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
+            if key in ("max_steps", "check_every") and not isinstance(value, int):
+                raise InputError(f"relax: {key} = {value!r} is not a whole number")
+        if not isinstance(self.kinetic_damping, bool):
+            raise InputError(f"relax: kinetic_damping = {self.kinetic_damping!r} is neither True nor False")
         if self.solver not in SOLVERS:
             raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
 
