@@ -131,28 +131,6 @@ def list_neighbors(
 
 
 @wp.kernel
-def number_springs(
-    rows: int,
-    columns: int,
-    rising: int,
-    offset: wp.array(dtype=wp.int32),
-    first: int,
-    # outputs
-    spring: wp.array(dtype=wp.int32),
-):
-    """The springs to these vertices, by the numbers of `spring_to`."""
-    v = wp.tid() + first
-    i = v / columns
-    j = v - i * columns
-    at = offset[v]
-    for up in range(-1, 2):
-        for right in range(-1, 2):
-            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
-                spring[at] = spring_to(rows, columns, rising, i, j, i + up, j + right)
-                at += 1
-
-
-@wp.kernel
 def list_values(
     rows: int,
     columns: int,
@@ -163,7 +141,7 @@ def list_values(
     # outputs
     listed: wp.array(dtype=wp.float64),
 ):
-    """The springs' values (#S) at these springs, without a list of their numbers."""
+    """The values (#S) of the springs to these vertices, by the numbers of `spring_to`, which are listed nowhere."""
     v = wp.tid() + first
     i = v / columns
     j = v - i * columns

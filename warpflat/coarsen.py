@@ -28,6 +28,7 @@ from scipy.sparse import csr_array, eye, vstack
 from warpflat.carry import GridCarry, LatticeCarry
 from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
+from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import triangulate
@@ -275,7 +276,7 @@ def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArra
     ring.vertices = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3d, device="cpu")
     ring.layout = wp.array([] if layout is None else np.ascontiguousarray(layout), dtype=wp.vec2d, device="cpu")
     around = np.bincount(triangles.ravel(), minlength=count)
-    room, sides = (_begins(places) for places in (np.maximum(around + 2, _ROOM), around))
+    room, sides = (begins(places) for places in (np.maximum(around + 2, _ROOM), around))
     ring.offset = wp.array(room, dtype=wp.int32, device="cpu")
     ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
     ring.neighbor = wp.empty(int(room[-1]), dtype=wp.int32, device="cpu")
@@ -288,9 +289,3 @@ def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArra
     )
     order.launch()
     return ring
-
-
-def _begins(counts: NDArray[np.integer]) -> IntArray:
-    begin = np.zeros(len(counts) + 1, dtype=np.int32)
-    np.cumsum(counts, out=begin[1:])
-    return begin

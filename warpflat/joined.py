@@ -10,16 +10,12 @@ from numpy.typing import NDArray
 from warpflat.cells import ByVertex, CellArrays
 from warpflat.network import SpringNetwork
 from warpflat.springs import SpringArrays, SpringsAround
+from warpflat.sums import begins
 from warpflat.surface.mesh import Surface
 
-__all__ = ["begins", "join_networks", "join_surfaces"]
+__all__ = ["join_networks", "join_surfaces"]
 
 IntArray = NDArray[np.int32]
-
-
-def begins(counts: Sequence[int]) -> IntArray:
-    """Where each of several ranges of so many begins, and where the last one ends."""
-    return np.cumsum([0, *counts], dtype=np.int32)
 
 
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:

@@ -16,12 +16,13 @@ from scipy.sparse import block_diag, csr_array
 
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
-from warpflat.joined import begins, join_networks
+from warpflat.joined import join_networks
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
 from warpflat.rungs import Rung, rungs_of, stay
+from warpflat.sums import begins
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
 

@@ -23,14 +23,14 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, expect, nearest
-from warpflat.joined import begins, join_networks
+from warpflat.joined import join_networks
 from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
 from warpflat.network import SpringNetwork
 from warpflat.smoothing import STEADY, STILL, pace_of
 from warpflat.step_buffers import StepBuffers
-from warpflat.sums import dot
+from warpflat.sums import begins, dot
 from warpflat.tangent import TangentMatrix
 from warpflat.upright import Upright, hold_upright, take_out_turning
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from warpflat.coarsen import coarser_surfaces
 from warpflat.develop import Development
 from warpflat.fabric import Fabric, grain_axes
-from warpflat.joined import begins, join_networks
+from warpflat.joined import join_networks
 from warpflat.looks import Energies, Outcome
 from warpflat.membrane import Model
 from warpflat.multilevel import levels_pay, relax_multilevel
@@ -22,6 +22,7 @@ from warpflat.network import SpringNetwork
 from warpflat.progress import Progress, Stage
 from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.strain import strain_energy
+from warpflat.sums import begins
 from warpflat.surface import Surface
 from warpflat.tightness import Wear, meant_stretch
 from warpflat.upright import Upright

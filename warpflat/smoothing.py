@@ -1,7 +1,7 @@
 """Steps that smooth: what is rough in a layout goes in few of them, what is not is left to coarser levels.
 
-The approximate implicit step, eq. (10), without viscosity, is a push P = (I + N) D^-1 F of the forces F on the vertices, whose matrix P A,
-with that of the springs' stiffness, has its eigenvalues e between 0 and 1. With viscosity velocities swing: times sqrt(e), .21 of some
+The approximate implicit step, eq. (10), without viscosity, is a push P F of the forces F on the vertices, P = (I + N) D^-1. Of P A, with A
+the stiffness of the springs, all eigenvalues e lie between 0 and 1. With viscosity velocities swing: times sqrt(e), .21 of some
 way is left after four steps from rest, and after eight. Velocities that are carried on and pushed by the shares of a Chebyshev polynomial
 of the fourth kind leave 1 / (2 k + 1) of any way after k steps, weighed so: as little as k pushes can, and what a cycle is bound by
 (Lottes, Optimal polynomial smoothers for multigrid V-cycles, Numerical Linear Algebra with Applications 30, 2023).

@@ -214,15 +214,14 @@ def springs_of(
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short, hold])
         stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
         # Most have none: what is not written to takes no memory.
-        number = np.flatnonzero(is_quad)
         if short.any():
             lacks, lack = short.any(axis=1), np.zeros((len(faces), 2))
-            lack[number[lacks]] = short[lacks]
+            lack[np.flatnonzero(is_quad)[lacks]] = short[lacks]
         held = np.flatnonzero(hold)
         if len(held):
             weights, wave = np.empty((len(held), 4)), np.zeros((len(faces), 4))
             launch_each(weigh_waves, len(held), [surface.vertices, quads[held], hold[held]], [weights])
-            wave[number[held]] = weights
+            wave[np.flatnonzero(is_quad)[held]] = weights
     stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,

@@ -14,7 +14,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.joined import begins
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
@@ -23,6 +22,7 @@ from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
 from warpflat.network import SpringNetwork
 from warpflat.smoothing import STEADY
+from warpflat.sums import begins
 
 __all__ = ["StepBuffers"]
 

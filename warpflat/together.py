@@ -9,11 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.flattening import Flattening
-from warpflat.joined import begins, join_networks, join_surfaces
+from warpflat.joined import join_networks, join_surfaces
 from warpflat.network import SpringNetwork
 from warpflat.progress import Stage
 from warpflat.relax import Relaxation
 from warpflat.strain import strain_energy
+from warpflat.sums import begins
 from warpflat.surface.topology import components
 from warpflat.upright import Upright
 

@@ -11,8 +11,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.kernels.lattice import list_corners, list_neighbors, list_values, number_springs
+from warpflat.kernels.lattice import list_corners, list_neighbors, list_values
 from warpflat.launching import launch_each
+from warpflat.sums import begins
 from warpflat.surface.mesh import Surface, once_per_faces
 
 __all__ = ["RowByRow", "row_by_row"]
@@ -65,7 +66,7 @@ class RowByRow:
         rows, columns = (_there(count, 2) for count in (self.rows, self.columns))
         slot_of = np.empty(4, dtype=np.int32)
         slot_of[list(self.place)] = range(4)
-        offset = _begins(np.multiply.outer(rows, columns))
+        offset = begins(np.multiply.outer(rows, columns).ravel())
         corner = np.empty(offset[-1], dtype=np.int32)
         launch_each(list_corners, self.rows * self.columns, [self.rows, self.columns, slot_of, offset], [corner])
         return offset, corner
@@ -74,17 +75,14 @@ class RowByRow:
         """#V+1, where each vertex's springs begin, edges and both diagonals of each face; and the vertices at their far ends, by which they
         are sorted."""
         rows, columns = (_there(count, 3) for count in (self.rows, self.columns))
-        offset = _begins(np.multiply.outer(rows, columns) - np.int32(1))
+        offset = begins(np.multiply.outer(rows, columns).ravel() - 1)
         neighbor = np.empty(offset[-1], dtype=np.int32)
         launch_each(list_neighbors, self.rows * self.columns, [self.rows, self.columns, offset], [neighbor])
         return offset, neighbor
 
     def springs_around(self, offset: IntArray) -> IntArray:
         """Those springs' numbers: edges first, then the faces' diagonals 0-2, then 1-3. offset: #V+1, where each vertex's begin."""
-        spring = np.empty(offset[-1], dtype=np.int32)
-        given = [self.rows, self.columns, self._rising, offset]
-        launch_each(number_springs, self.rows * self.columns, given, [spring])
-        return spring
+        return self.listed(offset, np.arange(offset[-1] // 2)).astype(np.int32)
 
     def listed(self, offset: IntArray, values: FloatArray) -> FloatArray:
         """The springs' values (#S) in the order of these numbers."""
@@ -105,12 +103,6 @@ def _there(count: int, most: int) -> IntArray:
     there[0] -= 1
     there[-1] -= 1
     return there
-
-
-def _begins(counts: IntArray) -> IntArray:
-    offset = np.zeros(counts.size + 1, dtype=np.int32)
-    np.cumsum(counts.ravel(), out=offset[1:])
-    return offset
 
 
 @once_per_faces
