@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -21,13 +19,13 @@ _SOUND = 1e-3
 
 Mark = tuple[FloatArray, FloatArray]
 """#V by 2, a layout [m], and the forces there [N]."""
-Way = tuple[NDArray[np.float32], NDArray[np.float32]]
-"""#V by 2, a way from one layout to another [m], and how much the forces fell on it [N]. Only directions count: single precision does."""
+Way = NDArray[np.float32]
+"""#V by 2, from one layout to another [m]. Only its direction counts: single precision does."""
 
 
 class CycleMemory:
-    """The last few cycles: where they led, and how much the forces fell on the way. In the plane of these ways the energy is known, to
-    second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
+    """The last few cycles: where they led, and how much the forces fell along each way on each other. In the plane of these ways the energy
+    is known, to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
 
     A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
     share with each cycle.
@@ -37,24 +35,43 @@ class CycleMemory:
         """Of so many cycles, besides the present one."""
         self._depth = depth
         self._last: Mark | None = None
+        # Ways of cycles before, each as one, and then those of the present cycle's parts; of all of them the curvature, the fall of the
+        # forces on one of them along another [N m].
         self._ways: list[Way] = []
-        self._past: list[Way] = []
+        self._past = 0
+        self._curvature = np.zeros((0, 0))
 
     def begin(self, mark: Mark) -> None:
         """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told. The mark
         is copied."""
-        if self._ways:
+        if len(self._ways) > self._past:
             self.come_to(mark)
-            self._past.append(_joined(self._ways))
-            del self._past[: -self._depth]
+            self._join()
+            del self._ways[: -self._depth]
+            self._past = len(self._ways)
+            self._curvature = self._curvature[-self._past :, -self._past :]
         self._keep(mark)
-        self._ways = []
 
     def come_to(self, mark: Mark) -> None:
         """A part of the cycle has led here: each is a way of its own. The mark is copied."""
         assert self._last is not None
-        self._ways.append((_difference(mark[0], self._last[0]), _difference(self._last[1], mark[1])))
+        fall = _difference(self._last[1], mark[1])
+        self._ways.append(_difference(mark[0], self._last[0]))
+        # How the forces fell on earlier ways along this one is the same as long as they fall in proportion.
+        along = products([way.ravel() for way in self._ways], [fall.ravel()])
+        self._curvature = np.block([[self._curvature, along[:-1]], [along.T]])
         self._keep(mark)
+
+    def _join(self) -> None:
+        """Make the parts of the present cycle one."""
+        parts = len(self._ways) - self._past
+        for way in self._ways[self._past + 1 :]:
+            self._ways[self._past] += way
+        del self._ways[self._past + 1 :]
+        joined = np.zeros((self._past + 1, self._past + parts))
+        joined[:-1, : self._past] = np.eye(self._past)
+        joined[-1, self._past :] = 1.0
+        self._curvature = joined @ self._curvature @ joined.T
 
     def _keep(self, mark: Mark) -> None:
         """In the room of the last one."""
@@ -67,10 +84,8 @@ class CycleMemory:
     def lowest(self, room: FloatArray) -> bool:
         """Put the way from where the cycle has come to where the energy is least there, #V by 2 [m]; whether that can be told."""
         assert self._last is not None
-        parts = [way for way in (*self._past, *self._ways) if way[0].any()]
-        ways, falls = ([part[k].ravel() for part in parts] for k in (0, 1))
-        curvature = products(ways, falls)
-        curvature = 0.5 * (curvature + curvature.T)
+        moved = [number for number, way in enumerate(self._ways) if way.any()]
+        ways, curvature = [self._ways[number].ravel() for number in moved], self._curvature[np.ix_(moved, moved)]
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not len(size) or not (size > 0.0).all():
             return False
@@ -80,18 +95,10 @@ class CycleMemory:
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
         weighted_rows(share, ways, room.reshape(-1))
-        self._ways = [_joined(self._ways)]
+        self._join()
         return True
 
 
 def _difference(a: FloatArray, b: FloatArray) -> NDArray[np.float32]:
     """a - b, rounded in the end only."""
     return np.subtract(a, b, out=np.empty(a.shape, dtype=np.float32))
-
-
-def _joined(ways: Sequence[Way]) -> Way:
-    """One after the other, in the place of the first."""
-    for way in ways[1:]:
-        for total, more in zip(ways[0], way, strict=True):
-            total += more
-    return ways[0]
