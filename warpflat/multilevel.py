@@ -17,6 +17,8 @@ Nested iteration gives the start: the coarsest level is relaxed first, and each 
 went. The minimum is that of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's
 work as the unit.
 
+Where they take too little away, in a cloth soft in shear between triangles, whole implicit steps go on (`warpflat.whole_steps`).
+
 Of several pieces side by side (`warpflat.joined`) each has levels of its own, which are joined level by level; a piece that has no
 coarser one stays as it is on those below. How much of a correction is taken, and whether the piece is at rest, is told piece by piece.
 """
@@ -36,6 +38,7 @@ from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, Watch, relax
+from warpflat.whole_steps import relax_whole, whole_steps_pay
 
 __all__ = ["levels_pay", "relax_multilevel"]
 
@@ -44,6 +47,9 @@ BoolArray = NDArray[np.bool_]
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0
 _FEW = 1_200
+# Of such a cloth between triangles cycles give way to whole steps once they have taken so many units; from such a K/G on at once.
+_PATIENCE = 600.0
+_VERY_SOFT = 200.0
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
 
@@ -110,6 +116,10 @@ def levels_pay(network: SpringNetwork) -> bool:
     return network.vertex_count > _FEW or network.fabric.softness < _SOFT
 
 
+def _patience(network: SpringNetwork) -> float:
+    return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE
+
+
 def relax_multilevel(
     state: Relaxation,
     *,
@@ -160,6 +170,10 @@ def relax_multilevel(
     state.evaluate_at_rest()
     state.work_units += FORCE_WORK
     while not cycles.done.all() and cycles.state.work_units - start < options.max_steps:
+        if whole_steps_pay(state.network) and cycles.state.work_units - start >= _patience(state.network):
+            left_over = options.max_steps - (cycles.state.work_units - start)
+            relax_whole(cycles.state, most=left_over, enough=enough, watch=watch, each_step=each_step)
+            break
         left = cycles.without_done()
         if left is not None:
             cycles.state.give(whole)

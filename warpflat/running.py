@@ -26,6 +26,7 @@ from warpflat.sums import begins
 from warpflat.surface import Surface
 from warpflat.tightness import Wear, meant_stretch
 from warpflat.upright import Upright
+from warpflat.whole_steps import relax_whole, whole_steps_pay
 
 __all__ = ["Relaxed", "Run", "relax_runs"]
 
@@ -242,6 +243,8 @@ class _Batch:
     def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
         told = any(run.callback is not None for run in self._runs)
         each_step = self._each_step if told else None
+        if not levels and self._options.solver == "multilevel" and whole_steps_pay(self._state.network):
+            return relax_whole(self._state, enough=enough, watch=self._watch, each_step=each_step)
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
         # After an edit the layout is near the minimum already; a grid is nearer once it has been carried up from its coarser levels.
