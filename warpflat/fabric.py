@@ -156,6 +156,13 @@ class Fabric:
         """K/G: how much stiffer it is along its threads than in shear."""
         return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
 
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether it is the same in all directions, within .1 %: values are given with three or four digits."""
+        same = math.isclose(self.stiffness_warp, self.stiffness_weft, rel_tol=1e-3)
+        sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
+        return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
+
     def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> NDArray[np.float64]:
         """Tension at given strains along one direction, by the curve where there is one.
 
