@@ -74,6 +74,12 @@ def test_a_fabric_table_and_fabric_files(tmp_path: Path):
     assert own.stiffness_warp == pytest.approx(98.07 / 0.03, rel=1e-3)
 
 
+def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):
+    write_scene(tmp_path, "\ufeff[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    text = "\ufefffabric = 'mine'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n"
+    assert scene_fabric(load_scene(write_scene(tmp_path, text))).shear_stiffness == 40.0
+
+
 def test_mesh_files_are_found_from_the_scene_and_by_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     (tmp_path / "meshes").mkdir()
     (tmp_path / "meshes" / "plane.obj").write_text(PLANE_OBJ)
