@@ -280,7 +280,8 @@ class DartMove:
     Attributes:
         result: the piece afterwards.
         closed, opened: names of the cuts.
-        energy_before, energy_both, energy_after: with the old dart, with both open, with the new one [J].
+        energy_before, energy_both, energy_after: what is minimised, springs and guard, with the old dart, with both open, with the new
+            one [J].
         angle_before, angle_after: of the old dart and of the new one, all their seams together [rad].
     """
 
@@ -341,9 +342,9 @@ def move_dart(
         result=after,
         closed=close,
         opened=plan.name,
-        energy_before=result.stages[-1].spring_energy_j,
-        energy_both=both.stages[-1].spring_energy_j,
-        energy_after=after.stages[-1].spring_energy_j,
+        energy_before=result.stages[-1].potential_j,
+        energy_both=both.stages[-1].potential_j,
+        energy_after=after.stages[-1].potential_j,
         angle_before=_angle_of(result, close),
         angle_after=_angle_of(after, plan.name),
     )
