@@ -39,7 +39,6 @@ __all__ = [
     "DartMove",
     "carry_layout",
     "cut",
-    "cut_sides",
     "draw_line",
     "line_part",
     "move_dart",
@@ -208,11 +207,6 @@ def carry_layout(positions: FloatArray, faces: IntArray, new_faces: IntArray, co
         total = np.bincount(pairs[:, 0], positions[pairs[:, 1], axis], minlength=count)
         carried[number > 0, axis] = total[number > 0] / number[number > 0]
     return carried
-
-
-def cut_sides(cuts: Sequence[AppliedCut]) -> dict[str, list[IntArray]]:
-    """Both sides of every crack by the name of its cut, in the pattern's numbering, for frames and pictures."""
-    return {made.name: [side for seam in made.seams for side in (seam.left, seam.right)] for made in cuts}
 
 
 def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flattening, IntArray]:
