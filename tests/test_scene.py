@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import runpy
 from pathlib import Path
 
@@ -270,5 +271,12 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
 def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(SCENES / "scripted.py"), run_name="__main__")
-    assert "flips 0" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "flips 0" in told
+    assert "inf" not in told
+    _, *cloths = re.split("^(?:denim|interlock)$", told, flags=re.MULTILINE)
+    for cloth in cloths:
+        energies = [float(energy) for energy in re.findall(r"([0-9.]+) mJ", cloth)]
+        assert len(energies) >= 5
+        assert energies == sorted(energies, reverse=True)
     assert (tmp_path / "out" / "scripted" / "denim" / "metrics.json").exists()
