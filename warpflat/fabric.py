@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, is_number, nearest
 
 __all__ = [
     "DEFAULT_FABRIC",
@@ -129,7 +129,7 @@ class Fabric:
             value = getattr(self, key)
             if value is None:
                 raise InputError(f"fabric {self.name!r}: {key} is missing; {_range_text(lowest, highest, unit)}")
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+            if not is_number(value):
                 raise InputError(f"fabric {self.name!r}: {key} = {value!r} is not a number")
             if not lowest <= value <= highest:  # false for NaN too
                 raise InputError(
