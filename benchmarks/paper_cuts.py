@@ -12,7 +12,7 @@ in the fabric `woven`. The paper, on its own mannequin: 1.66 J, A 1.32 J (-20.5 
 
 from __future__ import annotations
 
-import sys
+import argparse
 
 import numpy as np
 
@@ -35,11 +35,14 @@ def paths(piece: Flattening, line: str, stops: list[str]) -> tuple[np.ndarray, .
 def energies(piece: Flattening) -> tuple[float, float]:
     """Minimised energy and strain energy as worn [J]."""
     last = piece.stages[-1]
-    return last.spring_energy_j + last.guard_energy_j, last.strain_energy_j
+    return last.potential_j, last.strain_energy_j
 
 
-def main(sizes: list[str]) -> None:
+def main() -> None:
     """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("sizes", nargs="*", metavar="SIZE", help="[default: EU 36 to EU 44]")
+    sizes = parser.parse_args().sizes or ["EU 36", "EU 38", "EU 40", "EU 42", "EU 44"]
     print(f"{'size':8}{'uncut':>20}{'A: bust line':>34}{'B: princess lines':>34}")
     for size in sizes:
         block = Mannequin.from_size(size).form("basic_block").pieces["front_bodice"]
@@ -60,4 +63,4 @@ def main(sizes: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:] or ["EU 36", "EU 38", "EU 40", "EU 42", "EU 44"])
+    main()

@@ -38,7 +38,7 @@ def moved(coarse: FloatArray, fine: FloatArray) -> float:
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shape", nargs="+", default=["dome", "saddle", "bodice"])
     parser.add_argument("--shear", nargs="+", type=float, default=[200.0, 20.0], help="G [N/m]")
     parser.add_argument("--cells", nargs="+", choices=["quads", "triangles"], default=["quads", "triangles"])

@@ -172,7 +172,7 @@ class Runner:
         assert best is not None
         seconds, flat, looks = best
         last = flat.stages[-1]
-        self._looks[name, threads] = [*looks, (last.spring_energy_j + last.guard_energy_j, seconds, last.work_units)]
+        self._looks[name, threads] = [*looks, (last.potential_j, seconds, last.work_units)]
         self._layouts[name, threads] = flat.positions
         errors = layout_errors(flat.network.surface, flat.network, flat.positions)
         relaxing = sum(stage.seconds for stage in flat.stages if stage.name != "develop")

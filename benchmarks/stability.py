@@ -238,7 +238,7 @@ def draw(runs: dict[tuple[str, float], Run], case: Case, title: str, path: Path)
 
 def main() -> None:
     """Print the table, and draw it if asked to."""
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--shape", default="dome")
     parser.add_argument("--resolution", type=int, default=33)
     parser.add_argument("--shear", type=float, default=200.0, help="G [N/m], with K = 1000 N/m")

@@ -20,16 +20,11 @@ from warpflat.shapes import make_shape
 RESOLUTION = 65
 
 
-def stored(result: Flattening) -> float:
-    """What the relaxation minimises [J]."""
-    return result.stages[-1].spring_energy_j + result.stages[-1].guard_energy_j
-
-
 def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
     """A row of the figure."""
     worn, before = result.stages[-1].strain_energy_j, uncut.stages[-1].strain_energy_j
     change = {
-        "energy": (stored(result), stored(uncut)),
+        "energy": (result.stages[-1].potential_j, uncut.stages[-1].potential_j),
         "as worn": (worn, before),
     }
     captions = {"fabric": result.fabric.name}

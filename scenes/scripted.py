@@ -1,4 +1,4 @@
-"""A run as a script: one dome in two cloths, with a look at every hundredth step.
+"""A run as a script: one dome in two cloths, with the energy whenever it is looked at, and how each comes to rest.
 
 python scenes/scripted.py
 """
@@ -10,15 +10,29 @@ from warpflat.flattening import Progress
 from warpflat.shapes import make_shape
 
 
-def watch(progress: Progress) -> None:
-    """Called after every step."""
-    if progress.step % 100 == 0:
-        print(f"  step {progress.step:5d}: {progress.spring_energy * 1e3:9.4f} mJ, residual {progress.residual:.1e}")
+class Watch:
+    """A callback that prints a line for each look at the energy."""
+
+    def __init__(self) -> None:
+        """Nothing has been seen yet."""
+        self.seen = -1.0
+
+    def __call__(self, progress: Progress) -> None:
+        """Called after every step; between two looks, steps apart, the energy is that of the last one."""
+        if progress.spring_energy != self.seen:
+            print(
+                f"  {progress.stage:8} {progress.work_units:5.1f} units of work {1e3 * progress.spring_energy:9.4f} mJ"
+            )
+            self.seen = progress.spring_energy
 
 
 surface = make_shape("dome", resolution=33)
 for fabric in ("denim", "interlock"):
     print(fabric)
-    pattern = warpflat.flatten(surface, fabric=fabric, datum="centre", callback=watch)
+    pattern = warpflat.flatten(surface, fabric=fabric, datum="centre", callback=Watch())
+    last = pattern.stages[-1]
+    print(
+        f"  at rest  {last.work_units:5.1f} units of work {1e3 * last.spring_energy_j:9.4f} mJ, residual {last.residual:.1e}"
+    )
     print(f"  length error {100 * pattern.measures['length_error']:.2f} %, flips {pattern.flipped_faces}")
     pattern.save(f"out/scripted/{fabric}")

@@ -318,13 +318,28 @@ def test_usage_errors_are_one_line(warpflat: Run):
     assert "warpflat run --help" in mistake(warpflat("run"))
 
 
-@pytest.mark.parametrize("command", [[], ["run"], ["flatten"], ["fabrics"]])
+@pytest.mark.parametrize("command", [[], ["run"], ["flatten"], ["compare"], ["cuts"], ["fabrics"]])
 def test_help_teaches(warpflat: Run, command: list[str]):
     code, out, err = warpflat(*command, "--help")
     assert (code, err) == (0, "")
     assert "Examples:" in out
     if command != ["fabrics"]:
         assert re.search(r"Exit codes:\n +0 +done\n", out)
+
+
+@pytest.mark.parametrize(
+    ("command", "printed", "folder"),
+    [
+        ("run", "metrics.json", "out/NAME"),
+        ("flatten", "metrics.json", "out/NAME"),
+        ("compare", "compare.json", "out/NAME-compared"),
+        ("cuts", "ledger.json, with --apply metrics.json,", "out/NAME"),
+    ],
+)
+def test_help_says_what_is_printed_and_where_files_go(warpflat: Run, command: str, printed: str, folder: str):
+    told = " ".join(warpflat(command, "--help")[1].split())
+    assert f"--json Print {printed} on standard output" in told
+    assert f"Folder for the files. [default: {folder}]" in told
 
 
 def test_version(warpflat: Run):

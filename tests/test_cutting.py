@@ -316,6 +316,10 @@ def test_a_dart_moved_to_another_line_keeps_its_budget(bust_cut: Flattening):
     assert moved.result.flipped_faces == 0
     assert moved.result.converged
     assert moved.energy_both < min(moved.energy_before, moved.energy_after)
+    before = Relaxation(bust_cut.network, RelaxOptions(), start=bust_cut.positions).energies()
+    assert before.guard > 0.1 * before.potential
+    assert moved.energy_before == pytest.approx(before.potential, rel=1e-6)
+    assert moved.energy_after == moved.result.stages[-1].potential_j
     # The bust's angle defect must open somewhere: both darts show most of it.
     assert moved.angle_after == pytest.approx(moved.angle_before, rel=0.4)
     with pytest.raises(InputError, match="no cut 'bosom' to close"):

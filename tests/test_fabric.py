@@ -98,6 +98,14 @@ def test_isotropic_fabrics_obey_the_isotropic_relation(name: str):
     assert fabric.shear_stiffness == pytest.approx(relation, rel=1e-3)
 
 
+def test_only_isotropic_fabrics_are_isotropic():
+    isotropic = [name for name, fabric in load_library().items() if fabric.is_isotropic]
+    assert isotropic == ["isotropic", "paper", "neoprene", "leather"]
+    assert not cloth(stiffness_warp=1000.0, shear_stiffness=490.0).is_isotropic
+    assert cloth(stiffness_warp=1000.0, shear_stiffness=500.0).is_isotropic
+    assert not cloth(stiffness_warp=1010.0, shear_stiffness=500.0).is_isotropic
+
+
 def test_names_and_aliases_are_found_as_people_type_them():
     assert find_fabric("Power Net").name == "power-net"
     assert find_fabric("WOOL_plain").name == "wool-plain"

@@ -219,6 +219,16 @@ def test_stiffnesses_of_quads_have_no_jump_at_any_angle_to_the_grain():
     np.testing.assert_allclose(law[beyond, 2], rotated[beyond])
 
 
+def test_an_isotropic_cloth_does_not_feel_the_grain():
+    surface = make_shape("bodice", resolution=17)
+    straight, aslant = (
+        flatten(surface, fabric="isotropic", datum="centre", grain_angle=angle) for angle in (0.0, 30.0)
+    )
+    assert aslant.stages[-1].spring_energy_j == pytest.approx(straight.stages[-1].spring_energy_j, rel=1e-6)
+    far = [np.linalg.norm(flat.positions - flat.positions[0], axis=1) for flat in (straight, aslant)]
+    np.testing.assert_allclose(*far, atol=2e-5)
+
+
 @pytest.mark.parametrize(
     ("grain_angle", "model", "noted"), [(5, "springs", 0), (30, "springs", 1), (30, "membrane", 0)]
 )

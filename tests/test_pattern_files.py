@@ -173,6 +173,15 @@ def test_an_edge_that_the_plane_does_not_show_is_a_note_and_all_else_is_drawn(tm
     }  # fmt: skip
 
 
+def test_a_pattern_may_begin_with_a_byte_order_mark(tmp_path: Path):
+    corners = np.array([(0, 0, 0), (0.2, 0, 0), (0.2, 0.3, 0), (0, 0.3, 0)], dtype=float)
+    flat = flatten(make_surface(corners, np.array([[0, 1, 2, 3]], dtype=np.int32), name="cloth"))
+    surface_files([flat], tmp_path, name="cloth", options=PatternOptions(formats=("json",)))
+    file = tmp_path / "pattern.json"
+    file.write_text(file.read_text(encoding="utf-8"), encoding="utf-8-sig")
+    assert len(read_pattern_json(file).pieces[""]) == 1
+
+
 def test_every_edge_that_a_cut_surface_has_may_be_named(tmp_path: Path):
     (tmp_path / "trial.toml").write_text(PARTED)
     run_scene(load_scene(tmp_path / "trial.toml"), tmp_path / "out")

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import os
+import re
 import runpy
 from pathlib import Path
 
@@ -72,6 +73,12 @@ def test_a_fabric_table_and_fabric_files(tmp_path: Path):
     assert own.name == "trial"
     assert own.shear_stiffness == 40.0
     assert own.stiffness_warp == pytest.approx(98.07 / 0.03, rel=1e-3)
+
+
+def test_scenes_and_fabrics_may_begin_with_a_byte_order_mark(tmp_path: Path):
+    write_scene(tmp_path, "\ufeff[mine]\nbase = 'denim'\nshear_stiffness = 40.0\n", "cloth.toml")
+    text = "\ufefffabric = 'mine'\nfabric_files = ['cloth.toml']\n[surface]\nshape = 'dome'\n"
+    assert scene_fabric(load_scene(write_scene(tmp_path, text))).shear_stiffness == 40.0
 
 
 def test_mesh_files_are_found_from_the_scene_and_by_variables(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
@@ -264,5 +271,12 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
 def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(tmp_path)
     runpy.run_path(str(SCENES / "scripted.py"), run_name="__main__")
-    assert "flips 0" in capsys.readouterr().out
+    told = capsys.readouterr().out
+    assert "flips 0" in told
+    assert "inf" not in told
+    _, *cloths = re.split("^(?:denim|interlock)$", told, flags=re.MULTILINE)
+    for cloth in cloths:
+        energies = [float(energy) for energy in re.findall(r"([0-9.]+) mJ", cloth)]
+        assert len(energies) >= 5
+        assert energies == sorted(energies, reverse=True)
     assert (tmp_path / "out" / "scripted" / "denim" / "metrics.json").exists()

@@ -84,3 +84,12 @@ def test_developable_shapes_have_their_known_measures():
 def test_wrong_parameters_are_refused(name: str, parameters: dict, message: str):
     with pytest.raises(InputError, match=message):
         make_shape(name, **parameters)
+
+
+def test_parameters_may_be_numbers_of_numpy():
+    made = make_shape("dome", resolution=np.int64(5), radius=np.float32(0.5))
+    assert len(made.vertices) == 25
+    with pytest.raises(InputError, match="resolution: should be a whole number"):
+        make_shape("dome", resolution=np.float64(5.0))
+    with pytest.raises(InputError, match="resolution: should be a whole number"):
+        make_shape("dome", resolution=True)

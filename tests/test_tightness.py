@@ -127,6 +127,10 @@ def test_impossible_wishes_are_refused_by_name(wear: dict[str, object], message:
         Wear(**wear)  # type: ignore[arg-type]
 
 
+def test_wishes_may_be_numbers_of_numpy():
+    assert Wear(stretch_weft=np.float32(0.125), stretch_warp=np.int64(0)).is_tight  # type: ignore[arg-type]
+
+
 # --- curvature
 
 

@@ -47,6 +47,12 @@ What comes out, in DIR:
   pattern.pdf   the same in true size, tiled on A4
   pattern.json  everything of the pattern; warpflat export makes the others from it"""
 
+_COMPARED = """\b
+What comes out, in DIR:
+  compare.json  measures of every piece in each fabric, and how far the outlines lie apart [m]
+  compare.png   the outlines laid upon each other
+  compare.svg   the same in true size"""
+
 
 class _Interrupted(Exception):
     pass
@@ -140,31 +146,33 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-def _output_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    for option in reversed(
-        [
-            click.option(
-                "--out",
-                type=click.Path(path_type=Path),
-                metavar="DIR",
-                help="Folder for the files.  [default: out/NAME]",
-            ),
-            click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
-            click.option(
-                "--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else."
-            ),
-            click.option(
-                "--device", metavar="NAME", help="Warp device, such as cpu or cuda:0.  [default: Warp's choice]"
-            ),
-        ]
-    ):
-        command = option(command)
-    return command
+def _output_options(
+    *, folder: str = "out/NAME", printed: str = "metrics.json"
+) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """Options of commands that leave files in a folder, by default in this one, and print one of them on demand."""
+    options = [
+        click.option(
+            "--out",
+            type=click.Path(path_type=Path),
+            metavar="DIR",
+            help=f"Folder for the files.  [default: {folder}]",
+        ),
+        click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
+        click.option("--json", "as_json", is_flag=True, help=f"Print {printed} on standard output, nothing else."),
+        click.option("--device", metavar="NAME", help="Warp device, such as cpu or cuda:0.  [default: Warp's choice]"),
+    ]
+
+    def with_options(command: Callable[..., Any]) -> Callable[..., Any]:
+        for option in reversed(options):
+            command = option(command)
+        return command
+
+    return with_options
 
 
 @cli.command(epilog=f"{_FILES}\n\n{_EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
-@_output_options
+@_output_options()
 def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None) -> int:
     """Run a scene file.
 
@@ -209,7 +217,7 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
 @click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
 @click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
 @click.option("--no-picture", is_flag=True, help="Write no picture.png.")
-@_output_options
+@_output_options()
 def flatten(
     mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
 ) -> int:
@@ -328,12 +336,12 @@ def _metres(text: str, option: str) -> tuple[str, float]:
         raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}") from None
 
 
-@cli.command()
+@cli.command(epilog=f"{_COMPARED}\n\n{_EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
 @click.option(
     "--fabric", "fabrics", multiple=True, metavar="NAME", help="One of those to compare; the first is the base."
 )
-@_output_options
+@_output_options(folder="out/NAME-compared", printed="compare.json")
 def compare(
     scene: Path, fabrics: tuple[str, ...], out: Path | None, quiet: bool, as_json: bool, device: str | None
 ) -> int:
@@ -404,7 +412,7 @@ def fabrics(name: str | None, files: tuple[Path, ...], as_json: bool) -> None:
     show_default=True,
     help="What the order goes by: energy released per centimetre cut, or in all.",
 )
-@_output_options
+@_output_options(printed="ledger.json, with --apply metrics.json,")
 def cuts(
     scene: Path,
     out: Path | None,
@@ -418,7 +426,7 @@ def cuts(
 
     Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, and
     paths that follow the energy. Each is tried with a coarse relaxation; --apply relaxes fully. Writes ledger.json and
-    ledger.png.
+    ledger.png, with --apply all that a run leaves, too.
 
     \b
     Examples:

@@ -39,7 +39,6 @@ __all__ = [
     "DartMove",
     "carry_layout",
     "cut",
-    "cut_sides",
     "draw_line",
     "line_part",
     "move_dart",
@@ -210,11 +209,6 @@ def carry_layout(positions: FloatArray, faces: IntArray, new_faces: IntArray, co
     return carried
 
 
-def cut_sides(cuts: Sequence[AppliedCut]) -> dict[str, list[IntArray]]:
-    """Both sides of every crack by the name of its cut, in the pattern's numbering, for frames and pictures."""
-    return {made.name: [side for seam in made.seams for side in (seam.left, seam.right)] for made in cuts}
-
-
 def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flattening, IntArray]:
     """The same piece with a path worked into its edges, and the path's vertices; the pattern lies where it lay.
 
@@ -280,7 +274,8 @@ class DartMove:
     Attributes:
         result: the piece afterwards.
         closed, opened: names of the cuts.
-        energy_before, energy_both, energy_after: with the old dart, with both open, with the new one [J].
+        energy_before, energy_both, energy_after: what is minimised, springs and guard, with the old dart, with both open, with the new
+            one [J].
         angle_before, angle_after: of the old dart and of the new one, all their seams together [rad].
     """
 
@@ -341,9 +336,9 @@ def move_dart(
         result=after,
         closed=close,
         opened=plan.name,
-        energy_before=result.stages[-1].spring_energy_j,
-        energy_both=both.stages[-1].spring_energy_j,
-        energy_after=after.stages[-1].spring_energy_j,
+        energy_before=result.stages[-1].potential_j,
+        energy_both=both.stages[-1].potential_j,
+        energy_after=after.stages[-1].potential_j,
         angle_before=_angle_of(result, close),
         angle_after=_angle_of(after, plan.name),
     )

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import numbers
 from collections.abc import Collection, Iterable
 
-__all__ = ["InputError", "expect", "expect_callback", "expect_each", "nearest"]
+__all__ = ["InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
 
 
 class InputError(ValueError):
@@ -57,6 +58,11 @@ def expect_callback(callback: object) -> None:
     """
     if callback is not None and not callable(callback):
         raise InputError(f"callback is of type {type(callback).__name__}; it must be a function, or None")
+
+
+def is_number(value: object, *, whole: bool = False) -> bool:
+    """Whether it is a number, a whole one if that is asked for; Python's and NumPy's are, True and False are none."""
+    return isinstance(value, numbers.Integral if whole else numbers.Real) and not isinstance(value, bool)
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:

@@ -11,7 +11,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, is_number, nearest
 
 __all__ = [
     "DEFAULT_FABRIC",
@@ -129,7 +129,7 @@ class Fabric:
             value = getattr(self, key)
             if value is None:
                 raise InputError(f"fabric {self.name!r}: {key} is missing; {_range_text(lowest, highest, unit)}")
-            if isinstance(value, bool) or not isinstance(value, (int, float, np.integer, np.floating)):
+            if not is_number(value):
                 raise InputError(f"fabric {self.name!r}: {key} = {value!r} is not a number")
             if not lowest <= value <= highest:  # false for NaN too
                 raise InputError(
@@ -155,6 +155,13 @@ class Fabric:
     def softness(self) -> float:
         """K/G: how much stiffer it is along its threads than in shear."""
         return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether it is the same in all directions, within .1 %: values are given with three or four digits."""
+        same = math.isclose(self.stiffness_warp, self.stiffness_weft, rel_tol=1e-3)
+        sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
+        return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
 
     def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> NDArray[np.float64]:
         """Tension at given strains along one direction, by the curve where there is one.

@@ -113,7 +113,7 @@ def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
 
 def _missed(stage: Stage) -> float:
     """What the cloth stores and springs do not tell of [J]."""
-    return stage.strain_energy_j - stage.spring_energy_j - stage.guard_energy_j
+    return stage.strain_energy_j - stage.potential_j
 
 
 def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:

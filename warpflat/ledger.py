@@ -35,7 +35,7 @@ class LedgerEntry:
     Attributes:
         candidate: the cut.
         length: cut [m].
-        energy_before, energy_after: of the springs [J]; on a refined mesh both of the refined one.
+        energy_before, energy_after: what is minimised, springs and guard [J]; on a refined mesh both of the refined one.
         strain_energy_before, strain_energy_after: of the cloth as worn [J].
         opening: widest gap of its cracks, at the border or, of a fish-eye dart, in its middle [m].
         angle: of its widest dart [rad]; NaN if it parts the cloth. Negative: its sides overlap.
@@ -198,8 +198,8 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
     return LedgerEntry(
         candidate=candidate,
         length=path_length(before.surface, paths),
-        energy_before=_minimised(before),
-        energy_after=_minimised(after),
+        energy_before=before.stages[-1].potential_j,
+        energy_after=after.stages[-1].potential_j,
         strain_energy_before=old["strain_energy_j"],
         strain_energy_after=new["strain_energy_j"],
         opening=opening,
@@ -211,11 +211,6 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
         flipped_faces=new["flipped_faces"],
         result=after,
     )
-
-
-def _minimised(result: Flattening) -> float:
-    last = result.stages[-1]
-    return last.spring_energy_j + last.guard_energy_j
 
 
 def _widest(result: Flattening) -> tuple[float, float]:
@@ -241,7 +236,7 @@ class AutoCut:
 
     Attributes:
         max_cuts: at most so many; a mirrored pair counts as one.
-        stop_below: spring energy at which it is enough [J].
+        stop_below: what is minimised, springs and guard, at which it is enough [J].
         stop_below_strain: likewise for the largest worn strain along warp or weft that all but 2 % of the cloth stay below.
         by: what the best cut is: "per_cm", or "released" in all.
     """
@@ -253,7 +248,7 @@ class AutoCut:
 
     def is_enough(self, result: Flattening) -> bool:
         """Whether a piece needs no further cut."""
-        return _minimised(result) <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
+        return result.stages[-1].potential_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
 
 
 def worn_strain_level(result: Flattening) -> float:

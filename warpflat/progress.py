@@ -37,6 +37,11 @@ class Stage:
     converged: bool
     residual: float | None
 
+    @property
+    def potential_j(self) -> float:
+        """What is minimised: springs and guard."""
+        return self.spring_energy_j + self.guard_energy_j
+
     def as_dict(self) -> dict[str, Any]:
         """As in `metrics.json`."""
         return dict(self.__dict__)
@@ -46,7 +51,8 @@ class Progress:
     """Where a run stands; what a callback gets after every step.
 
     Attributes:
-        stage: "develop", "relax" or "cut:NAME".
+        stage: "develop", before the first step, then "relax"; "cut:NAME" and "close:NAME" where darts open and close, "fabric:NAME" and
+            "surface:NAME" after a change of these, "refine" on a mesh with a path drawn for a cut.
         step: approximate implicit steps so far, on the piece's own mesh.
         work_units: all work so far, in such steps.
         max_steps: at most so many.

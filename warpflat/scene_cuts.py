@@ -74,7 +74,7 @@ class AutoCutTable(Table):
     max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
     """At most so many; a mirrored pair counts as one."""
     stop_below: Annotated[float, Field(ge=0.0)] = 0.0
-    """Spring energy that is low enough, [J]."""
+    """What is minimised, springs and guard, that is low enough, [J]."""
     stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
     """Worn strain along warp or weft that is low enough on 98 % of the cloth."""
     by: Literal["released", "per_cm"] = "released"

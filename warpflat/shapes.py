@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, is_number, nearest
 from warpflat.surface import Surface, make_surface
 
 __all__ = ["SHAPES", "bodice", "cone", "cylinder", "dome", "hemisphere", "make_shape", "saddle", "strip"]
@@ -204,15 +204,11 @@ def make_shape(name: str, **parameters: Any) -> Surface:
         if key not in known:
             raise InputError(f"{key}: unknown key {key!r} for shape {name!r}; {nearest(key, known)}")
         wanted = type(known[key].default)
-        right = isinstance(value, bool) if wanted is bool else _is_number(value, wanted is int)
+        right = isinstance(value, bool) if wanted is bool else is_number(value, whole=wanted is int)
         if not right:
             kind = {bool: "true or false", int: "a whole number", float: "a number"}[wanted]
             raise InputError(f"{key}: should be {kind}, such as {known[key].default}, got {value!r}")
     return SHAPES[name](**parameters)
-
-
-def _is_number(value: Any, whole: bool) -> bool:
-    return isinstance(value, int if whole else (int, float)) and not isinstance(value, bool)
 
 
 def _check_range(shape: str, key: str, value: float, lowest: float, highest: float) -> None:

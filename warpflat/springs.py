@@ -240,10 +240,11 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
 
     Within 7.5 degrees of warp or weft the edges are the threads. From 15 degrees on the crossed lattice gets the rotated
     elasticity; a crossed lattice has C12 = C66 = G, and no coupling of shear with tension, so there it is an
-    approximation. Between the two it is rotated by a growing share of the angle.
+    approximation. Between the two it is rotated by a growing share of the angle. In an isotropic fabric no direction is another
+    one, and nothing is rotated: C12 = C66 = G is not isotropic itself, and would be felt.
     """
     nearest = np.round(angle / _QUARTER) * _QUARTER
-    off = _off_threads(angle)
+    off = 0.0 if fabric.is_isotropic else _off_threads(angle)
     share = np.clip((off - _ALIGNED) / (_OFF_GRAIN - _ALIGNED), 0.0, 1.0)
     if share == 0.0:
         if int(np.round(angle / _QUARTER)) % 2:

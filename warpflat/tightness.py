@@ -14,7 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.errors import InputError
+from warpflat.errors import InputError, is_number
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.membrane import compute_membrane_strain
 from warpflat.membrane import cloth_of, plane_stress
@@ -63,7 +63,7 @@ class Wear:
             value = getattr(self, key)
             if value is None and key == "pressure":
                 continue
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            if not (is_number(value) and math.isfinite(value)):
                 raise InputError(f"wear: {key} = {value!r} is not a number")
             if not 0.0 <= value <= highest:
                 hint = f" (if that is in percent, write {value / 100:g})" if unit == "" and 2.0 < value <= 100.0 else ""

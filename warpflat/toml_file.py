@@ -36,7 +36,7 @@ def read_toml(path: Path) -> dict[str, Any]:
         InputError: no such file, a directory, unreadable, or not TOML (with the line).
     """
     try:
-        text = path.read_text(encoding="utf-8")
+        text = path.read_text(encoding="utf-8-sig")  # as some editors save it, with a byte order mark
     except FileNotFoundError:
         raise InputError(f"{path}: no such file{_similar_file(path)}") from None
     except IsADirectoryError:

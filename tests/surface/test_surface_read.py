@@ -47,6 +47,11 @@ def test_obj_keeps_quads_order_and_every_digit(tmp_path):
     assert surface.notes == ()
 
 
+def test_obj_may_begin_with_a_byte_order_mark(tmp_path):
+    surface = read_surface(write(tmp_path / "mark.obj", "\ufeff" + SQUARE + "f 1 2 3 4\n"), units="m")
+    assert len(surface.vertices) == 4
+
+
 @pytest.mark.parametrize(
     "faces",
     [

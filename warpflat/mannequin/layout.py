@@ -99,11 +99,6 @@ class Layout:
         """Columns from the centre line to the arm column."""
         return sum(self.columns[:3])
 
-    @property
-    def to_princess(self) -> int:
-        """Columns from the centre line to the princess line."""
-        return sum(self.columns[:2])
-
 
 def make_layout(resolution_mm: float = 10.0) -> Layout:
     """The grid at a resolution; the same for every body.

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, is_number, nearest
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -104,7 +104,7 @@ def measurements_from_values(*, table: str = "women", **given: float) -> Measure
     for name, value in given.items():
         if name not in ranges:
             raise InputError(f"measurement {name!r} is unknown: {nearest(name, ranges)}")
-        if isinstance(value, bool) or not isinstance(value, (int, float, np.floating, np.integer)):
+        if not is_number(value):
             raise InputError(f"measurement {name} = {value!r}: a number of metres is needed")
         low, high = (v / 100.0 for v in ranges[name])
         if not math.isfinite(value) or not low <= value <= high:

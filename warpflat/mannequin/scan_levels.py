@@ -15,8 +15,6 @@ from warpflat.mannequin.scan_pose import Slicer
 __all__ = ["TrunkSections", "find_levels", "trunk_sections"]
 
 _UP = np.array([0.0, 1.0, 0.0])
-#: Directions in which every section's hull is sampled.
-_RAYS = 360
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

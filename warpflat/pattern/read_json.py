@@ -32,7 +32,7 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
     """
     path = Path(path)
     try:
-        data = json.loads(path.read_text(encoding="utf-8"))
+        data = json.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; a run leaves a pattern.json in its folder") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:

@@ -60,7 +60,7 @@ def read_obj(path: Path) -> ObjMesh:
     raw = path.read_bytes()
     if b"\0" in raw:
         raise InputError("not an OBJ file: it holds binary data")
-    statements = _collect(raw.decode("utf-8", errors="replace"))
+    statements = _collect(raw.decode("utf-8-sig", errors="replace"))
     if not statements.vertices:
         raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
     vertices = _numbers(statements)
