@@ -54,7 +54,7 @@ def change_fabric(
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     cloth = as_fabric(fabric)
     run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback)
-    return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
+    return replace(_gone_on(result, run, result.positions), fabric=cloth)
 
 
 def change_surface(
@@ -99,7 +99,7 @@ def change_surface(
     inherit_levels(moved, cut)
     run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
-    gone_on = _gone_on(result, run, result.positions, measure_again=run.directions_matter())
+    gone_on = _gone_on(result, run, result.positions)
     return replace(gone_on, surface=surface, cuts=cuts)
 
 
@@ -163,8 +163,7 @@ def relax_cut(
         callback: called with a `Progress` before the first step and after every step.
     """
     run = _later_run(result, surface, result.fabric, stage, options, callback)
-    # What opens turns, and its threads with it.
-    return replace(_gone_on(result, run, positions, measure_again=run.directions_matter()), cuts=tuple(cuts))
+    return replace(_gone_on(result, run, positions), cuts=tuple(cuts))
 
 
 def _later_run(
@@ -191,9 +190,9 @@ def _later_run(
     )
 
 
-def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
+def _gone_on(result: Flattening, run: Run, positions: FloatArray) -> Flattening:
     """The result of a run from a layout, with what it adds to the history."""
-    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[measure_again])
+    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[run.measured_again()])
     return replace(
         result,
         network=end.network,

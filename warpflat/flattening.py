@@ -355,7 +355,7 @@ def finish(pieces: Sequence[Started]) -> list[Flattening]:
         [piece.run for piece in pieces],
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
-        again=[piece.development.mended or piece.run.directions_matter() for piece in pieces],
+        again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
