@@ -31,7 +31,7 @@ DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 _EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge or has flipped faces
+  1    done, but a piece did not converge or has flipped faces, in whatever size
   2    bad input; one line says what is wrong, where, and what would be right
   130  interrupted
   143  terminated"""
@@ -454,7 +454,7 @@ def cuts(
 )
 @click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
 @click.option("--paper", type=click.Choice(["A4", "Letter", "A0"]), default="A4", show_default=True, help="Of the PDF.")
-@click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern.")
+@click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern; not of json.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(
     folder: Path, formats: tuple[str, ...], dialect: str, paper: str, sizes: tuple[str, ...], quiet: bool

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
@@ -141,22 +141,21 @@ def run_garment(
         options=drawing,
         sample_size=own or "",
     )
-    odd = [
-        f"size {size}: {name} did not converge"
-        for size, other in graded.items()
-        for name, piece in other.pieces.items()
-        if not piece.converged
-    ]
     metrics, settled = settle(
         out,
-        {**garment.metrics(), **pattern.metrics},
+        {**garment.metrics(), **_of_sizes(graded), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
         sources=scene_sources(scene),
     )
     unnamed = note_on_names(garment.pieces) if settings.output.picture else ()
-    notes = (*garment.notes, *odd, *pattern.notes, *unnamed, *settled)
+    notes = (*garment.notes, *pattern.notes, *unnamed, *settled)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+
+
+def _of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:
+    """The entry `sizes` of `metrics.json`: of each besides the mannequin's own, whether its pattern is good."""
+    return {"sizes": {size: garment.summary() for size, garment in graded.items()}} if graded else {}
 
 
 def _in_order(sizes: Iterable[str], wanted: Sequence[str]) -> list[str]:
