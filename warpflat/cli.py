@@ -339,6 +339,8 @@ def compare(
 ) -> int:
     """Run a scene in several fabrics and lay the outlines upon each other: table, compare.png, compare.svg, compare.json.
 
+    Cuts, seams and constraints are the scene's in each of them; cuts found automatically are found once and all made.
+
     \b
     Examples:
       warpflat compare scenes/bodice.toml --fabric denim --fabric jersey --fabric power-net
@@ -356,7 +358,9 @@ def compare(
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
-        for line in warnings_of({"pieces": {name: piece.measures for name, piece in pieces.items()}})
+        for line in warnings_of(
+            {"pieces": {name: piece.measures for name, piece in pieces.items()}, **comparison.sewing[fabric]}
+        )
     ]
     for warning in warnings:
         click.echo(f"warpflat: {warning}", err=True)
@@ -417,8 +421,8 @@ def cuts(
     """Compare cuts: where the energy is, and what each candidate would release.
 
     Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, and
-    paths that follow the energy. Each is tried with a coarse relaxation; --apply relaxes fully. Writes ledger.json and
-    ledger.png.
+    paths that follow the energy. Each is tried with a coarse relaxation, without the scene's seams and constraints;
+    --apply relaxes fully, with them. Writes ledger.json and ledger.png.
 
     \b
     Examples:
@@ -441,6 +445,8 @@ def cuts(
     if as_json and story is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):
+        for note in ledger.notes:
+            click.echo(f"warpflat: note: {note}", err=True)
         click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
     if story is None:
         return DONE
