@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 from xml.etree import ElementTree as ET
 
@@ -12,7 +13,7 @@ import pytest
 from warpflat.cli import main
 from warpflat.compare import Comparison, compare_fabrics, comparison_table, outline, save_comparison
 from warpflat.errors import InputError
-from warpflat.scene import Scene, load_scene
+from warpflat.scene import Scene, load_scene, run_scene
 
 TEXT = 'datum = "centre"\nmodel = "membrane"\n[surface]\nshape = "bodice"\nresolution = 17\n'
 
@@ -123,3 +124,72 @@ def test_the_command(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: py
     assert "compare.svg" in told.splitlines()[-1]
     assert main(["compare", "cap.toml", "--fabric", "woven"]) == 2
     assert "name two or more" in capsys.readouterr().err
+
+
+HEM = """datum = "centre"
+[surface]
+shape = "bodice"
+resolution = 17
+[[cuts]]
+line = "centre"
+part = [0.0, 0.4]
+name = "dart"
+[[constraints]]
+line = "top"
+straight = "weft"
+[[constraints]]
+line = "bust"
+length_mm = "body"
+[output]
+frames = 0
+picture = false
+[pattern]
+formats = []
+"""
+SKIRT = """form = "a_line_skirt"
+half = true
+[mannequin]
+size = "EU 38"
+resolution_mm = 40
+[[seams]]
+name = "side left"
+ease = 0.03
+longer = "front"
+[output]
+frames = 0
+picture = false
+[pattern]
+formats = []
+"""
+
+
+@pytest.mark.parametrize(("text", "pieces"), [(HEM, ["front"]), (SKIRT, ["front", "back"])], ids=["surface", "garment"])
+def test_all_else_is_what_a_run_makes_in_that_fabric(tmp_path: Path, text: str, pieces: list[str]):
+    """Seams, constraints and the legs of darts included."""
+    scene = scene_in(tmp_path, text)
+    found = compare_fabrics(scene, ["denim", "jersey"], device="cpu")
+    assert found.pieces == pieces
+    for fabric in found.fabrics:
+        run = replace(scene, settings=scene.settings.model_copy(update={"fabric": fabric}))
+        metrics = run_scene(run, tmp_path / fabric, device="cpu").metrics
+        for name in pieces:
+            rows = (tmp_path / fabric / f"{name}.obj").read_text().splitlines()
+            flat = np.array([row.split()[1:] for row in rows if row.startswith("vt ")], dtype=float)
+            np.testing.assert_allclose(found.results[fabric][name].positions, flat, atol=2e-6)
+        assert found.sewing[fabric]["sewing"]["converged"]
+        for key in ("seams", "constraints"):
+            told = [{k: v for k, v in entry.items() if k != "price_j"} for entry in found.sewing[fabric][key]]
+            assert told == [{k: v for k, v in entry.items() if k != "price_j"} for entry in metrics[key]]
+    assert json.loads(json.dumps(found.as_dict()))["sewing"]["denim"]["seams"]
+
+
+def test_what_a_run_refuses_is_not_compared(tmp_path: Path):
+    with pytest.raises(InputError, match=r"front.toml: grain_angle: .* on the fold, with the grain at 30 degrees"):
+        compare_fabrics(scene_in(tmp_path, "grain_angle = 30\n" + SKIRT), ["denim", "jersey"])
+
+
+def test_cuts_are_ranked_without_constraints_and_say_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    scene_in(tmp_path, HEM)
+    assert main(["cuts", str(tmp_path / "front.toml"), "--out", str(tmp_path / "out")]) == 0
+    assert "note: candidates are compared without the scene's constraints; a run keeps them" in capsys.readouterr().err
+    assert len(json.loads((tmp_path / "out" / "ledger.json").read_text())["notes"]) == 1

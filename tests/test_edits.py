@@ -14,9 +14,11 @@ from warpflat.edits import change_fabric, change_surface
 from warpflat.errors import InputError
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
+from warpflat.membrane import Model
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface
 from warpflat.surface.topology import half_edges_of
+from warpflat.tightness import Wear
 
 
 def cloth(shear: float) -> Fabric:
@@ -54,6 +56,41 @@ def test_changing_the_fabric_gives_what_flattening_in_it_gives(triangles: bool):
     assert energies[0] < 0.95 * energies[2]
     with pytest.raises(InputError, match="fabric"):
         change_fabric(first, "no such cloth")
+
+
+def apart(first: Flattening, second: Flattening) -> float:
+    """By how much two patterns of one piece differ, at most, in whatever place they lie [m]."""
+    way = first.positions - second.positions
+    return float(np.linalg.norm(way - way.mean(axis=0), axis=1).max())
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+@pytest.mark.parametrize(("before", "after"), [("isotropic", "woven"), ("woven", "denim"), ("denim", "isotropic")])
+def test_a_cloth_of_other_threads_gives_what_flattening_in_it_gives(before: str, after: str, triangles: bool):
+    """Springs between triangles are of the directions in which they lie, and another cloth turns them."""
+    surface = make_shape("bodice", resolution=25, triangles=triangles)
+    changed = change_fabric(flatten(surface, fabric=before, datum="centre", device="cpu"), after)
+    fresh = flatten(surface, fabric=after, datum="centre", device="cpu")
+    assert changed.converged
+    assert minimum(changed) == pytest.approx(minimum(fresh), rel=3e-3)
+    assert apart(changed, fresh) < 2e-4
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+@pytest.mark.parametrize("model", ["springs", "membrane"])
+@pytest.mark.parametrize(
+    "wear",
+    [Wear(stretch_weft=0.2), Wear(stretch_weft=0.6, stretch_warp=0.3), Wear(pressure=300.0)],
+    ids=["weft", "both", "pressure"],
+)
+def test_a_tight_pattern_is_measured_where_it_lies(wear: Wear, model: Model, triangles: bool):
+    """Threads are shortened along where they run in the end: a pattern that goes on in its own cloth stays."""
+    surface = make_shape("bodice", resolution=25, triangles=triangles)
+    first = flatten(surface, fabric="power-net", datum="centre", wear=wear, model=model, device="cpu")
+    again = change_fabric(first, "power-net")
+    assert first.converged
+    assert minimum(again) == pytest.approx(minimum(first), rel=3e-3)
+    assert apart(again, first) < 2e-4
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

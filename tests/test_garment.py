@@ -9,11 +9,18 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpflat.cutting import CutPlan, cut
+from warpflat.edits import change_fabric, change_surface
 from warpflat.errors import InputError
+from warpflat.flattening import Flattening, flatten
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import Mannequin
+from warpflat.relax import RelaxOptions
 from warpflat.scene import load_scene, run_scene
 from warpflat.seam_wishes import SeamWish
+from warpflat.shapes import make_shape
+from warpflat.tightness import Wear
+from warpflat.wear_report import fit_lines
 
 
 @pytest.fixture(scope="module")
@@ -228,3 +235,69 @@ def test_a_wrong_body_or_form_is_one_line(tmp_path: Path, text: str, message: st
 def test_arguments_of_a_wrong_type_are_one_line(block: Garment, wrong: dict[str, Any], message: str):
     with pytest.raises(InputError, match=message):
         flatten_form(**{"mannequin": block.mannequin, "form": block.form, **wrong})
+
+
+def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin: Mannequin):
+    """Its fullness, its folds and the other sides of its seams would be lost without a word."""
+    wish = SeamWish(name="waist", factor=1.5, gathered=True)
+    full = flatten_form(mannequin, block.form, fabric="woven", wishes=[wish]).pieces["front_skirt"]
+    line = full.surface.lines["hip"]
+    plan = CutPlan(name="hip", paths=(line,))
+    for edit in (
+        lambda piece: change_fabric(piece, "denim"),
+        lambda piece: change_surface(piece, piece.surface.vertices),
+        lambda piece: cut(piece, plan),
+    ):
+        for piece in (full, block.pieces["front_skirt"]):
+            with pytest.raises(InputError, match=r"'front_skirt' has been sewn: .* again with the change, or edit its"):
+                edit(piece)
+        assert full.alone is not None
+        assert edit(full.alone).converged
+    unsewn = flatten_form(mannequin, block.form, fabric="woven", sewn=False).pieces["front_skirt"]
+    assert unsewn.alone is None
+    np.testing.assert_array_equal(full.alone.positions, unsewn.positions)
+
+
+def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():
+    """What is gathered here strains the back skirt's waist; the same skirt with a tiny dart, unsewn, fits, and so it does without."""
+    body = Mannequin.from_size("EU 38", resolution_mm=35.0)
+    wishes = [
+        SeamWish(name="waist", factor=1.5, gathered=True),
+        SeamWish(name="waist 2", factor=1.5, gathered=True),
+        SeamWish(name="shoulder left", factor=1.01),
+    ]
+    form = body.form("basic_block", half=True)
+    dress = flatten_form(body, form, fabric="woven", wishes=wishes, wear=Wear())
+    skirt, bodice = (dress.pieces[name].measures["wear"] for name in ("back_skirt", "front_bodice"))
+    assert not skirt["fits"]
+    assert skirt["outside_unsewn"] == 0.0
+    assert skirt["would_help"] == []
+    alone = flatten_form(body, form, fabric="woven", wear=Wear(), sewn=False).pieces["front_bodice"]
+    assert bodice["outside_unsewn"] == pytest.approx(alone.fit.outside)
+    assert bodice["outside"] > 2 * bodice["outside_unsewn"]
+    assert bodice["would_help"]
+    assert all(remedy["outside_after"] < 0.9 * bodice["outside_unsewn"] for remedy in bodice["would_help"])
+    lines = fit_lines(dress.metrics())
+    before = f"{100 * alone.fit.outside:.1f} % -> "
+    assert sum(before in line and line.endswith("beyond the limit, unsewn") for line in lines) == len(
+        bodice["would_help"]
+    )
+    assert (
+        "  unsewn it fits: its seams, folds and constraints strain it; ask less of them, or take another fabric"
+        in lines
+    )
+
+
+def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPatch):
+    given: list[RelaxOptions] = []
+
+    def noted(piece: Flattening, plan: CutPlan, *, relax: RelaxOptions) -> Flattening:
+        given.append(relax)
+        return cut(piece, plan, relax=relax)
+
+    monkeypatch.setattr("warpflat.cutting.cut", noted)
+    options = RelaxOptions(solver="plain", check_every=7, energy_tolerance=1e-5)
+    front = flatten(make_shape("bodice", resolution=13), fabric="denim", datum="centre", wear=Wear(), relax=options)
+    assert front.measures["wear"]["would_help"]
+    assert {(one.solver, one.check_every) for one in given} == {("plain", 7)}
+    assert all(one.energy_tolerance == pytest.approx(2e-4) for one in given)

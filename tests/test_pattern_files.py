@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
+from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from typing import Any
 from xml.etree import ElementTree as ET
 
 import ezdxf
@@ -20,6 +23,9 @@ from warpflat.export.pattern_json import pattern_json
 from warpflat.export.pdf import write_pdf
 from warpflat.export.svg import write_svg
 from warpflat.flattening import flatten
+from warpflat.garment import Garment as Flattened
+from warpflat.garment import flatten_form
+from warpflat.mannequin import FormResult, Mannequin
 from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, draft_garment, draft_piece
 from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import DraftedGarment
@@ -381,6 +387,47 @@ def test_export_redoes_one_file(nest: Path, tmp_path: Path, capsys: pytest.Captu
     assert main(["export", str(folder), "--format", "pdf", "--paper", "Letter", "-q"]) == 0
     assert capsys.readouterr().out == ""
     assert (folder / "pattern.pdf").read_bytes() != before
+
+
+def test_one_size_of_what_the_others_are_made_from_is_refused(
+    nest: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+):
+    folder = tmp_path / "run"
+    shutil.copytree(nest, folder)
+    before = (folder / "pattern.json").read_bytes()
+    assert main(["export", str(folder), "--format", "json", "--size", "EU 36"]) == 2
+    assert "holds all sizes" in capsys.readouterr().err
+    assert (folder / "pattern.json").read_bytes() == before
+    assert main(["export", str(folder), "--format", "json"]) == 0
+
+
+def test_another_size_that_went_wrong_is_a_warning(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    def flattened(mannequin: Mannequin, form: FormResult, **given: Any) -> Flattened:
+        garment = flatten_form(mannequin, form, **given)
+        if "EU 44" not in mannequin.source:
+            return garment
+        front, back = garment.pieces.values()
+        last = replace(front.stages[-1], converged=False)
+        front = replace(front, stages=(*front.stages[:-1], last))
+        back = replace(back, positions=back.positions * [-1.0, 1.0])
+        return replace(garment, pieces={"front": front, "back": back})
+
+    monkeypatch.setattr("warpflat.scene_garment.flatten_form", flattened)
+    (tmp_path / "scene.toml").write_text(NEST)
+    assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--quiet"]) == 1
+    warnings = capsys.readouterr().err.splitlines()
+    assert len(warnings) == 2
+    assert warnings[0].startswith("warpflat: size EU 44: front did not converge within ")
+    assert re.match(r"warpflat: size EU 44: back has \d+ flipped faces; the pattern cannot be cut", warnings[1])
+    sizes = json.loads((tmp_path / "out" / "metrics.json").read_text())["sizes"]
+    assert {size: [piece["converged"] for piece in of["pieces"].values()] for size, of in sizes.items()} == {
+        "EU 44": [False, True],
+        "EU 36": [True, True],
+    }
+    assert sizes["EU 44"]["pieces"]["back"]["flipped_faces"] > 0
+    assert sizes["EU 36"]["sewing"]["converged"]
 
 
 @pytest.mark.parametrize(

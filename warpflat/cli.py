@@ -31,7 +31,7 @@ DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
 _EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge or has flipped faces
+  1    done, but a piece did not converge or has flipped faces, in whatever size
   2    bad input; one line says what is wrong, where, and what would be right
   130  interrupted
   143  terminated"""
@@ -347,6 +347,8 @@ def compare(
 ) -> int:
     """Run a scene in several fabrics and lay the outlines upon each other: table, compare.png, compare.svg, compare.json.
 
+    Cuts, seams and constraints are the scene's in each of them; cuts found automatically are found once and all made.
+
     \b
     Examples:
       warpflat compare scenes/bodice.toml --fabric denim --fabric jersey --fabric power-net
@@ -364,7 +366,9 @@ def compare(
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
-        for line in warnings_of({"pieces": {name: piece.measures for name, piece in pieces.items()}})
+        for line in warnings_of(
+            {"pieces": {name: piece.measures for name, piece in pieces.items()}, **comparison.sewing[fabric]}
+        )
     ]
     for warning in warnings:
         click.echo(f"warpflat: {warning}", err=True)
@@ -425,8 +429,8 @@ def cuts(
     """Compare cuts: where the energy is, and what each candidate would release.
 
     Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, and
-    paths that follow the energy. Each is tried with a coarse relaxation; --apply relaxes fully. Writes ledger.json and
-    ledger.png, with --apply all that a run leaves, too.
+    paths that follow the energy. Each is tried with a coarse relaxation, without the scene's seams and constraints;
+    --apply relaxes fully, with them. Writes ledger.json and ledger.png, with --apply all that a run leaves, too.
 
     \b
     Examples:
@@ -449,6 +453,8 @@ def cuts(
     if as_json and story is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):
+        for note in ledger.notes:
+            click.echo(f"warpflat: note: {note}", err=True)
         click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
     if story is None:
         return DONE
@@ -462,7 +468,7 @@ def cuts(
 )
 @click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
 @click.option("--paper", type=click.Choice(["A4", "Letter", "A0"]), default="A4", show_default=True, help="Of the PDF.")
-@click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern.")
+@click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern; not of json.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(
     folder: Path, formats: tuple[str, ...], dialect: str, paper: str, sizes: tuple[str, ...], quiet: bool

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from warpflat._version import __version__
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening, Progress
-from warpflat.scene import Scene, scene_cuts, scene_fabric, scene_relax_options, scene_wear, told_by
+from warpflat.scene import Scene, flatten_scene, scene_cuts, scene_fabric
+from warpflat.scene_cuts import CutStory
 from warpflat.surface.topology import border_loops
 
 __all__ = ["Comparison", "compare_fabrics", "comparison_table", "laid_upon", "outline", "save_comparison"]
@@ -32,11 +33,13 @@ class Comparison:
         results: by fabric, then by piece; the first fabric is what the others are compared with.
         layouts: by fabric, then by piece: #P by 2 [m], laid upon the first fabric's pattern as well as it goes, turned
             and shifted only.
+        sewing: by fabric, how its seams and constraints came out, as in `metrics.json`; empty where nothing was sewn.
     """
 
     name: str
     results: Mapping[str, Mapping[str, Flattening]]
     layouts: Mapping[str, Mapping[str, FloatArray]]
+    sewing: Mapping[str, Mapping[str, Any]]
 
     @property
     def fabrics(self) -> list[str]:
@@ -101,6 +104,7 @@ class Comparison:
                 }
                 for fabric, pieces in self.results.items()
             },
+            "sewing": {fabric: dict(how) for fabric, how in self.sewing.items()},
             "distances_m": {piece: self.distances(piece) for piece in self.pieces},
         }
 
@@ -121,10 +125,10 @@ def compare_fabrics(
     on_progress: Callable[[str, Progress], None] | None = None,
     device: str | None = None,
 ) -> Comparison:
-    """Run a scene in each fabric, all else alike.
+    """Run a scene in each fabric, all else alike: its cuts, seams and constraints are kept in each of them.
 
     Args:
-        scene: a surface with its cuts, or a garment on a mannequin; its own fabric does not count.
+        scene: a surface with its cuts, all of which are made, or a garment on a mannequin; its own fabric does not count.
         fabrics: two names or more, of the library or the scene's fabric files; others are compared with the first.
         on_progress: called with the fabric and its `Progress` after every step.
         device: Warp device, before the scene's own.
@@ -143,45 +147,40 @@ def compare_fabrics(
         if fabric.name in dressed:
             raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
         dressed[fabric.name] = one
-    # Cuts are the scene's, found once, so that all patterns have the same points.
-    story = None if scene.settings.mannequin is not None else scene_cuts(scene, device=device)
-    results: dict[str, dict[str, Flattening]] = {}
+    # Cuts are the scene's, found once, and all of them made, so that all patterns have the same points.
+    story = None
+    if scene.settings.mannequin is None:
+        story = replace(scene_cuts(scene, device=device), auto=None)
+    results: dict[str, Mapping[str, Flattening]] = {}
+    sewing: dict[str, Mapping[str, Any]] = {}
     for name, one in dressed.items():
 
         def told(progress: Progress, name: str = name) -> None:
             if on_progress is not None:
                 on_progress(name, progress)
 
-        with told_by(scene.where):
-            results[name] = _run(one, story, told, device)
+        results[name], sewing[name] = _run(one, story, told, device)
     first = next(iter(results.values()))
     layouts = {
         name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
         for name, pieces in results.items()
     }
-    return Comparison(name=scene.name, results=results, layouts=layouts)
+    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing)
 
 
-def _run(scene: Scene, story: Any, told: Callable[[Progress], None], device: str | None) -> dict[str, Flattening]:
-    from warpflat.cutting import cut, separate
-    from warpflat.flattening import flatten
+def _run(
+    scene: Scene, story: CutStory | None, told: Callable[[Progress], None], device: str | None
+) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
+    """The pieces as a run of the scene gives them, and how they were sewn."""
+    from warpflat.cutting import separate
+    from warpflat.scene_garment import plan_garment
 
-    settings, relax, fabric = scene.settings, scene_relax_options(scene), scene_fabric(scene)
-    where = device or settings.device
-    common: dict[str, Any] = {
-        "fabric": fabric, "grain_angle": settings.grain_angle, "model": settings.model, "wear": scene_wear(scene),
-        "relax": relax, "device": where,
-    }  # fmt: skip
-    if settings.mannequin is not None:
-        from warpflat.garment import flatten_form
-        from warpflat.scene_garment import scene_form
-
-        mannequin, form = scene_form(scene)
-        return dict(flatten_form(mannequin, form, callback=lambda _, progress: told(progress), **common).pieces)
-    result = flatten(story.surface, datum=settings.datum, callback=told, **common)
-    for plan in story.plans:
-        result = cut(result, plan, relax=relax, callback=told)
-    return {piece.surface.name: piece for piece in separate(result)}
+    if story is None:
+        garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: told(progress))
+        how = garment.summary()
+        return garment.pieces, {key: how[key] for key in how if key != "pieces"}
+    result, sewn = flatten_scene(scene, story, callback=told, device=device)
+    return {piece.surface.name: piece for piece in separate(result)}, {} if sewn is None else sewn.metrics()
 
 
 def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
@@ -219,7 +218,9 @@ def comparison_table(comparison: Comparison) -> str:
         for name in borders[0]:
             rows.append((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]))
         rows.append(("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]))
-        rows.append(("minimised energy [mJ]", [f"{1e3 * m['spring_energy_j']:.4g}" for m in measures]))
+        rows.append(
+            ("minimised energy [mJ]", [f"{1e3 * (m['spring_energy_j'] + m['guard_energy_j']):.4g}" for m in measures])
+        )
         rows.append(("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]))
         for thread in ("warp", "weft"):
             worst = [m["wear"][f"strain_{thread}"] for m in measures]

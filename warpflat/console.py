@@ -131,7 +131,7 @@ def _price(joules: float | None) -> str:
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """One line for each piece that did not converge or has flipped faces."""
+    """One line for each piece that did not converge or has flipped faces, of every size."""
     lines = []
     given_up = metrics.get("sewing", {}).get("contradictory", False)
     for name, piece in metrics["pieces"].items():
@@ -152,6 +152,8 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
             for name, by in amiss
             if by > _AMISS
         ]
+    for size, other in metrics.get("sizes", {}).items():
+        lines += [f"size {size}: {line}" for line in warnings_of(other)]
     return lines
 
 

@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.darts import AppliedCut, seam_kind
 from warpflat.develop import choose_datum, develop
-from warpflat.edits import relax_cut
+from warpflat.edits import expect_unsewn, relax_cut
 from warpflat.errors import InputError, nearest
 from warpflat.flattening import Flattening, Progress
 from warpflat.network import SpringNetwork
@@ -125,8 +125,9 @@ def cut(
 
     Raises:
         InputError: the path leaves the mesh, repeats a vertex, runs along the border or an earlier cut, or separates
-            nothing; or a cut of that name has been made. The message names the vertex.
+            nothing; or a cut of that name has been made, or the piece has been sewn. The message names the vertex.
     """
+    expect_unsewn(result)
     if isinstance(plan, str):
         plan = CutPlan(name=plan, paths=(line_part(result.surface, plan),))
     if plan.name in [made.name for made in result.cuts]:
@@ -217,6 +218,7 @@ def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flat
     Raises:
         InputError: as :func:`draw_line`.
     """
+    expect_unsewn(result)
     if name in result.surface.lines:
         raise InputError(f"piece {result.surface.name!r} already has a line {name!r}; call the cut something else")
     old = result.surface
@@ -456,6 +458,7 @@ def _part(result: Flattening, piece: Piece) -> Flattening:
         development=replace(result.development, positions=result.development.positions[used]),
         stages=(*result.stages[:-1], last),
         cuts=tuple(made for made in cuts if made.seams),
+        alone=None if result.alone is None else _part(result.alone, piece),
     )
 
 

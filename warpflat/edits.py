@@ -25,7 +25,7 @@ from warpflat.surface.mend import checked_positions
 from warpflat.surface.paths import path_length
 from warpflat.surface.topology import components_of
 
-__all__ = ["change_fabric", "change_surface", "relax_cut"]
+__all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
 
 FloatArray = NDArray[np.float64]
 
@@ -49,12 +49,12 @@ def change_fabric(
         callback: called with a `Progress` before the first step and after every step; the stage is "fabric:NAME".
 
     Raises:
-        InputError: an unknown fabric or an option out of its bounds.
+        InputError: an unknown fabric, an option out of its bounds, or the piece has been sewn.
     """
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     cloth = as_fabric(fabric)
     run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback)
-    return replace(_gone_on(result, run, result.positions, measure_again=False), fabric=cloth)
+    return replace(_gone_on(result, run, result.positions), fabric=cloth)
 
 
 def change_surface(
@@ -77,7 +77,8 @@ def change_surface(
         The piece on that surface, with the same cuts. Its development stays that of the surface before.
 
     Raises:
-        InputError: the mesh is another one, a vertex is not finite, a face has collapsed, or an option out of its bounds.
+        InputError: the mesh is another one, a vertex is not finite, a face has collapsed, an option out of its bounds, or the piece has
+            been sewn.
     """
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     before, options = result.surface, given_options(relax)
@@ -99,8 +100,17 @@ def change_surface(
     inherit_levels(moved, cut)
     run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
-    gone_on = _gone_on(result, run, result.positions, measure_again=run.directions_matter())
+    gone_on = _gone_on(result, run, result.positions)
     return replace(gone_on, surface=surface, cuts=cuts)
+
+
+def expect_unsewn(result: Flattening) -> None:
+    """Raise InputError for a piece that has been sewn or given fullness: what holds it there is not of this piece alone."""
+    if result.alone is not None:
+        raise InputError(
+            f"piece {result.surface.name!r} has been sewn: edited alone it would lose its seams, folds and gathers; run the scene or "
+            "flatten_form again with the change, or edit its `alone`, the piece as it lay before"
+        )
 
 
 def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
@@ -163,8 +173,7 @@ def relax_cut(
         callback: called with a `Progress` before the first step and after every step.
     """
     run = _later_run(result, surface, result.fabric, stage, options, callback)
-    # What opens turns, and its threads with it.
-    return replace(_gone_on(result, run, positions, measure_again=run.directions_matter()), cuts=tuple(cuts))
+    return replace(_gone_on(result, run, positions), cuts=tuple(cuts))
 
 
 def _later_run(
@@ -176,6 +185,7 @@ def _later_run(
     callback: Callable[[Progress], None] | None,
 ) -> Run:
     """A run that goes on from a result."""
+    expect_unsewn(result)
     expect_callback(callback)
     datum = result.datum
     if surface is not result.surface:
@@ -191,9 +201,9 @@ def _later_run(
     )
 
 
-def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_again: bool) -> Flattening:
+def _gone_on(result: Flattening, run: Run, positions: FloatArray) -> Flattening:
     """The result of a run from a layout, with what it adds to the history."""
-    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[measure_again])
+    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[run.measured_again()])
     return replace(
         result,
         network=end.network,
@@ -201,4 +211,5 @@ def _gone_on(result: Flattening, run: Run, positions: FloatArray, *, measure_aga
         stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
         history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
         notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
+        options=run.options,
     )

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Sequence
 from contextlib import nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from os import PathLike
 from pathlib import Path
@@ -58,6 +58,8 @@ class Flattening:
         notes: what was mended or chosen on the way, one sentence each.
         cuts: made since the first relaxation, see `warpflat.cutting`.
         wear: how it is meant to be worn, if that was asked for.
+        options: of its last relaxation.
+        alone: the piece as it lay before it was sewn or given fullness; None of one that was not.
     """
 
     surface: Surface
@@ -73,6 +75,8 @@ class Flattening:
     notes: tuple[str, ...]
     cuts: tuple[AppliedCut, ...] = ()
     wear: Wear | None = None
+    options: RelaxOptions = field(default_factory=RelaxOptions)
+    alone: Flattening | None = None
 
     @property
     def faces(self) -> IntArray:
@@ -355,7 +359,7 @@ def finish(pieces: Sequence[Started]) -> list[Flattening]:
         [piece.run for piece in pieces],
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
-        again=[piece.development.mended or piece.run.directions_matter() for piece in pieces],
+        again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
@@ -386,6 +390,7 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
         history=np.array(run.history),
         notes=(*run.surface.notes, *piece.notes, *development.notes, *run.notes),
         wear=run.wear,
+        options=run.options,
     )
 
 

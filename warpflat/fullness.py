@@ -91,7 +91,14 @@ def give_fullness(
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
     notes = (*piece.notes, note, *_slanted(network, piece.stages[-1], stage))
-    return replace(piece, network=network, positions=positions, stages=(*piece.stages, stage), notes=notes)
+    return replace(
+        piece,
+        network=network,
+        positions=positions,
+        stages=(*piece.stages, stage),
+        notes=notes,
+        alone=piece.alone or piece,
+    )
 
 
 def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:

@@ -133,6 +133,21 @@ class Garment:
             **({} if self.sewn is None else self._sewing()),
         }
 
+    def summary(self) -> dict[str, Any]:
+        """What `metrics.json` says of it as another size: whether its pieces came to rest and lie without flips, and its seams."""
+        return {
+            "pieces": {
+                name: {
+                    "converged": piece.converged,
+                    "flipped_faces": piece.flipped_faces,
+                    "stages": [stage.as_dict() for stage in piece.stages],
+                }
+                for name, piece in self.pieces.items()
+            },
+            "seams": [seam.as_dict() for seam in self.seams],
+            **({} if self.sewn is None else self._sewing()),
+        }
+
     def _sewing(self) -> dict[str, Any]:
         assert self.sewn is not None
         return {

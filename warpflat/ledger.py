@@ -102,12 +102,14 @@ class Ledger:
         peaks: where its energy is.
         entries: what each cut would do.
         refused: candidates that could not be made, and why.
+        notes: what the comparison leaves out, one sentence each.
     """
 
     result: Flattening
     peaks: Peaks
     entries: tuple[LedgerEntry, ...]
     refused: tuple[tuple[str, str], ...] = ()
+    notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
         """Plain data."""
@@ -116,6 +118,7 @@ class Ledger:
             "peaks": list(self.peaks.words),
             "entries": [entry.as_dict() for entry in self.entries],
             "refused": [{"name": name, "reason": reason} for name, reason in self.refused],
+            "notes": list(self.notes),
         }
 
 

@@ -154,16 +154,20 @@ def export_pattern(
         format: "dxf", "svg", "pdf" or "json".
         dialect: of a DXF.
         paper: of a PDF.
-        sizes: only these; None takes all.
+        sizes: only these; None takes all. Not of "json", which is what the others are made from.
 
     Raises:
-        InputError: there is no pattern, an unknown format, dialect, paper or size, or the folder cannot be written.
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be written.
     """
     from warpflat.leftovers import note_file
     from warpflat.pattern.read_json import read_pattern_json
 
     if format not in FORMATS:
         raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+    if format == "json" and sizes is not None:
+        raise InputError(
+            "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
+        )
     drafted = read_pattern_json(folder / "pattern.json")
     file = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
     note_file(folder, drafted.name, file)

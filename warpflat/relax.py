@@ -22,7 +22,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError, expect, nearest
+from warpflat.errors import InputError, expect, is_number, nearest
 from warpflat.joined import join_networks
 from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
@@ -90,11 +90,11 @@ class RelaxOptions:
             ("check_every", 1, 10**6),
         ):
             value = getattr(self, key)
-            if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+            if not (is_number(value) and math.isfinite(value)):
                 raise InputError(f"relax: {key} = {value!r} is not a number")
             if not low <= value <= high:
                 raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
-            if key in ("max_steps", "check_every") and not isinstance(value, int):
+            if key in ("max_steps", "check_every") and not is_number(value, whole=True):
                 raise InputError(f"relax: {key} = {value!r} is not a whole number")
         if not isinstance(self.kinetic_damping, bool):
             raise InputError(f"relax: kinetic_damping = {self.kinetic_damping!r} is neither True nor False")

@@ -33,8 +33,13 @@ __all__ = ["Relaxed", "Run", "relax_runs"]
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 
-# A first round only turns and shapes the layout, since directions are measured again after it: tolerances are so many times the others.
+# Rounds before the last only turn and shape the layout, since directions are measured again after them: tolerances are so many times the
+# others.
 _FIRST_ROUND = 30.0
+# Each round leaves about a fifth of what the one before was off: directions stand once a round has moved the piece by no more than this
+# share of its size, on average, and further rounds than so many would tell little.
+_STANDS = 2e-4
+_MOST_AGAIN = 6
 # And a layout that can be free of strain has told its directions once it is strained by no more than this.
 _FIRST_STRAIN = 1e-6
 # Quads across the grain are worth a note where they are so many times as stiff in shear as the cloth.
@@ -91,9 +96,13 @@ class Run:
         self.notes += [note for note in (*notes, *_off_grain(network)) if note not in self.notes]
         return network
 
-    def directions_matter(self) -> bool:
-        """Whether another layout gives other springs: in a cloth that is not the same in all directions, between triangles."""
-        return not (_is_isotropic(self.fabric) or bool(self.surface.is_quad.all()))
+    def measured_again(self, *, mended: bool = False) -> int:
+        """How many times at most directions are measured again: until they stand where another layout gives other springs, or other lengths
+        for a stretch that is meant; once where they matter to a membrane's steps alone, or a `mended` layout says little of them."""
+        springs = self.model == "springs"
+        alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
+        tight = self.wear is not None and self.wear.is_tight and (springs or bool(self.wear.pressure))
+        return _MOST_AGAIN if tight or (springs and not alike) else int(mended or not alike)
 
     def tell(self, stage: str, state: Relaxation, piece: int) -> None:
         """Call back with where this piece of the relaxation stands, by the last look."""
@@ -158,7 +167,7 @@ def relax_runs(
     networks: Sequence[SpringNetwork],
     starts: Sequence[FloatArray],
     *,
-    again: Sequence[bool],
+    again: Sequence[int],
 ) -> list[Relaxed]:
     """Relax the pieces of several runs, those of a kind side by side.
 
@@ -166,17 +175,16 @@ def relax_runs(
         runs: of one fabric, grain, model, device, stage and set of options.
         networks: of each, measured in its start.
         starts: of each, #V by 2 [m].
-        again: for each, whether its first layout says little of directions: then it is relaxed in two rounds, and they are measured
-            again in between.
+        again: for each, how many times at most directions are measured again: it is relaxed in rounds, and they are measured in between.
     """
-    kinds: dict[tuple[bool, bool], list[int]] = {}
+    kinds: dict[tuple[bool, int], list[int]] = {}
     for number, (run, network) in enumerate(zip(runs, networks, strict=True)):
-        kinds.setdefault((_has_levels(run, network), bool(again[number])), []).append(number)
+        kinds.setdefault((_has_levels(run, network), again[number]), []).append(number)
     relaxed: dict[int, Relaxed] = {}
-    for (levels, twice), numbers in kinds.items():
+    for (levels, times), numbers in kinds.items():
         own = [runs[number] for number in numbers]
         batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
-        relaxed |= zip(numbers, batch.relax(levels=levels, twice=twice), strict=True)
+        relaxed |= zip(numbers, batch.relax(levels=levels, again=times), strict=True)
     return [relaxed[number] for number in range(len(runs))]
 
 
@@ -200,27 +208,16 @@ class _Batch:
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
 
-    def relax(self, *, levels: bool, twice: bool) -> list[Relaxed]:
-        """Relax them, once or in two rounds."""
-        state, begun = self._state, time.perf_counter()
-        begin = state.begin().energies
+    def relax(self, *, levels: bool, again: int) -> list[Relaxed]:
+        """Relax them, in rounds between which directions are measured again, so many times at most."""
+        begun = time.perf_counter()
+        begin = self._state.begin().energies
         stage = self._runs[0].stage_name
-        self._tell(state, "develop" if stage == "relax" else stage)
-        if twice:
-            state.options = replace(
-                self._options,
-                energy_tolerance=_FIRST_ROUND * self._options.energy_tolerance,
-                residual_tolerance=_FIRST_ROUND * self._options.residual_tolerance,
-            )
-            state.least_strain = _FIRST_STRAIN
-            self._round(levels, enough=_FIRST_GAIN)
-            layout = state.positions()
-            self._put(
-                [run.network_at(layout[own]) for run, own in zip(self._runs, state.vertices, strict=True)], layout
-            )
-            after, state = state, self._state
-            state.steps, state.restarts, state.work_units = after.steps, after.restarts, after.work_units
-        outcome = replace(self._round(levels), seconds=time.perf_counter() - begun)
+        self._tell(self._state, "develop" if stage == "relax" else stage)
+        for _ in range(again):
+            if self._measure_again(levels) <= _STANDS:
+                break
+        outcome, state = replace(self._round(levels), seconds=time.perf_counter() - begun), self._state
         layout, look = state.positions(), state.last
         return [
             Relaxed(
@@ -239,6 +236,23 @@ class _Batch:
             )
             for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertices, strict=True))
         ]
+
+    def _measure_again(self, levels: bool) -> float:
+        """Relax them roughly, and measure directions where they then lie; by how much of its size a piece has moved, at most."""
+        state = self._state
+        state.options = replace(
+            self._options,
+            energy_tolerance=_FIRST_ROUND * self._options.energy_tolerance,
+            residual_tolerance=_FIRST_ROUND * self._options.residual_tolerance,
+        )
+        state.least_strain = _FIRST_STRAIN
+        before = state.positions()
+        self._round(levels, enough=_FIRST_GAIN)
+        layout = state.positions()
+        self._put([run.network_at(layout[own]) for run, own in zip(self._runs, state.vertices, strict=True)], layout)
+        after = self._state
+        after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
+        return max(_moved(before[own], layout[own]) for own in state.vertices)
 
     def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
         told = any(run.callback is not None for run in self._runs)
@@ -268,6 +282,7 @@ class _Batch:
             self._runs[number].tell(stage, state, piece)
 
 
-def _is_isotropic(fabric: Fabric) -> bool:
-    same = np.isclose(fabric.stiffness_warp, fabric.stiffness_weft, rtol=1e-9)
-    return bool(same and np.isclose(fabric.shear_stiffness, fabric.stiffness_warp / 2 / (1 + fabric.poisson_ratio)))
+def _moved(before: FloatArray, after: FloatArray) -> float:
+    """How far a layout (#V by 2 [m]) has moved in itself, on average, as a share of its size."""
+    way = after - before
+    return float(np.sqrt(np.var(way, axis=0).sum()) / np.linalg.norm(np.ptp(after, axis=0)))

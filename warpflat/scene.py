@@ -51,9 +51,11 @@ from warpflat.surface.border import SIDES
 from warpflat.toml_file import Table, check_table, read_toml
 
 if TYPE_CHECKING:
+    from warpflat.film import Film
     from warpflat.flattening import Flattening, Progress
     from warpflat.ledger import Ledger
     from warpflat.pattern.from_garment import EdgeRules
+    from warpflat.sew_surface import SewnSurface
     from warpflat.tightness import Wear
 
 __all__ = [
@@ -65,6 +67,7 @@ __all__ = [
     "SceneResult",
     "SceneTable",
     "ShapeSurface",
+    "flatten_scene",
     "load_scene",
     "make_scene",
     "run_scene",
@@ -217,15 +220,14 @@ def run_scene(
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
-    from warpflat.cutting import cut, separate
+    from warpflat.cutting import separate
     from warpflat.export import FrameWriter, prepare_folder
     from warpflat.film import Film
     from warpflat.pattern_files import pattern_options
-    from warpflat.scene_seams import scene_constraints, scene_surface_seams
-    from warpflat.sew_surface import sew_surface
+    from warpflat.scene_seams import scene_surface_seams
 
     settings = scene.settings
-    relax = scene_relax_options(scene)
+    scene_relax_options(scene)  # a mistake is told before the folder is made
     folder = prepare_folder(out)
     if settings.mannequin is not None:
         from warpflat.scene_garment import run_garment
@@ -246,19 +248,7 @@ def run_scene(
             if on_progress is not None:
                 on_progress(progress)
 
-        with told_by(scene.where):
-            result = _flatten(scene, story.surface, relax, callback=each_step, device=device)
-            film.last(result)
-            for number, plan in enumerate(story.plans):
-                if story.goes_on(result, number):
-                    film.mark(result, plan)
-                    result = cut(result, plan, relax=relax, callback=each_step)
-                    film.last(result)
-            lines = {result.surface.name: result.network.surface.lines}
-            sewn = sew_surface(result, scene_constraints(settings.constraints, lines), seams=seams, options=relax)
-            if sewn is not None:
-                result = sewn.result
-                film.last(result)
+        result, sewn = flatten_scene(scene, story, film=film, callback=each_step, device=device)
     pieces = separate(result)
     return write_surface(
         scene,
@@ -271,6 +261,50 @@ def run_scene(
         sources=scene_sources(scene),
         notes=(*result.notes, *story.notes),
     )
+
+
+def flatten_scene(
+    scene: Scene,
+    story: CutStory,
+    *,
+    film: Film | None = None,
+    callback: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> tuple[Flattening, SewnSurface | None]:
+    """The scene's surface flattened, cut and sewn, as its constraints hold it; and how it was sewn, if it was.
+
+    Args:
+        scene: with its fabric and settings.
+        story: what is cut, of :func:`scene_cuts`.
+        film: takes the last frame of every stage.
+        callback: called after each step.
+        device: Warp device, before the scene's own.
+
+    Raises:
+        InputError: a seam or a constraint asks what the piece cannot be, or a setting is wrong.
+    """
+    from warpflat.cutting import cut
+    from warpflat.film import Film
+    from warpflat.scene_seams import scene_constraints, scene_surface_seams
+    from warpflat.sew_surface import sew_surface
+
+    settings, relax = scene.settings, scene_relax_options(scene)
+    film = film or Film(None, story.surface, lambda: FrameSchedule(settings.output))
+    with told_by(scene.where):
+        seams = scene_surface_seams(settings.seams, scene.name)
+        result = _flatten(scene, story.surface, relax, callback=callback, device=device)
+        film.last(result)
+        for number, plan in enumerate(story.plans):
+            if story.goes_on(result, number):
+                film.mark(result, plan)
+                result = cut(result, plan, relax=relax, callback=callback)
+                film.last(result)
+        lines = {result.surface.name: result.network.surface.lines}
+        sewn = sew_surface(result, scene_constraints(settings.constraints, lines), seams=seams, options=relax)
+    if sewn is None:
+        return result, None
+    film.last(sewn.result)
+    return sewn.result, sewn
 
 
 def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
@@ -337,7 +371,7 @@ def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
 
 
 def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", device: str | None = None) -> Ledger:
-    """Candidates for the next cut of the scene's piece, after those that the scene makes, each tried and ranked.
+    """Candidates for the next cut of the scene's piece, after those that the scene makes, each tried and ranked; unsewn, as a note says.
 
     Raises:
         InputError: as :func:`scene_cuts`, or there is no candidate.
@@ -353,7 +387,14 @@ def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", 
         result = flatten_and_cut(
             story, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
         )
-        return make_ledger(result, relax=relax, by=by)
+        ledger = make_ledger(result, relax=relax, by=by)
+    asked = [key for key in ("seams", "constraints") if getattr(scene.settings, key)]
+    if not asked:
+        return ledger
+    return replace(
+        ledger,
+        notes=(f"candidates are compared without the scene's {' and '.join(asked)}; a run keeps them, --apply too",),
+    )
 
 
 def scene_surface(scene: Scene) -> Surface:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from warpflat.constraints import Constraint
 from warpflat.flattening import Progress
 from warpflat.garment import Garment, flatten_form
 from warpflat.leftovers import settle
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.pattern.from_garment import check_fold_grain, folds_of, plan_form
-from warpflat.pattern_files import garment_files, pattern_options
+from warpflat.pattern_files import PatternOptions, garment_files, pattern_options
 from warpflat.scene import (
     FrameSchedule,
     Scene,
@@ -27,9 +28,9 @@ from warpflat.scene import (
     told_by,
 )
 from warpflat.scene_seams import scene_constraints, scene_wishes
-from warpflat.seam_wishes import wished_seams
+from warpflat.seam_wishes import SeamWish, wished_seams
 
-__all__ = ["run_garment", "scene_form"]
+__all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
 
 
 def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
@@ -53,20 +54,56 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
         return mannequin, mannequin.form(form, half=settings.half)
 
 
-def run_garment(
-    scene: Scene,
-    out: Path,
-    *,
-    on_progress: Callable[[Progress], None] | None = None,
-    device: str | None = None,
-) -> SceneResult:
-    """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
-    from warpflat.export import FrameWriter
-    from warpflat.export.letters import note_on_names
+@dataclass(frozen=True, kw_only=True, eq=False)
+class GarmentPlan:
+    """A scene's garment, checked, before anything of it is flattened.
 
+    Attributes:
+        scene: whose it is.
+        mannequin, form: the body, and the pieces on it.
+        drawing: what is written of its pattern.
+        wishes: ease and gathers of its seams.
+        constraints: on its edges and lines.
+        settings: what else :func:`warpflat.garment.flatten_form` takes.
+    """
+
+    scene: Scene
+    mannequin: Mannequin
+    form: FormResult
+    drawing: PatternOptions
+    wishes: Sequence[SeamWish]
+    constraints: Sequence[Constraint]
+    settings: Mapping[str, Any]
+
+    def flatten(self, *, callback: Callable[[str, Progress], None] | None = None) -> Garment:
+        """Flatten and sew it.
+
+        Raises:
+            InputError: as :func:`warpflat.garment.flatten_form`.
+        """
+        with told_by(self.scene.where):
+            return flatten_form(
+                self.mannequin,
+                self.form,
+                callback=callback,
+                wishes=self.wishes,
+                constraints=self.constraints,
+                **self.settings,
+            )
+
+
+def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
+    """What a scene asks of its garment.
+
+    Args:
+        scene: with a form on a mannequin.
+        device: Warp device, before the scene's own.
+
+    Raises:
+        InputError: the body, the form, the fabric, a seam, a constraint, an edge of the pattern or a setting is wrong.
+    """
     settings = scene.settings
-    relax = scene_relax_options(scene)
-    fabric = scene_fabric(scene)
+    relax, fabric = scene_relax_options(scene), scene_fabric(scene)
     mannequin, form = scene_form(scene)
     with told_by(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
@@ -82,6 +119,38 @@ def run_garment(
             {name: piece.surface.lines for name, piece in form.pieces.items()},
             {name: piece.fold for name, piece in form.pieces.items() if piece.fold},
         )
+    return GarmentPlan(
+        scene=scene,
+        mannequin=mannequin,
+        form=form,
+        drawing=drawing,
+        wishes=wishes,
+        constraints=constraints,
+        settings={
+            "fabric": fabric,
+            "grain_angle": settings.grain_angle,
+            "model": settings.model,
+            "wear": scene_wear(scene),
+            "relax": relax,
+            "device": device or settings.device,
+        },
+    )
+
+
+def run_garment(
+    scene: Scene,
+    out: Path,
+    *,
+    on_progress: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> SceneResult:
+    """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
+    from warpflat.export import FrameWriter
+    from warpflat.export.letters import note_on_names
+
+    settings = scene.settings
+    plan = plan_garment(scene, device=device)
+    form, drawing = plan.form, plan.drawing
     others = _other_sizes(scene)
     schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
     wanted = next(iter(schedules.values())).wanted
@@ -103,25 +172,12 @@ def run_garment(
             if on_progress is not None:
                 on_progress(progress)
 
-        def flattened(body: Mannequin, form: FormResult, each_step: Callable[[str, Progress], None]) -> Garment:
-            return flatten_form(
-                body,
-                form,
-                fabric=fabric,
-                grain_angle=settings.grain_angle,
-                model=settings.model,
-                wear=scene_wear(scene),
-                relax=relax,
-                callback=each_step,
-                device=device or settings.device,
-                wishes=wishes,
-                constraints=constraints,
-            )
-
-        with told_by(scene.where):
-            garment = flattened(mannequin, form, each_step)
-            told = on_progress or (lambda progress: None)
-            graded = {size: flattened(*other, lambda name, progress: told(progress)) for size, other in others.items()}
+        garment = plan.flatten(callback=each_step)
+        told = on_progress or (lambda progress: None)
+        graded = {
+            size: replace(plan, mannequin=body, form=other).flatten(callback=lambda _, progress: told(progress))
+            for size, (body, other) in others.items()
+        }
         if writer is not None:
             _last_frames(writer, garment)
     files = garment.save(out, picture=settings.output.picture)
@@ -141,22 +197,21 @@ def run_garment(
         options=drawing,
         sample_size=own or "",
     )
-    odd = [
-        f"size {size}: {name} did not converge"
-        for size, other in graded.items()
-        for name, piece in other.pieces.items()
-        if not piece.converged
-    ]
     metrics, settled = settle(
         out,
-        {**garment.metrics(), **pattern.metrics},
+        {**garment.metrics(), **_of_sizes(graded), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
         sources=scene_sources(scene),
     )
     unnamed = note_on_names(garment.pieces) if settings.output.picture else ()
-    notes = (*garment.notes, *odd, *pattern.notes, *unnamed, *settled)
+    notes = (*garment.notes, *pattern.notes, *unnamed, *settled)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+
+
+def _of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:
+    """The entry `sizes` of `metrics.json`: of each besides the mannequin's own, whether its pattern is good."""
+    return {"sizes": {size: garment.summary() for size, garment in graded.items()}} if graded else {}
 
 
 def _in_order(sizes: Iterable[str], wanted: Sequence[str]) -> list[str]:

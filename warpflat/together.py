@@ -76,7 +76,7 @@ class Together:
                 converged=converged,
                 residual=residual,
             )
-            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage))
+            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), alone=piece.alone or piece)
         return sewn
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
-from warpflat.tightness import Misfit, WornFit, assess_fit
+from warpflat.tightness import TOLERATED, Misfit, WornFit, assess_fit
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
@@ -49,7 +49,7 @@ class Remedy:
         words: what to cut.
         path: vertices of the uncut surface.
         length: [m].
-        outside: share of the cloth beyond the limit once it is made, by trial; None if it was not tried.
+        outside: share of the cloth beyond the limit once it is made, by trial and unsewn; None if it was not tried.
     """
 
     words: str
@@ -62,6 +62,8 @@ def wear_measures(result: Flattening) -> dict[str, Any]:
     """The entry `wear` in `metrics.json`; where a way of wearing was asked for, the remedies have been tried."""
     asked = result.wear is not None
     measures = {**(asdict(result.wear) if result.wear is not None else {}), **result.fit.as_dict()}
+    if result.alone is not None:
+        measures["outside_unsewn"] = result.alone.fit.outside
     measures["would_help"] = [
         {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside}
         for remedy in remedies(result, result.fit, trial=asked)
@@ -72,12 +74,16 @@ def wear_measures(result: Flattening) -> dict[str, Any]:
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
     """Darts and seams for the worst places: along lines that pass by, and straight from the border.
 
+    None for a piece that fits unsewn. Cuts of a sewn piece are tried on it as it lay before, and compared with that: what sewing adds
+    or takes is not the cut's.
+
     Args:
         result: a flattened piece.
         fit: how it sits.
         trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
     """
-    if fit.fits:
+    alone = result.alone or result
+    if fit.fits or alone.fit.fits:
         return []
     found: list[Remedy] = []
     for misfit in fit.misfits[:4]:
@@ -87,8 +93,8 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
                 found.append(remedy)
     if not trial:
         return found[:3]
-    tried = [_tried(result, remedy) for remedy in found[:_MOST_TRIALS]]
-    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * fit.outside]
+    tried = [_tried(alone, remedy) for remedy in found[:_MOST_TRIALS]]
+    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * alone.fit.outside]
     return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:3]
 
 
@@ -153,14 +159,13 @@ def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy
 
 def _tried(result: Flattening, remedy: Remedy) -> Remedy:
     from warpflat.cutting import CutPlan, cut
-    from warpflat.relax import RelaxOptions
 
-    options = RelaxOptions()
+    options = result.options
     quick = replace(
         options,
-        energy_tolerance=_TRIAL_TOLERANCE * options.energy_tolerance,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
         residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
-        max_steps=result.stages[-1].steps + 2000,
+        max_steps=min(options.max_steps, result.stages[-1].steps + 2000),
     )
     try:
         opened = cut(result, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
@@ -187,13 +192,21 @@ def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def help_words(remedy: Mapping[str, Any], outside: float | None = None) -> str:
-    """A remedy as in `metrics.json`, in words; with the share beyond the limit before it, if that is given."""
+def help_words(remedy: Mapping[str, Any], outside: float | None = None, *, sewn: bool = False) -> str:
+    """A remedy as in `metrics.json`, in words; with the share beyond the limit before it, if that is given. Of a piece that is `sewn`, both
+    are told to be without that."""
     after = remedy["outside_after"]
     if after is None:
         return f"may help: {remedy['cut']}"
     before = "" if outside is None else f"{100 * outside:.1f} % -> "
-    return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit"
+    unsewn = ", unsewn" if sewn else ""
+    return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit{unsewn}"
+
+
+def _no_cut_words(outside: float, *, sewn: bool) -> str:
+    if sewn and outside <= TOLERATED:
+        return "unsewn it fits: its seams, folds and constraints strain it; ask less of them, or take another fabric"
+    return "would help: another fabric, or another stretch; no single dart does"
 
 
 def strain_words(wear: Mapping[str, Any]) -> list[str]:
@@ -228,9 +241,11 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if wear["fits"]:
             continue
         lines += [f"  where not: {words}" for words in wear["where_not"]]
-        lines += [f"  {help_words(remedy, wear['outside'])}" for remedy in wear["would_help"]]
+        sewn = "outside_unsewn" in wear
+        before = wear["outside_unsewn"] if sewn else wear["outside"]
+        lines += [f"  {help_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
         if not wear["would_help"]:
-            lines.append("  would help: another fabric, or another stretch; no single dart does")
+            lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
     if lines:
         lines.append(f"ranges: {RANGES}")
     if "wear" in metrics:

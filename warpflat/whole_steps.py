@@ -1,10 +1,11 @@
 """Whole implicit steps: all vertices of a piece at once, by a sparse factor, where cloth is soft in shear and lies on triangles.
 
-Eq. (10) holds each vertex by its own springs. Along a thread of such cloth these are up to a thousand times as stiff as what the thread may
-shear against, and between triangles threads run across the edges: neither lines nor coarser meshes carry a vertex' neighbours along, and
-steps creep for ten thousands. A whole step solves the implicit equation (Baraff and Witkin 1998) as if its time step were infinite, with the
-stiffness J^T J of springs and guard in the present layout; the force across compressed springs, which would push vertices off a thread, is
-left out of that, so that each way leads down. Some of the paper's steps after it take what is local: what it presses in slivers, say.
+Eq. (10) holds each vertex by its own springs. Along a thread of such cloth these are up to a thousand times as stiff as what the
+thread may shear against, and between triangles threads run across the edges: neither lines nor coarser meshes carry a vertex' neighbours
+along, and steps creep for ten thousands. A whole step solves the implicit equation (Baraff and Witkin 1998) as if its time step were
+infinite, with the stiffness J^T J of springs and guard in the present layout; the force across compressed springs, which would push
+vertices off a thread, is left out of that, so that each way leads down. Some of the paper's steps after it take what is local: what it
+presses in slivers, say.
 """
 
 from __future__ import annotations
