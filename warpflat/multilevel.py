@@ -17,7 +17,8 @@ Nested iteration gives the start: the coarsest level is relaxed first, and each 
 went. The minimum is that of the fine level alone, and what says that it is reached is what `relax` asks for, with a step's
 work as the unit.
 
-Where they take too little away, in a cloth soft in shear between triangles, whole implicit steps go on (`warpflat.whole_steps`).
+Where cycles take too little away, between triangles, others go on: whole implicit steps in cloth soft in shear (`warpflat.whole_steps`),
+plain ones with a membrane.
 
 Of several pieces side by side (`warpflat.joined`) each has levels of its own, which are joined level by level; a piece that has no
 coarser one stays as it is on those below. How much of a correction is taken, and whether the piece is at rest, is told piece by piece.
@@ -25,6 +26,7 @@ coarser one stays as it is on those below. How much of a correction is taken, an
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
@@ -47,9 +49,11 @@ BoolArray = NDArray[np.bool_]
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0
 _FEW = 1_200
-# Of such a cloth between triangles cycles give way to whole steps once they have taken so many units; from such a K/G on at once.
+# Work units of cycles between triangles after which others go on: whole steps in a soft cloth, from the latter K/G on at once, plain steps
+# with a membrane. On clean meshes cycles are at rest by then; slivers, and cloth that wrinkles, would take them ten thousands.
 _PATIENCE = 600.0
 _VERY_SOFT = 200.0
+_PATIENCE_WITH_MEMBRANE = 300.0
 # How often levels are made anew, since the piece has come far from where they were made.
 _RENEWALS = 8
 
@@ -117,6 +121,13 @@ def levels_pay(network: SpringNetwork) -> bool:
 
 
 def _patience(network: SpringNetwork) -> float:
+    """Work units of cycles after which other steps go on."""
+    if network.surface.is_quad.any():
+        return math.inf
+    if network.model == "membrane":
+        return _PATIENCE_WITH_MEMBRANE
+    if not whole_steps_pay(network):
+        return math.inf
     return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE
 
 
@@ -169,10 +180,15 @@ def relax_multilevel(
     levels.follow()
     state.evaluate_at_rest()
     state.work_units += FORCE_WORK
+    patience = _patience(state.network)
     while not cycles.done.all() and cycles.state.work_units - start < options.max_steps:
-        if whole_steps_pay(state.network) and cycles.state.work_units - start >= _patience(state.network):
-            left_over = options.max_steps - (cycles.state.work_units - start)
-            relax_whole(cycles.state, most=left_over, enough=enough, watch=watch, each_step=each_step)
+        spent = cycles.state.work_units - start
+        if spent >= patience:
+            if state.network.model == "membrane":
+                relax(cycles.state, watch=watch, each_step=each_step)
+            else:
+                most = options.max_steps - spent
+                relax_whole(cycles.state, most=most, enough=enough, watch=watch, each_step=each_step)
             break
         left = cycles.without_done()
         if left is not None:
