@@ -36,7 +36,8 @@ def test_tape_reads_what_the_table_says(bodies: dict[str, Mannequin], size: str)
         assert abs(levels[level].girth - wished.lengths[name]) < 0.001, name
     for name in ("bust", "waist", "hip", "knee"):
         assert levels[name].height == pytest.approx(wished.heights[name], abs=1e-9)
-    nape = bodies[size].line("centre back")[-1]
+    layout = bodies[size].layout
+    nape = bodies[size].vertices[layout.back[-1, layout.to_arm]]
     under = bodies[size].line("side left")[-1]
     assert nape[1] - under[1] == pytest.approx(wished.heights["nape"] - wished.heights["underarm"], abs=0.001)
 
