@@ -390,3 +390,32 @@ def test_progress_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch):
             bar(look)  # type: ignore[arg-type]
         assert ("cap: relax: 7 steps" in stream.getvalue()) == shown
         assert ("2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
+
+
+def test_a_size_takes_measures_of_ones_own(warpflat: Run):
+    code, out, err = warpflat("mannequin", "--size", "EU 38", "--measure", "waist=0.76", "--resolution", "30")
+    assert code == 0
+    assert "waist = 76.0 cm instead of the 72.0 cm of size EU 38" in err
+    assert "size EU 38 with waist = 76 cm" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["--measure", "bust=0.9", "--measure", "bust=0.92"], "--measure bust is given twice, 0.9 and 0.92"),
+        (["--measure", "bust=nan"], "is not NAME=METRES"),
+        (["--size", "EU 38", "--table", "men"], "size 'EU 38' is completed by the table 'women', not by 'men'"),
+        (["--table", "women"], "give the body in one way: --size or --measure, or both"),
+        (["--scan", "body.obj", "--size", "EU 38"], "give the body in one way: --size or --measure, or both"),
+        (["--scan", "body.obj", "--table", "men"], "--table completes measurements"),
+        (["--size", "EU 38", "--units", "cm"], "--units is about a --scan"),
+        (["--size", "EU 38", "--landmark", "waist=1.0"], "--landmark is about a --scan"),
+        (["--size", "EU 38", "--resolution", "50"], "'--resolution'"),
+    ],
+)
+def test_a_mannequin_asked_for_in_two_ways_is_one_line_of_options(warpflat: Run, arguments: list[str], words: str):
+    code, _, err = warpflat("mannequin", *arguments)
+    assert code == 2
+    assert words in err
+    assert err.count("\n") == 1
+    assert "[mannequin" not in err

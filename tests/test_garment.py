@@ -301,3 +301,39 @@ def test_cuts_are_tried_with_the_options_of_the_run(monkeypatch: pytest.MonkeyPa
     assert front.measures["wear"]["would_help"]
     assert {(one.solver, one.check_every) for one in given} == {("plain", 7)}
     assert all(one.energy_tolerance == pytest.approx(2e-4) for one in given)
+
+
+@pytest.mark.parametrize(
+    ("size", "title"),
+    [("", "made to measure"), ("size = 'EU 38'\n", "EU 38 made to measure")],
+    ids=["own", "of a size"],
+)
+def test_a_garment_on_own_measures_says_so(tmp_path: Path, size: str, title: str):
+    path = tmp_path / "skirt.toml"
+    path.write_text(
+        f"form = 'skirt'\nhalf = true\n[mannequin]\n{size}resolution_mm = 25\nmeasurements = {{ waist = 0.76, hip = 0.98 }}\n"
+        "[output]\nframes = 0\npicture = false\n[pattern]\nformats = ['dxf', 'svg']\n"
+    )
+    run_scene(load_scene(path), tmp_path / "out")
+    assert f"SIZE: {title}\n" in (tmp_path / "out" / "skirt.dxf").read_text()
+    label = f">Size {title}<" if size else ">Made to measure<"
+    assert label in (tmp_path / "out" / "skirt.svg").read_text()
+
+
+@pytest.mark.parametrize(
+    ("body", "message"),
+    [
+        ("size = 'EU 38'\ntable = 'men'\n", "mannequin: size 'EU 38' is completed by the table 'women', not by 'men'"),
+        ("scan = 'a.obj'\ntable = 'men'\n", "a scan has its own"),
+        ("scan = 'a.obj'\nsize = 'EU 38'\n", "give the body in one way"),
+        (
+            "size = 'EU 38'\nmeasurements = { waist = 0.76 }\n[pattern]\nsizes = ['EU 38', 'EU 40']\n",
+            r"leave out \[mannequin",
+        ),
+    ],
+)
+def test_a_body_in_two_ways_is_one_line(tmp_path: Path, body: str, message: str):
+    path = tmp_path / "trial.toml"
+    path.write_text(f"form = 'dress'\n[mannequin]\n{body}")
+    with pytest.raises(InputError, match=message):
+        run_scene(load_scene(path), tmp_path / "out")

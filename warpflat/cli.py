@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import json
+import math
 import os
 import re
 import signal
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -270,14 +271,18 @@ def flatten(
 @cli.command()
 @click.option("--size", metavar="SIZE", help='Of a size table: "EU 38", "UK 10", "US 8", "JIS 9AR", "men 50".')
 @click.option("--measure", "measures", multiple=True, metavar="NAME=METRES", help="A measurement, such as bust=0.88.")
-@click.option("--table", type=click.Choice(["women", "men"]), default="women", help="Completes the measurements.")
+@click.option(
+    "--table", type=click.Choice(["women", "men"]), help="Completes the measurements.  [default: the size's, or women]"
+)
 @click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, GLB.")
 @click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")
 @click.option("--landmark", "landmarks", multiple=True, metavar="NAME=METRES", help="A height known better.")
 @click.option("--mirror", is_flag=True, help="Average the scan's left and right.")
-@click.option("--resolution", type=float, metavar="MM", help="Wished edge of the quads.  [default: 10]")
+@click.option(
+    "--resolution", type=click.FloatRange(2, 40), metavar="MM", help="Wished edge of the quads.  [default: 10]"
+)
 @click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="[default: out/mannequin]")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 @click.option("--json", "as_json", is_flag=True, help="Print metrics.json on standard output, nothing else.")
@@ -297,6 +302,7 @@ def mannequin(
     Examples:
       warpflat mannequin --size "EU 38"
       warpflat mannequin --measure bust=0.90 --measure waist=0.74 --measure hip=0.99
+      warpflat mannequin --size "EU 38" --measure waist=0.76
       warpflat mannequin --scan body.obj --units m --out body
     """
     from warpflat.console import mannequin_table
@@ -305,12 +311,13 @@ def mannequin(
     from warpflat.toml_file import check_table
 
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
+    _check_body(tables, size=size, measures=measures, landmarks=landmarks)
     if size is not None:
         tables["size"] = size
     if measures:
-        tables["measurements"] = dict(_metres(text, "--measure") for text in measures)
+        tables["measurements"] = _lengths(measures, "--measure")
     if landmarks:
-        tables["landmarks"] = dict(_metres(text, "--landmark") for text in landmarks)
+        tables["landmarks"] = _lengths(landmarks, "--landmark")
     if resolution is not None:
         tables["resolution_mm"] = resolution
     body = mannequin_from_table(check_table(MannequinTable, tables, "command line"), path_of=Path)
@@ -326,14 +333,46 @@ def mannequin(
     return DONE
 
 
+def _check_body(
+    options: Mapping[str, Any], *, size: str | None, measures: Sequence[str], landmarks: Sequence[str]
+) -> None:
+    """See that the body is given in one way, and that no option is of another one."""
+    scan = options.get("scan")
+    if (scan is None) == (size is None and not measures):
+        raise InputError(
+            "command line: give the body in one way: --size or --measure, or both, which replaces some of the size's; or --scan"
+        )
+    of_scan = [f"--{key}" for key in options if key not in ("scan", "table")] + ["--landmark"] * bool(landmarks)
+    if scan is None and of_scan:
+        raise InputError(f"command line: {of_scan[0]} is about a --scan; leave it out")
+    if scan is not None and "table" in options:
+        raise InputError("command line: --table completes measurements; a scan has its own: leave it out")
+
+
+def _lengths(texts: Sequence[str], option: str) -> dict[str, float]:
+    """Every NAME=METRES, each name once."""
+    found: dict[str, float] = {}
+    for text in texts:
+        name, value = _metres(text, option)
+        if name in found:
+            raise InputError(
+                f"command line: {option} {name} is given twice, {found[name]:g} and {value:g}; give it once"
+            )
+        found[name] = value
+    return found
+
+
 def _metres(text: str, option: str) -> tuple[str, float]:
     """NAME=METRES as a pair."""
     name, equals, value = text.partition("=")
     try:
-        return name.strip(), float(value)
+        metres = float(value)
     except ValueError:
+        metres = math.nan
+    if not math.isfinite(metres):
         shown = f"{name.strip()}=0.88" if equals else "bust=0.88"
-        raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}") from None
+        raise InputError(f"command line: {option} {text!r} is not NAME=METRES, such as {shown}")
+    return name.strip(), metres
 
 
 @cli.command(epilog=f"{_COMPARED}\n\n{_EXIT_CODES}")

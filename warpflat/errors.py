@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import numbers
 from collections.abc import Collection, Iterable
+from typing import TypeGuard
 
 __all__ = ["InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
 
@@ -60,7 +61,7 @@ def expect_callback(callback: object) -> None:
         raise InputError(f"callback is of type {type(callback).__name__}; it must be a function, or None")
 
 
-def is_number(value: object, *, whole: bool = False) -> bool:
+def is_number(value: object, *, whole: bool = False) -> TypeGuard[float]:
     """Whether it is a number, a whole one if that is asked for; Python's and NumPy's are, True and False are none."""
     return isinstance(value, numbers.Integral if whole else numbers.Real) and not isinstance(value, bool)
 

@@ -142,6 +142,10 @@ class SceneTable(Table):
                 )
         if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
             raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
+        if self.pattern.sizes and self.mannequin is not None and self.mannequin.measurements:
+            raise ValueError(
+                "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
+            )
         return self
 
 

@@ -188,14 +188,14 @@ def run_garment(
         write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
     if wanted:
         files.append("frames.usdc")
-    own = settings.mannequin.size if settings.mannequin is not None else None
-    sizes = {**graded, own or "": garment}
+    own = settings.mannequin.size_name if settings.mannequin is not None else ""
+    sizes = {**graded, own: garment}
     pattern = garment_files(
         {size: sizes[size] for size in _in_order(sizes, settings.pattern.sizes)},
         out,
         name=scene.name,
         options=drawing,
-        sample_size=own or "",
+        sample_size=own,
     )
     metrics, settled = settle(
         out,

@@ -169,14 +169,18 @@ def relax_whole(
         if call is not None:
             call(state, state.last.total, float(state.last.residual.max()))
 
-    state.hold_upright()
-    state.evaluate_at_rest()
-    steps = _STEPS
-    while not (done := state.last.at_rest | near).all() and state.work_units - start < most:
-        left, share = _go(state, whole, ~done)
-        steps = _STEPS if share > _LITTLE_WAY else min(2 * steps, _MOST_STEPS)
-        _smooth(state, steps, lambda: tell(each_step))
-        state.work_units += _WORK * math.sqrt(state.network.vertex_count) + steps
+    free = state.last.potential <= state.negligible_energy
+    state.last = replace(state.last, at_rest=state.last.at_rest | free)
+    if not state.last.at_rest.all():
+        state.hold_upright()
+        state.evaluate_at_rest()
+    work, steps, left = _WORK * math.sqrt(state.network.vertex_count), _STEPS, np.full(len(near), np.inf)
+    while not (done := state.last.at_rest | near).all() and (room := most - (state.work_units - start)) > 0.0:
+        if room > work:
+            left, share = _go(state, whole, ~done)
+            state.work_units += work
+            steps = _STEPS if share > _LITTLE_WAY else min(2 * steps, _MOST_STEPS)
+        _smooth(state, min(steps, math.ceil(room)), lambda: tell(each_step))
         state.hold_upright()
         state.evaluate_at_rest()
         look = state.look(1.0)
@@ -191,6 +195,7 @@ def relax_whole(
 def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None]) -> None:
     state.velocity.zero_()
     state.sweep(steps, each_step)
+    state.work_units += steps
 
 
 def _go(state: Relaxation, whole: WholeSteps, which: BoolArray) -> tuple[FloatArray, float]:

@@ -188,3 +188,86 @@ def test_tube_can_be_opened_along_a_line(body: Mannequin) -> None:
     made = body.form(form)
     assert set(made.pieces["skirt"].edges) == {"waist", "knee", "centre back", "centre back 2"}
     assert [s.pieces for s in made.seams] == [("skirt", "skirt")]
+
+
+_FRONT = {"bricks": ["waist-knee/front-*"], "datum": "centre front"}
+_SLEEVE = {"bricks": ["armhole-elbow/arm-left-*"], "datum": "overarm left", "open": ["underarm left"]}
+
+
+@pytest.mark.parametrize(
+    ("pieces", "words"),
+    [
+        (
+            {"front": _FRONT, "back": {"bricks": ["waist-hip/back-left-*", "waist-knee/back-right-*"]}},
+            r"in piece back hip-thigh/back-right-centre, .* have no mirror image; cut it whole: half = false",
+        ),
+        (
+            {
+                "over": {"bricks": ["chest-hip/front-right-*", "chest-hip/front-left-centre"]},
+                "under": {"bricks": ["chest-hip/front-left-side"]},
+            },
+            r"in piece over .* and 1 more have no mirror image",
+        ),
+        (
+            {"a": {"bricks": ["waist-hip/front-right-*"]}},
+            r"no piece is the mirror image of piece a \(waist-abdomen/front-right",
+        ),
+        ({"front": _FRONT, "sleeve": _SLEEVE}, r"mirror image of piece sleeve \(armhole-biceps/arm-left-front, "),
+        (
+            {"yoke": {"bricks": ["shoulder-chest/*-left-*"]}, "right": {"bricks": ["shoulder-yoke/*-right-*"]}},
+            r"mirror image of piece yoke \(yoke-chest/",
+        ),
+        ({"skirt": {"bricks": ["waist-knee/*"], "open": ["side left"]}}, "skirt is open along 'side left'"),
+        (
+            {"left": _SLEEVE, "right": {"bricks": ["armhole-elbow/arm-right-*"], "open": ["overarm right"]}},
+            "left is open along 'underarm left' and piece right not along 'underarm right'",
+        ),
+        (
+            {
+                "left": {"bricks": ["waist-hip/*-left-*"], "datum": "side left"},
+                "right": {"bricks": ["waist-hip/*-right-*"], "datum": "princess front right"},
+            },
+            "datum along 'side left' and piece right along 'princess front right'",
+        ),
+        (
+            {"skirt": {"bricks": ["waist-knee/*"]}},
+            r"joined along centre back and centre front.* open = \[.centre back.\]",
+        ),
+        ({"front": {**_FRONT, "open": ["centre front"]}}, "halves are joined along no centre line"),
+        ({"front": {**_FRONT, "datum": "hip"}}, r"datum 'hip' runs across the fold, .* datum = 'centre front', or"),
+    ],
+)
+def test_halves_that_do_not_stand_for_both_sides_are_refused(
+    body: Mannequin, pieces: dict[str, dict[str, object]], words: str
+) -> None:
+    with pytest.raises(InputError, match=words) as caught:
+        body.form(form_from_mapping("mine", {"pieces": pieces}), half=True)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_half_piece_is_laid_along_its_fold_unless_told_otherwise(body: Mannequin) -> None:
+    form = form_from_mapping("mine", {"pieces": {"front": {"bricks": ["waist-hip/front-*"]}}})
+    assert body.form(form, half=True).pieces["front"].datum == "centre front"
+
+
+def test_a_collar_stand_opens_at_the_front_and_folds_at_the_back(body: Mannequin) -> None:
+    recipe = {"bricks": ["collar-neck/*"], "open": ["centre front"]}
+    form = form_from_mapping("mine", {"pieces": {"stand": recipe}})
+    whole = body.form(form)
+    assert {"neck", "collar", "centre front", "centre front 2"} == set(whole.pieces["stand"].edges)
+    assert [seam.edges for seam in whole.seams] == [("centre front", "centre front 2")]
+    half = body.form(form, half=True).pieces["stand"]
+    assert set(half.edges) == {"neck", "collar", "centre front", "centre back"}
+    assert half.fold == "centre back"
+    assert np.abs(half.surface.vertices[half.edges["centre back"], 0]).max() < 1e-6
+
+
+@pytest.mark.parametrize("half", [False, True])
+def test_a_line_that_opens_a_piece_runs_through_it(body: Mannequin, half: bool) -> None:
+    for line, recipe in (("biceps left", {"bricks": ["waist-knee/*"]}), ("side left", _FRONT)):
+        form = form_from_mapping("mine", {"pieces": {"a": {**recipe, "open": [line]}}})
+        with pytest.raises(InputError, match=f"line '{line}' does not run through piece a, which is to be open"):
+            body.form(form, half=half)
+    form = form_from_mapping("mine", {"pieces": {"a": {"bricks": ["waist-knee/*"], "open": ["hip"]}}})
+    with pytest.raises(InputError, match=r"not one disk .* name another line to open it along"):
+        body.form(form)

@@ -36,7 +36,8 @@ def test_tape_reads_what_the_table_says(bodies: dict[str, Mannequin], size: str)
         assert abs(levels[level].girth - wished.lengths[name]) < 0.001, name
     for name in ("bust", "waist", "hip", "knee"):
         assert levels[name].height == pytest.approx(wished.heights[name], abs=1e-9)
-    nape = bodies[size].line("centre back")[-1]
+    layout = bodies[size].layout
+    nape = bodies[size].vertices[layout.back[-1, layout.to_arm]]
     under = bodies[size].line("side left")[-1]
     assert nape[1] - under[1] == pytest.approx(wished.heights["nape"] - wished.heights["underarm"], abs=0.001)
 
@@ -166,6 +167,105 @@ def test_odd_but_valid_bodies_are_built() -> None:
             if name != "stature":
                 assert body.levels()[name].girth == pytest.approx(value, abs=1e-6)
         assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"bust": 0.84, "waist": 0.82, "hip": 0.92},
+        {"bust": 0.80, "waist": 0.90, "hip": 0.90},
+        {"bust": 1.20, "waist": 0.95, "hip": 0.95},
+        {"bust": 1.60, "waist": 1.50, "hip": 1.65},
+        {"waist": 0.90},
+        {"table": "men", "bust": 0.90, "waist": 1.10},
+    ],
+)
+def test_what_is_completed_lies_between_what_is_given(given: dict[str, float]) -> None:
+    lengths = measurements_from_values(**given).lengths
+    for name, ends in (("abdomen", ("waist", "hip")), ("underbust", ("waist", "bust"))):
+        low, high = sorted(lengths[end] for end in ends)
+        assert low <= lengths[name] <= high, name
+    body = Mannequin.from_measurements(resolution_mm=20, **given)
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+
+
+def test_completion_agrees_with_the_table() -> None:
+    of_size = measurements_from_size("EU 42").lengths
+    made = measurements_from_values(bust=0.96, waist=0.80, hip=1.04).lengths
+    assert set(made) == set(of_size)
+    assert all(made[name] == pytest.approx(of_size[name], abs=2e-5) for name in made)
+
+
+def test_lengths_down_the_body_go_with_stature() -> None:
+    tall, usual = (measurements_from_values(bust=0.84, **at) for at in ({"stature": 1.85}, {}))
+    for name in ("nape_to_waist", "armscye_depth"):
+        assert tall.lengths[name] == pytest.approx(usual.lengths[name] * 1.85 / 1.66)
+    assert tall.heights["waist"] / 1.85 == pytest.approx(usual.heights["waist"] / 1.66)
+    assert tall.lengths["neck"] == usual.lengths["neck"]
+    assert measurements_from_size("EU 36/185").heights == tall.heights
+    given = measurements_from_values(bust=0.84, stature=1.85, nape_to_waist=0.43)
+    assert given.lengths["nape_to_waist"] == 0.43
+    # Men's tables say what changes with stature, for what is completed too.
+    men = measurements_from_values(table="men", bust=1.0, stature=1.88)
+    assert men.lengths == pytest.approx(measurements_from_size("men 50/188").lengths)
+    assert men.heights == measurements_from_size("men 50/188").heights
+
+
+@pytest.mark.parametrize(
+    "given",
+    [
+        {"bust": 1.40, "stature": 1.50},
+        {"bust": 0.90, "stature": 1.30},
+        {"bust": 0.90, "nape_to_waist": 0.54},
+        {"bust": 0.90, "armscye_depth": 0.30},
+        {"hip": 1.00, "neck": 0.56},
+        {"hip": 0.62},
+    ],
+)
+def test_nothing_is_refused_for_what_was_not_given(given: dict[str, float]) -> None:
+    body = Mannequin.from_measurements(resolution_mm=25, **given)
+    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    made = measurements_from_values(**given)
+    assert all(made.lengths[name] == value for name, value in given.items())
+    if "armscye_depth" in given:
+        assert made.lengths["nape_to_waist"] == pytest.approx(0.30 / 0.62)
+        assert any("as far as armscye_depth lets it" in note for note in made.notes)
+
+
+def test_measurements_replace_those_of_a_size() -> None:
+    plain, made = measurements_from_size("EU 38"), measurements_from_size("EU 38", waist=0.76)
+    assert made.lengths["waist"] == 0.76
+    assert made.lengths["abdomen"] == pytest.approx(0.82 + (1 - 0.4167) * 0.04, abs=2e-5)
+    assert made.lengths["underbust"] == 0.76  # not less than the waist
+    assert all(made.lengths[n] == plain.lengths[n] for n in plain.lengths if n not in ("waist", "abdomen", "underbust"))
+    assert "size EU 38 with waist = 76 cm" in made.source
+    assert "waist = 76.0 cm instead of the 72.0 cm of size EU 38" in made.notes
+    assert measurements_from_size("EU 38", bust=0.92).lengths["underbust"] == pytest.approx(0.852 * 0.92)
+    assert measurements_from_size("EU 38", bust=0.92).lengths["abdomen"] == 0.82
+    assert measurements_from_size("men 50", stature=1.88).lengths == measurements_from_size("men 50/188").lengths
+    body = Mannequin.from_size("EU 38", resolution_mm=25, waist=0.76)
+    assert body.levels()["waist"].girth == pytest.approx(0.76, abs=1e-6)
+    assert body.notes == made.notes
+
+
+@pytest.mark.parametrize(
+    ("size", "given", "words"),
+    [
+        (38, {}, r'size is of type int; it must be text, such as "EU 38"'),
+        ("EU 38", {"wasit": 0.7}, "did you mean 'waist'"),
+        ("EU 38", {"waist": 3.0}, "valid range"),
+        (
+            "EU 38",
+            {"waist": 1.3},
+            r"waist = 1\.3 m does not go with bust = 0\.88 m of size EU 38: valid range 0\.46 to 1\.17 m",
+        ),
+        ("EU 38", {"chest_width": 0.25, "bust_points": 0.26}, "too little for so deep a bust"),
+        ("men 50/182", {"stature": 1.8}, "give the stature once"),
+    ],
+)
+def test_a_size_with_impossible_measurements_is_refused(size: object, given: dict[str, float], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        Mannequin.from_size(size, **given)  # type: ignore[arg-type]
 
 
 def test_tape_bridges_hollows() -> None:

@@ -18,7 +18,7 @@ from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
-from warpflat.words import counted
+from warpflat.words import counted, size_words
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
@@ -84,7 +84,7 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     """
     name = f"{marker.name.replace('_', ' ')} marker {marker.fabric}".strip()
     sizes = list(dict.fromkeys(copy.piece.size for copy in marker.placements if copy.piece.size))
-    cut = counted(len(marker.placements), "piece") + (f", size {', '.join(sizes)}" if sizes else "")
+    cut = counted(len(marker.placements), "piece") + (f", {size_words(', '.join(sizes))}" if sizes else "")
     cloth = f"{marker.length:.3f} m of cloth {marker.width:.3f} m wide, {marker.utilisation:.1%} used"
     rows = [name, cut, cloth]
     widest = max(text_width(text, 1.0, bold=row == 0) for row, text in enumerate(rows))

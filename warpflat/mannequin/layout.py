@@ -254,8 +254,8 @@ def _lines(
     lines |= {"yoke back left": back[-1, : k - n0 + 1], "yoke back right": back[-1, k + n0 :]}
     lines |= {"neck": loop(neck[0]), "collar": loop(neck[-1])}
     lines |= {"shoulder left": yokes["front-left"][-1], "shoulder right": yokes["front-right"][-1][::-1]}
-    lines["centre front"] = np.concatenate([rings[:, 0], front[1:, k]])
-    lines["centre back"] = np.concatenate([rings[:, 2 * q], back[1:, k]])
+    lines["centre front"] = np.concatenate([rings[:, 0], front[1:, k], neck[1:, 0]])
+    lines["centre back"] = np.concatenate([rings[:, 2 * q], back[1:, k], neck[1:, neck.shape[1] // 2]])
     lines["side left"], lines["side right"] = rings[:, q], rings[:, 3 * q]
     for name, column, patch, at, up in (
         ("princess front left", p, front, k + p, yokes["front-left"][:, n1]),

@@ -63,13 +63,19 @@ class Mannequin:
     sections: Mapping[str, float] = field(default_factory=dict)
 
     @classmethod
-    def from_size(cls, size: str, *, resolution_mm: float = 10.0) -> Mannequin:
+    def from_size(cls, size: str, *, resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
         """A mannequin of a size of the tables: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``, ``men 50/182``.
 
+        Args:
+            size: its name.
+            resolution_mm: wished quad edge [mm].
+            lengths: measurements [m] instead of the size's, by name; what follows from them follows (see `notes`).
+
         Raises:
-            InputError: if no table has the size.
+            InputError: if no table has the size, or for a measurement that is unknown, outside its valid range, or that no body of
+                that size has.
         """
-        return cls._from(measurements_from_size(size), resolution_mm)
+        return cls._from(measurements_from_size(size, **lengths), resolution_mm)
 
     @classmethod
     def from_measurements(cls, *, table: str = "women", resolution_mm: float = 10.0, **lengths: float) -> Mannequin:

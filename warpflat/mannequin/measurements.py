@@ -13,14 +13,21 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.errors import InputError, is_number, nearest
+from warpflat.errors import InputError, expect, is_number, nearest
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-__all__ = ["Measurements", "measurements_from_size", "measurements_from_values", "size_names", "size_tables"]
+__all__ = [
+    "Measurements",
+    "measurements_from_size",
+    "measurements_from_values",
+    "size_names",
+    "size_table",
+    "size_tables",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,7 +39,7 @@ class Measurements:
         heights: height of every level and of nape, side_neck, front_neck, underarm above the floor [m].
         body: whose cross-sections are used, ``women`` or ``men``.
         source: where the numbers come from, for metrics and messages.
-        notes: one sentence for each measurement that was not given but completed.
+        notes: one sentence for each measurement that was not given but completed, or given instead of a size's.
     """
 
     lengths: Mapping[str, float]
@@ -58,33 +65,40 @@ def size_names() -> list[str]:
     return names
 
 
-def measurements_from_size(size: str) -> Measurements:
-    """The measurements of a size of the tables.
+def size_table(size: str) -> str:
+    """The table whose proportions complete a size: ``women`` or ``men``.
+
+    Raises:
+        InputError: if no table has the size.
+    """
+    key, _, _ = _found(size)
+    return _completing(key)
+
+
+def measurements_from_size(size: str, **given: float) -> Measurements:
+    """The measurements of a size of the tables, some of them replaced.
 
     Args:
         size: a name of :func:`size_names`, optionally with a stature in centimetres: ``men 50/182``.
+        given: lengths [m] by name, instead of the size's. What follows from them follows: the abdomen from waist and hip,
+            lengths down the body from the stature, and all that the size does not give itself.
 
     Raises:
-        InputError: if no table has the size, or the stature is out of range.
+        InputError: if no table has the size, the stature is out of range, or a given length is unknown, outside its valid
+            range, or goes with no body of that size.
     """
-    name, _, tall = size.partition("/")
-    wanted = _plain(name)
-    for key, table in size_tables()["tables"].items():
-        aliases = {_plain(a): s for a, s in table.get("aliases", {}).items()}
-        known = {_plain(f"{table['label']} {s}"): s for s in table["sizes"]} | aliases
-        if wanted not in known:
-            continue
-        values = {k: v / 100.0 for k, v in table["sizes"][known[wanted]].items()}
-        values["stature"] = _stature(tall, size) if tall else table["stature"] / 100.0
-        step = table.get("stature_step")
-        if step:
-            by = (values["stature"] * 100.0 - table["stature"]) / step["per"]
-            for k, v in step.items():
-                if k != "per":
-                    values[k] += by * v / 100.0
-        label = f"size {table['label']} {known[wanted]} ({table['source']}; grade {table['grade']})"
-        return _complete(values, table.get("complete_from", key), label)
-    raise InputError(f"size {size!r} is in no table: {nearest(name, size_names())}")
+    key, name, tall = _found(size)
+    _check_given(given)
+    if tall and "stature" in given:
+        raise InputError(f"size {size!r} and measurement stature = {given['stature']:g} m: give the stature once")
+    table = size_tables()["tables"][key]
+    title = f"size {table['label']} {name}" + (f"/{tall}" if tall else "")
+    replaced = {k: float(v) for k, v in given.items()}
+    label = title + (f" with {_listed(replaced)}" if given else "") + f" ({table['source']}; grade {table['grade']})"
+    if tall:
+        replaced["stature"] = _stature(tall, size)
+    values = {k: v / 100.0 for k, v in table["sizes"][name].items()}
+    return _Completion(key, replaced, values, title=title).measurements(label)
 
 
 def measurements_from_values(*, table: str = "women", **given: float) -> Measurements:
@@ -97,10 +111,34 @@ def measurements_from_values(*, table: str = "women", **given: float) -> Measure
     Raises:
         InputError: for an unknown name, a value outside its valid range, or two values that no body has together.
     """
-    ranges = size_tables()["valid"]["range"]
     tables = {k for k, t in size_tables()["tables"].items() if "complete_from" not in t}
     if table not in tables:
         raise InputError(f"measurements: table {table!r} is unknown: {nearest(table, tables)}")
+    _check_given(given)
+    if not {"bust", "waist", "hip"} & set(given):
+        raise InputError("measurements: give at least one of bust, waist, hip (in metres)")
+    values = {k: float(v) for k, v in given.items()}
+    return _Completion(table, values).measurements(f"measurements, {table}'s proportions")
+
+
+def _found(size: str) -> tuple[str, str, str]:
+    """A size's table, its name there, and the stature after its '/', if any."""
+    expect(size, str, "size", 'text, such as "EU 38"')
+    name, _, tall = size.partition("/")
+    for key, table in size_tables()["tables"].items():
+        aliases = {_plain(a): s for a, s in table.get("aliases", {}).items()}
+        known = {_plain(f"{table['label']} {s}"): s for s in table["sizes"]} | aliases
+        if _plain(name) in known:
+            return key, known[_plain(name)], tall
+    raise InputError(f"size {size!r} is in no table: {nearest(name, size_names())}")
+
+
+def _completing(table: str) -> str:
+    return str(size_tables()["tables"][table].get("complete_from", table))
+
+
+def _check_given(given: Mapping[str, object]) -> None:
+    ranges = size_tables()["valid"]["range"]
     for name, value in given.items():
         if name not in ranges:
             raise InputError(f"measurement {name!r} is unknown: {nearest(name, ranges)}")
@@ -109,14 +147,14 @@ def measurements_from_values(*, table: str = "women", **given: float) -> Measure
         low, high = (v / 100.0 for v in ranges[name])
         if not math.isfinite(value) or not low <= value <= high:
             raise InputError(f"measurement {name} = {value:g} m: valid range {low:g} to {high:g} m")
-    if not {"bust", "waist", "hip"} & set(given):
-        raise InputError("measurements: give at least one of bust, waist, hip (in metres)")
-    values = {k: float(v) for k, v in given.items()}
-    return _complete(values, table, f"measurements, {table}'s proportions", check=True)
 
 
 def _plain(name: str) -> str:
     return re.sub(r"[\s_\-']+", "", name).lower()
+
+
+def _listed(values: Mapping[str, float]) -> str:
+    return ", ".join(f"{name} = {value * 100:g} cm" for name, value in values.items())
 
 
 def _stature(text: str, size: str) -> float:
@@ -130,36 +168,114 @@ def _stature(text: str, size: str) -> float:
     return value / 100.0
 
 
-def _complete(values: dict[str, float], table_name: str, source: str, *, check: bool = False) -> Measurements:
-    data = size_tables()
-    table = data["tables"][table_name]
-    body = data["bodies"][table["body"]]
-    lengths = dict(values)
-    notes: list[str] = []
+class _Completion:
+    """What is given, of a size or by a user, and the rest by a table's proportions.
 
-    def fill(name: str, value: float, how: str) -> None:
-        lengths[name] = value
-        notes.append(f"{name} = {value * 100:.1f} cm {how}")
+    Args:
+        table: of the size, or the one that completes.
+        given: lengths [m] by name.
+        of_size: lengths [m] that the size gives, at its table's stature.
+        title: of the size, for messages.
+    """
 
-    if "stature" not in lengths:
-        fill("stature", table["stature"] / 100.0, f"is the {table_name} table's stature")
-    key = next(k for k in ("bust", "waist", "hip") if k in values)
-    for name in next(iter(table["sizes"].values())):
-        if name not in lengths:
-            fill(name, _along_table(table, key, values[key], name), f"from {key} by the {table_name} table")
-    for name, rule in body["complete"].items():
-        if name in lengths:
-            continue
-        if "of" in rule:
-            fill(name, rule["share"] * lengths[rule["of"]], f"is {rule['share']:g} of {rule['of']}")
-        else:
-            a, b = rule["between"]
-            fill(name, (1 - rule["at"]) * lengths[a] + rule["at"] * lengths[b], f"lies between {a} and {b}")
-    if check:
-        _check_ratios(lengths, set(values))
-    return Measurements(
-        lengths=lengths, heights=_heights(lengths, body), body=table["body"], source=source, notes=tuple(notes)
-    )
+    def __init__(
+        self, table: str, given: Mapping[str, float], of_size: Mapping[str, float] | None = None, *, title: str = ""
+    ) -> None:
+        tables = size_tables()["tables"]
+        self._own, self._name = tables[table], _completing(table)
+        self._rows = tables[self._name]
+        self._body = size_tables()["bodies"][self._own["body"]]
+        self._given, self._title = given, title
+        self._notes: list[str] = []
+        self._lengths = dict(given)
+        self._known = set(given)
+        if "stature" not in given:
+            stature = self._own["stature"] / 100.0
+            if of_size:
+                self._lengths["stature"] = stature
+            else:
+                self._fill("stature", stature, f"is the {table} table's stature")
+        rules = self._body["complete"]
+        # They stand between two others, and must not stay where a table has them when one of these has moved.
+        self._between = {n for n, rule in rules.items() if set(rule.get("between", ())) & set(given)} - set(given)
+        for name, value in (of_size or {}).items():
+            if name in given:
+                self._notes.append(
+                    f"{name} = {given[name] * 100:.1f} cm instead of the {value * 100:.1f} cm of {title}"
+                )
+            elif name not in self._between:
+                self._lengths[name] = self._at_stature(name, value)
+        if of_size:
+            self._known = set(self._lengths)
+
+    def measurements(self, source: str) -> Measurements:
+        """All of them.
+
+        Raises:
+            InputError: two that are given go together on no body.
+        """
+        self._check_ratios()
+        lengths, rows = self._lengths, self._rows["sizes"].values()
+        for name in next(iter(rows)):
+            if name not in lengths and name not in self._between:
+                key = next(k for k in ("bust", "waist", "hip") if k in lengths)
+                value = self._at_stature(name, _along_table(self._rows, key, lengths[key], name))
+                self._fill(name, value, f"from {key} by the {self._name} table")
+        for name, rule in self._body["complete"].items():
+            if name in lengths:
+                continue
+            if "of" in rule:
+                value, how = rule["share"] * lengths[rule["of"]], f"is {rule['share']:g} of {rule['of']}"
+            else:
+                a, b = rule["between"]
+                value, how = lengths[a] + rule["at"] * (lengths[b] - lengths[a]), f"lies between {a} and {b}"
+            low, high = sorted(lengths[end] for end in rule.get("within", ())) or (value, value)
+            if not low <= value <= high:
+                value, how = min(max(value, low), high), f"lies within {' and '.join(rule['within'])}"
+            self._fill(name, value, how)
+        return Measurements(
+            lengths=lengths, heights=_heights(lengths, self._body), body=self._own["body"], source=source,
+            notes=tuple(self._notes),
+        )  # fmt: skip
+
+    def _fill(self, name: str, value: float, how: str) -> None:
+        """Complete one, within the ratios in which bodies have it to what is known."""
+        for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
+            other = bottom if name == top else top
+            if name not in (top, bottom) or other not in self._known:
+                continue
+            least, most = _ends(name, top, low, high, self._lengths[other])
+            if not least <= value <= most:
+                value, how = min(max(value, least), most), f"{how}, as far as {other} lets it"
+        self._lengths[name] = value
+        self._notes.append(f"{name} = {value * 100:.1f} cm {how}")
+
+    def _at_stature(self, name: str, value: float) -> float:
+        """A length [m] at the stature of the own table, at that of the body."""
+        of_table = self._own["stature"] / 100.0
+        step = self._rows.get("stature_step", {})
+        if name in step:
+            return float(value + (self._lengths["stature"] - of_table) / step["per"] * step[name])
+        return value * self._lengths["stature"] / of_table if name in self._rows.get("with_stature", ()) else value
+
+    def _check_ratios(self) -> None:
+        for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
+            if not {top, bottom} <= self._known or not {top, bottom} & set(self._given):
+                continue
+            if low <= self._lengths[top] / self._lengths[bottom] <= high:
+                continue
+            name, other = (top, bottom) if top in self._given else (bottom, top)
+            least, most = _ends(name, top, low, high, self._lengths[other])
+            whose = "" if other in self._given else f" of {self._title}"
+            raise InputError(
+                f"measurement {name} = {self._lengths[name]:g} m does not go with {other} = {self._lengths[other]:.3g} m{whose}: "
+                f"valid range {least:.2f} to {most:.2f} m"
+            )
+
+
+def _ends(name: str, top: str, low: float, high: float, other: float) -> tuple[float, float]:
+    """Between which lengths [m] the first or the second of a ratio lies, given the other [m]."""
+    return (low * other, high * other) if name == top else (other / high, other / low)
 
 
 def _along_table(table: Mapping[str, Any], key: str, value: float, name: str) -> float:
@@ -171,25 +287,7 @@ def _along_table(table: Mapping[str, Any], key: str, value: float, name: str) ->
     slope = (y[-1] - y[0]) / (x[-1] - x[0])
     beyond = at - min(max(at, x[0]), x[-1])
     # Bones grow less than girths: what lies beyond the table's ends must not run off to nothing or to a giant.
-    return max(inside + slope * beyond, 0.55 * y[0]) / 100.0
-
-
-def _check_ratios(lengths: Mapping[str, float], given: set[str]) -> None:
-    for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
-        if not {top, bottom} & given:
-            continue
-        ratio = lengths[top] / lengths[bottom]
-        if low <= ratio <= high:
-            continue
-        name, other = (top, bottom) if top in given else (bottom, top)
-        if name == top:
-            ends = (low * lengths[bottom], high * lengths[bottom])
-        else:
-            ends = (lengths[top] / high, lengths[top] / low)
-        raise InputError(
-            f"measurement {name} = {lengths[name]:g} m does not go with {other} = {lengths[other]:.3g} m: "
-            f"valid range {ends[0]:.2f} to {ends[1]:.2f} m"
-        )
+    return float(max(inside + slope * beyond, 0.55 * y[0])) / 100.0
 
 
 def _heights(lengths: Mapping[str, float], body: Mapping[str, Any]) -> dict[str, float]:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.mannequin.layout import Ids, Layout
 from warpflat.mannequin.profiles import Floats
 from warpflat.surface.mesh import Surface
@@ -73,10 +74,11 @@ def cut_pieces(
             those of the right side are left out, being the left ones' mirror images.
 
     Raises:
-        InputError: for an unknown brick or line, a brick in two pieces, or a piece that is not one disk.
+        InputError: for an unknown brick or line, a line that does not run through its piece, a brick in two pieces, a piece that
+            is not one disk, or halves that are no mirror images.
     """
     owner: dict[str, str] = {}
-    pieces: dict[str, FormPiece] = {}
+    cuts: dict[str, tuple[list[str], str, Sequence[str]]] = {}
     for name, (patterns, datum, opened) in recipes.items():
         bricks = select_bricks(layout, patterns)
         for b in bricks:
@@ -86,39 +88,63 @@ def cut_pieces(
         for line in (*opened, *([datum] if datum else [])):
             if line not in layout.lines:
                 raise InputError(f"form: piece {name}: line {line!r} is unknown: {nearest(line, layout.lines)}")
-        if half and all(_is_side(b, "right") for b in bricks):
-            continue
-        pieces[name] = _piece(layout, vertices, name, bricks, datum, opened, half)
+        _check_opened(layout, name, bricks, opened)
+        cuts[name] = (bricks, datum, opened)
+    if half:
+        check_halves(cuts)
+        cuts = {name: cut for name, cut in cuts.items() if not all(is_side(b, "right") for b in cut[0])}
+    pieces = {name: _piece(layout, vertices, name, *cut, half) for name, cut in cuts.items()}
     return pieces, _seams(pieces)
 
 
-def _is_side(brick: str, side: str) -> bool:
-    return side in brick.partition("/")[2].split("-")
+def _faces_of(layout: Layout, bricks: Sequence[str]) -> NDArray[np.int64]:
+    index = {b: i for i, b in enumerate(layout.bricks)}
+    return np.flatnonzero(np.isin(layout.face_brick, [index[b] for b in bricks]))
+
+
+def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequence[str]) -> None:
+    """See that a piece lies on both sides of the lines along which it is to be open."""
+    if not opened:
+        return
+    corners = layout.faces[_faces_of(layout, bricks)]
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    edges, counts = np.unique(ends, axis=0, return_counts=True)
+    inside = {(a, b) for a, b in edges[counts == 2].tolist()}
+    through = [line for line in layout.lines if not inside.isdisjoint(_edge_set(layout, [line]))]
+    for line in opened:
+        if line not in through:
+            raise InputError(
+                f"form: line {line!r} does not run through piece {name}, which is to be open along it: {nearest(line, through)}"
+            )
 
 
 def _piece(
     layout: Layout, vertices: Floats, name: str, bricks: Sequence[str], datum: str, opened: Sequence[str], half: bool
 ) -> FormPiece:
-    both = {_is_side(b, "left") for b in bricks} == {True, False}
-    if half and both:
-        bricks = [b for b in bricks if _is_side(b, "left")]
-    index = {b: i for i, b in enumerate(layout.bricks)}
-    rows = np.flatnonzero(np.isin(layout.face_brick, [index[b] for b in bricks]))
+    folded = half and lies_on_both(bricks)
+    if folded:
+        bricks = [b for b in bricks if is_side(b, "left")]
+    rows = _faces_of(layout, bricks)
     corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened))
-    edges = _edges(layout, corners, grid_vertices, name)
+    edges = _edges(layout, corners, grid_vertices, name, opened=bool(opened))
     lines = dict(edges) | {
         line: ids for line, ids in _inner_lines(layout, corners, grid_vertices).items() if line not in edges
     }
-    fold = next((e for e in edges if e.startswith("centre")), None) if half and both else None
+    fold = fold_among(edges, opened, name) if folded else None
     surface = Surface(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
     if datum and datum not in lines:
         raise InputError(f"form: piece {name}: its datum {datum!r} does not run through it: {nearest(datum, lines)}")
+    if fold and len(np.intersect1d(lines[datum or fold], edges[fold])) == 1:
+        raise InputError(
+            f"form: piece {name}: its datum {datum!r} runs across the fold, {fold}, along which a half piece is laid: "
+            f"datum = {fold!r}, or cut it whole: half = false"
+        )
     names = list(layout.bricks)
     return FormPiece(
-        surface=surface, edges=edges, datum=datum or next(iter(lines)), fold=fold, grid_vertices=grid_vertices,
+        surface=surface, edges=edges, datum=datum or fold or next(iter(lines)), fold=fold, grid_vertices=grid_vertices,
         face_brick=tuple(names[i] for i in layout.face_brick[rows]),
     )  # fmt: skip
 
@@ -166,7 +192,7 @@ def _split(faces: Ids, cut: set[tuple[int, int]]) -> tuple[Ids, Ids]:
     return corners.reshape(-1, 4), grid_vertices
 
 
-def _border(corners: Ids, name: str) -> NDArray[np.int64]:
+def _border(corners: Ids, name: str, *, opened: bool) -> NDArray[np.int64]:
     """The one border loop of a disk, counter-clockwise from outside."""
     ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
     key = np.sort(ahead, axis=1)
@@ -177,7 +203,7 @@ def _border(corners: Ids, name: str) -> NDArray[np.int64]:
     if len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1 or not follow:
         raise InputError(
             f"form: piece {name} is not one disk (its bricks touch at a point, fall apart, or close to a tube); "
-            "choose neighbouring bricks, or name a line to open it along"
+            f"choose neighbouring bricks, or name {'another' if opened else 'a'} line to open it along"
         )
     start = min(follow)
     loop = [start]
@@ -202,8 +228,8 @@ def _unique(name: str, taken: Mapping[str, object]) -> str:
     return next(f"{name} {i}" for i in itertools.count(2) if f"{name} {i}" not in taken)
 
 
-def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str) -> dict[str, Ids]:
-    loop = _border(corners, name)
+def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str, *, opened: bool) -> dict[str, Ids]:
+    loop = _border(corners, name, opened=opened)
     line_of = _line_of_edge(layout)
     on_grid = grid_vertices[loop]
     labels = [

@@ -10,19 +10,21 @@ from pydantic import Field, model_validator
 
 from warpflat.errors import InputError
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.measurements import size_table
 from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.toml_file import Table
+from warpflat.words import MADE_TO_MEASURE
 
 __all__ = ["MannequinTable", "mannequin_from_scan_file", "mannequin_from_table"]
 
 
 class MannequinTable(Table):
-    """A body: by size, by measurements [m], or by a scan. Exactly one of the three."""
+    """A body: by size, by measurements [m], by a size of which measurements replace some, or by a scan."""
 
     size: str | None = None
     measurements: dict[str, float] | None = None
-    table: Literal["women", "men"] = "women"
-    """Whose proportions complete the measurements."""
+    table: Literal["women", "men"] | None = None
+    """Whose proportions complete the measurements; a size's own, or the women's."""
     scan: str | None = None
     """A mesh file, from the scene's folder on; may name environment variables."""
     units: str | None = None
@@ -34,9 +36,21 @@ class MannequinTable(Table):
 
     @model_validator(mode="after")
     def _one_source(self) -> MannequinTable:
-        if sum(source is not None for source in (self.size, self.measurements, self.scan)) != 1:
-            raise ValueError('give the body in one way: size = "EU 38", [mannequin.measurements], or scan = "FILE"')
+        if (self.scan is None) == (self.size is None and self.measurements is None):
+            raise ValueError(
+                'give the body in one way: size = "EU 38" or [mannequin.measurements], or both, which replaces some of the size\'s; '
+                'or scan = "FILE"'
+            )
+        if self.scan is not None and self.table is not None:
+            raise ValueError("table completes measurements; a scan has its own: leave it out")
         return self
+
+    @property
+    def size_name(self) -> str:
+        """What patterns call the body's size."""
+        if self.measurements is None and self.size is not None:
+            return self.size
+        return f"{self.size or ''} {MADE_TO_MEASURE}".strip()
 
 
 def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path]) -> Mannequin:
@@ -47,14 +61,18 @@ def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path
         path_of: where a file named in the scene lies.
 
     Raises:
-        InputError: an unknown size, impossible measurements, or a scan that is no standing body.
+        InputError: an unknown size, one that another table completes, impossible measurements, or a scan that is no standing body.
     """
+    given = dict(table.measurements or {})
     if table.size is not None:
-        return Mannequin.from_size(table.size, resolution_mm=table.resolution_mm)
+        own = size_table(table.size)
+        if table.table not in (None, own):
+            raise InputError(
+                f"size {table.size!r} is completed by the table {own!r}, not by {table.table!r}: leave the table out"
+            )
+        return Mannequin.from_size(table.size, resolution_mm=table.resolution_mm, **given)
     if table.measurements is not None:
-        return Mannequin.from_measurements(
-            table=table.table, resolution_mm=table.resolution_mm, **dict(table.measurements)
-        )
+        return Mannequin.from_measurements(table=table.table or "women", resolution_mm=table.resolution_mm, **given)
     options = ScanOptions(
         unit=table.units, up=table.up, facing=table.facing, landmarks=table.landmarks, mirror=table.mirror
     )

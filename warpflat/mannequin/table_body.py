@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from warpflat.errors import InputError
 from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables
@@ -182,6 +183,11 @@ def _chest_row(start: Floats, end_z: float, length: float, swell: float) -> Floa
         z = start[2] + (end_z - start[2]) * t**2.6 + swell * np.sin(np.pi * np.clip(t / 0.9, 0.0, 1.0)) ** 2
         return np.column_stack([width * t, np.full_like(t, start[1]), z])
 
+    if arc_lengths(row(0.3 * length))[-1] > length:
+        raise InputError(
+            f"measurements: {200 * length:.1f} cm across chest or back is too little for so deep a bust: wider chest_width or back_width, "
+            "or nearer bust_points, would do"
+        )
     width = brentq(lambda w: arc_lengths(row(w))[-1] - length, 0.3 * length, 1.2 * length)
     return row(float(width))
 

@@ -247,7 +247,7 @@ def pattern_of_garment(
     say so.
 
     Args:
-        garments: flattened, by size; "" where there is no size, as on a scan.
+        garments: flattened, by size; "" where there is none.
         name: of the pattern.
         rules: exceptions for edges.
         sample_size: see :class:`Garment`.

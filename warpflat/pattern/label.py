@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.pattern.lettering import Words, text_width, wrapped
 from warpflat.pattern.pieces import Piece
+from warpflat.words import size_words
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -103,7 +104,8 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
         cut = f"Cut {piece.quantity}"
     lines = [piece.name.replace("_", " ").upper()]
     if piece.size:
-        lines.append(f"Size {piece.size}")
+        words = size_words(piece.size)
+        lines.append(words[0].upper() + words[1:])
     lines.append(cut + (f" - {piece.fabric}" if piece.fabric else ""))
     widths = {}
     for kind in ("seam", "hem"):

@@ -13,6 +13,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label
 from warpflat.pattern.pieces import unknown_size
+from warpflat.words import size_words
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
@@ -154,7 +155,7 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
         cut = unfolded(piece) @ matrix.T
         across = float(np.ptp(cut[:, 1]))
         if across + SIMPLER > usable:
-            size = f" size {piece.size}" if piece.size else ""
+            size = f" {size_words(piece.size)}" if piece.size else ""
             raise InputError(
                 f"piece {piece.name!r}{size} is {across * 1000:.0f} mm wide, the cloth "
                 f"{usable * 1000:.0f} mm between its margins; give wider cloth or divide the piece"
@@ -294,7 +295,7 @@ def _named(copy: Copy) -> Copy:
 
     piece = copy.piece
     rows = [(piece.name.replace("_", " "), NAME)]
-    rows += [(f"size {piece.size}", MORE)] if piece.size else []
+    rows += [(size_words(piece.size), MORE)] if piece.size else []
     rows += [("mirrored", MORE)] if copy.mirrored else []
     lines = [*copy.fold_lines, copy.grain, *copy.notches]
     for clearance in CLEARANCES:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
+from warpflat.words import size_words
 
 __all__ = [
     "DEFAULT_ALLOWANCE",
@@ -162,7 +163,7 @@ class Piece:
     paired: bool = True
 
     def __post_init__(self) -> None:
-        where = f"piece {self.name!r}" + (f" size {self.size}" if self.size else "")
+        where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
         if not self.name:
             raise InputError("a piece has no name; every piece needs one, files and seams refer to it")
         if self.quantity < 1:
