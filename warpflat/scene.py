@@ -209,7 +209,7 @@ def run_scene(
 
     Args:
         scene: what to do.
-        out: folder for the files, made if need be.
+        out: folder for the files, made if need be; no folder is left where the run ends with an error and no file.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
         cuts: to be made instead of the scene's own (see `warpflat.scene_cuts.story_of_entry`).
@@ -217,8 +217,26 @@ def run_scene(
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
+    from warpflat.export import output_folder
+
+    with output_folder(out) as folder:
+        if scene.settings.mannequin is not None:
+            from warpflat.scene_garment import run_garment
+
+            return run_garment(scene, folder, on_progress=on_progress, device=device)
+        return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)
+
+
+def _run_surface(
+    scene: Scene,
+    folder: Path,
+    *,
+    on_progress: Callable[[Progress], None] | None,
+    device: str | None,
+    cuts: CutStory | None,
+) -> SceneResult:
     from warpflat.cutting import cut, separate
-    from warpflat.export import FrameWriter, prepare_folder
+    from warpflat.export import FrameWriter
     from warpflat.film import Film
     from warpflat.pattern_files import pattern_options
     from warpflat.scene_seams import scene_constraints, scene_surface_seams
@@ -226,11 +244,6 @@ def run_scene(
 
     settings = scene.settings
     relax = scene_relax_options(scene)
-    folder = prepare_folder(out)
-    if settings.mannequin is not None:
-        from warpflat.scene_garment import run_garment
-
-        return run_garment(scene, folder, on_progress=on_progress, device=device)
     with told_by(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
