@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpflat.constraints import FixedLength
 from warpflat.errors import InputError
 from warpflat.garment import Garment, flatten_form
 from warpflat.mannequin import Mannequin, form_from_mapping
 from warpflat.scene import load_scene, run_scene
+from warpflat.seam_lengths import polyline_length
 from warpflat.seam_wishes import SeamWish
 
 
@@ -95,6 +97,18 @@ def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
     assert sum(held.price for held in half.sewn.held) == pytest.approx(half.sewn.price, rel=0.05)
     # two halves are the whole
     assert 2 * half.sewn.energy_after == pytest.approx(block.sewn.energy_after, rel=0.02)
+
+
+def test_a_length_is_that_of_the_whole_line_on_a_half_piece_too(mannequin: Mannequin):
+    wanted = {"waist": 0.36, "centre front": 0.54}
+    asked = [FixedLength(piece="front", line=line, length=length) for line, length in wanted.items()]
+    lengths = []
+    for half in (False, True):
+        made = flatten_form(mannequin, mannequin.form("skirt", half=half), fabric="woven", constraints=asked)
+        piece = made.pieces["front"]
+        lengths.append({line: polyline_length(piece.positions[piece.surface.lines[line]]) for line in wanted})
+    assert lengths[0] == pytest.approx(wanted, abs=2e-4)
+    assert lengths[1] == pytest.approx({**wanted, "waist": 0.18}, abs=2e-4)
 
 
 @pytest.mark.parametrize("top", ["bust", "chest"])
