@@ -134,7 +134,7 @@ def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeyp
     monkeypatch.setattr("warpflat.console.ProgressBar.__call__", interrupt)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     assert warpflat("run", "cap.toml") == (130, "", "warpflat: interrupted\n")
-    assert list(Path("out/cap").iterdir()) == []
+    assert not Path("out").exists()
 
 
 @pytest.mark.skipif(os.name != "posix", reason="only POSIX has signals that can be handled")
@@ -151,7 +151,7 @@ def test_terminating_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypa
         assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
     finally:
         signal.signal(signal.SIGTERM, before)
-    assert list(Path("out/cap").iterdir()) == []
+    assert not Path("out").exists()
 
 
 # --- bad input
@@ -366,6 +366,20 @@ def test_a_mistake_found_late_is_one_line_in_a_fresh_process_too(tmp_path: Path)
         capture_output=True, text=True, check=False, cwd=tmp_path,
     )  # fmt: skip
     assert mistake((result.returncode, result.stdout, result.stderr)).startswith("command line: device 'cuda:99'")
+
+
+def test_a_run_that_fails_leaves_no_folder(warpflat: Run, tmp_path: Path):
+    (tmp_path / "hung.toml").write_text(
+        'form = "dress"\n[mannequin]\nsize = "EU 38"\n[[seams]]\nname = "sid left"\nease = 0.1\n'
+    )
+    (tmp_path / "flat.toml").write_text("datum = 'centr'\n[surface]\nshape = 'dome'\nresolution = 9\n")
+    for command in (("run", "hung.toml"), ("run", "flat.toml"), ("cuts", "flat.toml")):
+        mistake(warpflat(*command, "--out", "deep/inside"))
+        assert not (tmp_path / "deep").exists(), command
+    # One that was there stays, with what it holds.
+    (tmp_path / "mine").mkdir()
+    mistake(warpflat("run", "flat.toml", "--out", "mine/inside"))
+    assert not list((tmp_path / "mine").iterdir())
 
 
 def test_the_module_runs_as_a_program(tmp_path: Path):

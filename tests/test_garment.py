@@ -9,14 +9,16 @@ from typing import Any
 import numpy as np
 import pytest
 
+from warpflat.constraints import FixedLength
 from warpflat.cutting import CutPlan, cut
 from warpflat.edits import change_fabric, change_surface
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening, flatten
 from warpflat.garment import Garment, flatten_form
-from warpflat.mannequin import Mannequin
+from warpflat.mannequin import Mannequin, form_from_mapping
 from warpflat.relax import RelaxOptions
 from warpflat.scene import load_scene, run_scene
+from warpflat.seam_lengths import polyline_length
 from warpflat.seam_wishes import SeamWish
 from warpflat.shapes import make_shape
 from warpflat.tightness import Wear
@@ -102,6 +104,37 @@ def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
     assert sum(held.price for held in half.sewn.held) == pytest.approx(half.sewn.price, rel=0.05)
     # two halves are the whole
     assert 2 * half.sewn.energy_after == pytest.approx(block.sewn.energy_after, rel=0.02)
+
+
+def test_a_length_is_that_of_the_whole_line_on_a_half_piece_too(mannequin: Mannequin):
+    wanted = {"waist": 0.36, "centre front": 0.54}
+    asked = [FixedLength(piece="front", line=line, length=length) for line, length in wanted.items()]
+    lengths = []
+    for half in (False, True):
+        made = flatten_form(mannequin, mannequin.form("skirt", half=half), fabric="woven", constraints=asked)
+        piece = made.pieces["front"]
+        lengths.append({line: polyline_length(piece.positions[piece.surface.lines[line]]) for line in wanted})
+    assert lengths[0] == pytest.approx(wanted, abs=2e-4)
+    assert lengths[1] == pytest.approx({**wanted, "waist": 0.18}, abs=2e-4)
+
+
+@pytest.mark.parametrize("top", ["bust", "chest"])
+def test_a_half_with_a_low_neck_is_half_of_the_whole(top: str):
+    """Alone it bends its fold by 17 and 20 mm: moved to a line, these vertices alone pressed faces at the neck until they mirrored."""
+    bricks = [f"{top}-hip/front-*-centre", "shoulder-hip/front-*-side"]
+    form = form_from_mapping("straps", {"pieces": {"front": {"bricks": bricks, "datum": "centre front"}}})
+    body = Mannequin.from_size("EU 38")
+    half, whole = (flatten_form(body, body.form(form, half=h), fabric="woven") for h in (True, False))
+    assert half.sewn is not None
+    assert half.sewn.converged
+    assert half.pieces["front"].flipped_faces == 0
+    # Its quads lie along the threads, as those of the harmonic maps did not from which they started.
+    assert not any("times as stiff" in note for garment in (half, whole) for note in garment.notes)
+    energy = [garment.pieces["front"].stages[-1].spring_energy_j for garment in (half, whole)]
+    assert 2 * energy[0] == pytest.approx(energy[1], rel=1e-3)
+    of_half, of_whole = (garment.form.pieces["front"].grid_vertices for garment in (half, whole))
+    there = whole.pieces["front"].positions[np.searchsorted(of_whole, of_half)]
+    assert np.ptp(half.pieces["front"].positions - there, axis=0).max() < 1e-3
 
 
 @pytest.mark.parametrize("size", ["EU 36", "EU 44"])

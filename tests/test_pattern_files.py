@@ -239,6 +239,19 @@ def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
     assert "A4" in told("[surface]\nshape = 'dome'\n[pattern]\npaper = 'A5'\n")
 
 
+def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    text = (Path(__file__).parents[1] / "README.md").read_text(encoding="utf-8")
+    piece, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    (of_piece,) = re.findall(r"`(warpflat\.pattern_files\.surface_files\(.*?\))`", text)
+    monkeypatch.chdir(tmp_path)
+    exec(f"{piece}\nimport warpflat.pattern_files\n{of_piece}", {})
+    exec(garment, {})
+    for name, objects in (("bodice", {"bodice.obj"}), ("dress", {"front_centre.obj", "back_centre.obj"})):
+        files = {path.name for path in (tmp_path / "out" / name).iterdir()}
+        assert {"metrics.json", "picture.png", f"{name}.dxf", f"{name}.svg", "pattern.pdf", "pattern.json"} <= files
+        assert objects < files
+
+
 def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):
     flat = flatten(make_shape("dome", resolution=7))
     flat.positions[0] = flat.positions[-1] + [0.1, 0.1]

@@ -477,18 +477,18 @@ def cuts(
       warpflat cuts scenes/bodice.toml --apply 1 --out cut
     """
     from warpflat.console import ledger_table
-    from warpflat.export import prepare_folder, write_json
+    from warpflat.export import output_folder, write_json
     from warpflat.ledger_picture import write_ledger_picture
     from warpflat.scene import load_scene, scene_ledger
     from warpflat.scene_cuts import story_of_entry
 
     loaded = load_scene(scene)
     _start_warp()
-    folder = prepare_folder(out if out is not None else Path("out") / loaded.name)
-    ledger = scene_ledger(loaded, by=by, device=device)
-    story = None if apply is None else story_of_entry(ledger, apply)
-    write_json(folder / "ledger.json", ledger.as_dict())
-    write_ledger_picture(folder / "ledger.png", ledger)
+    with output_folder(out if out is not None else Path("out") / loaded.name) as folder:
+        ledger = scene_ledger(loaded, by=by, device=device)
+        story = None if apply is None else story_of_entry(ledger, apply)
+        write_json(folder / "ledger.json", ledger.as_dict())
+        write_ledger_picture(folder / "ledger.png", ledger)
     if as_json and story is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):

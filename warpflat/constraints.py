@@ -49,7 +49,8 @@ class FixedLength:
 
     Attributes:
         piece, line: names.
-        length: of the whole line [m], each edge having its share of it; None keeps the lengths on the body.
+        length: of the whole line [m], each edge having its share of it; None keeps the lengths on the body. A line of a half piece that
+            ends on the fold is whole with its mirror image: the half gets half of it.
     """
 
     piece: str
@@ -102,7 +103,8 @@ def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | 
     if isinstance(constraint, FixedLength):
         lengths = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1)
         if constraint.length is not None:
-            lengths = lengths * (constraint.length / lengths.sum())
+            there = lengths.sum() * (2.0 if _goes_on_beyond(fold, line) else 1.0)
+            lengths = lengths * (constraint.length / there)
         return one_group(length_ties(line, lengths), smooth_ties(line, piece.positions, fold)), False
     if line[0] == line[-1]:
         raise InputError(f"{constraint.name}: the line is closed; it must run from one end to another")
@@ -123,6 +125,12 @@ def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | 
     axis = vertices[partner == vertices]
     pairs = np.column_stack([vertices, partner])[one_of_two]
     return mirror_ties(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
+
+
+def _goes_on_beyond(fold: IntArray | None, line: IntArray) -> bool:
+    """Whether a line ends on the fold, and does not run along it."""
+    on_fold = np.isin(line, [] if fold is None else fold)
+    return bool((on_fold[0] or on_fold[-1]) and not on_fold.all())
 
 
 def _line(constraint: Constraint, piece: Flattening) -> IntArray:

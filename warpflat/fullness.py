@@ -24,8 +24,9 @@ from warpflat.progress import Stage
 from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
 from warpflat.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.strain import strain_energy
+from warpflat.surface.faded import faded
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops, half_edges_of, mesh_edges
+from warpflat.surface.topology import border_loops, half_edges_of
 from warpflat.upright import Upright
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
@@ -133,12 +134,12 @@ def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[In
         if along:
             stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
             logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
-            log_full[:, axis] += _faded(faces, logs, stops, len(positions))
+            log_full[:, axis] += faded(faces, logs, stops, len(positions))
     # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap, and all of what is eased in; and
     # what a slanting side has got too much.
     wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
     lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
-    log_full += _faded(faces, lacks, border_loops(faces), len(positions))[:, None]
+    log_full += faded(faces, lacks, border_loops(faces), len(positions))[:, None]
     return np.asarray(np.exp(log_full))
 
 
@@ -158,29 +159,6 @@ def _lack(
     length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
     lack = np.log(factor * length / np.linalg.norm(along * here, axis=1))
     return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
-
-
-def _faded(
-    faces: IntArray, logs: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
-) -> FloatArray:
-    """#V, the values given at vertices, 0 at `stops` besides, and harmonic in between."""
-    from scipy.sparse import coo_matrix, diags
-    from scipy.sparse.linalg import spsolve
-
-    value, known = np.zeros(count), np.zeros(count, dtype=bool)
-    for stop in stops:
-        known[stop] = True
-    for vertices, given in logs:
-        value[vertices], known[vertices] = given, True
-    free = np.flatnonzero(~known)
-    if len(free):
-        ends = mesh_edges(faces)
-        ones = np.ones(2 * len(ends))
-        rows, columns = np.concatenate([ends[:, 0], ends[:, 1]]), np.concatenate([ends[:, 1], ends[:, 0]])
-        joined = coo_matrix((ones, (rows, columns)), shape=(count, count)).tocsr()
-        laplacian = (diags(np.asarray(joined.sum(axis=1)).ravel()) - joined).tocsr()
-        value[free] = spsolve(laplacian[free][:, free].tocsc(), joined[free] @ value)
-    return value
 
 
 def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:

@@ -67,7 +67,7 @@ class WrittenPattern:
 
 def garment_files(
     garments: Mapping[str, Garment],
-    folder: Path,
+    folder: str | Path,
     *,
     name: str,
     options: PatternOptions | None = None,
@@ -80,7 +80,7 @@ def garment_files(
 
     Args:
         garments: flattened, by size; "" where there is none.
-        folder: exists.
+        folder: made if need be.
         name: of the files.
         options: see the class.
         sample_size: the one that the files show first.
@@ -99,7 +99,7 @@ def garment_files(
 
 def surface_files(
     results: Sequence[Flattening],
-    folder: Path,
+    folder: str | Path,
     *,
     name: str,
     options: PatternOptions | None = None,
@@ -175,13 +175,16 @@ def export_pattern(
 
 
 def _drawn(
-    make: Callable[[], tuple[Pattern, tuple[str, ...]]], folder: Path, name: str, options: PatternOptions
+    make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
     """Make, draft and write a pattern; geometry that defeats it becomes a note."""
     from shapely.errors import ShapelyError
 
+    from warpflat.export import prepare_folder
+
     if not options.formats and options.cloth is None:
         return WrittenPattern()
+    folder = prepare_folder(to)
     try:
         pattern, notes = make()
         drafted, told = _drafted(pattern, options.tolerance)

@@ -498,5 +498,8 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
             state.matrix.follow(state.position)
         if watch is not None:
             watch(state, look.total, float(look.residual.max()))
+    if state.steps > first and state.upright:
+        # Turned upright after the last look.
+        state.last = replace(state.last, energies=state.piece_energies())
     state.give(whole)
     return whole.outcome(first, work, begun=begun)

@@ -93,7 +93,7 @@ class Run:
             model=self.model,
             stretch=stretch,
         )
-        self.notes += [note for note in (*notes, *_off_grain(network)) if note not in self.notes]
+        self.notes += [note for note in notes if note not in self.notes]
         return network
 
     def measured_again(self, *, mended: bool = False) -> int:
@@ -185,6 +185,9 @@ def relax_runs(
         own = [runs[number] for number in numbers]
         batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
         relaxed |= zip(numbers, batch.relax(levels=levels, again=times), strict=True)
+    for number, run in enumerate(runs):
+        # Of the springs that the pattern has: those of a start that turned out otherwise are gone.
+        run.notes += _off_grain(relaxed[number].network)
     return [relaxed[number] for number in range(len(runs))]
 
 

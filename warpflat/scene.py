@@ -216,7 +216,7 @@ def run_scene(
 
     Args:
         scene: what to do.
-        out: folder for the files, made if need be.
+        out: folder for the files, made if need be; no folder is left where the run ends with an error and no file.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
         cuts: to be made instead of the scene's own (see `warpflat.scene_cuts.story_of_entry`).
@@ -224,19 +224,32 @@ def run_scene(
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
+    from warpflat.export import output_folder
+
+    with output_folder(out) as folder:
+        if scene.settings.mannequin is not None:
+            from warpflat.scene_garment import run_garment
+
+            return run_garment(scene, folder, on_progress=on_progress, device=device)
+        return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)
+
+
+def _run_surface(
+    scene: Scene,
+    folder: Path,
+    *,
+    on_progress: Callable[[Progress], None] | None,
+    device: str | None,
+    cuts: CutStory | None,
+) -> SceneResult:
     from warpflat.cutting import separate
-    from warpflat.export import FrameWriter, prepare_folder
+    from warpflat.export import FrameWriter
     from warpflat.film import Film
     from warpflat.pattern_files import pattern_options
     from warpflat.scene_seams import scene_surface_seams
 
     settings = scene.settings
-    scene_relax_options(scene)  # a mistake is told before the folder is made
-    folder = prepare_folder(out)
-    if settings.mannequin is not None:
-        from warpflat.scene_garment import run_garment
-
-        return run_garment(scene, folder, on_progress=on_progress, device=device)
+    scene_relax_options(scene)  # a mistake is told before anything is made
     with told_by(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)

@@ -147,8 +147,8 @@ class ConstraintTable(Table):
     """What is asked of an edge or a feature line, in one piece or in all that have it.
 
     `straight` lays it on a straight line: of any direction ("free"), parallel to the grain ("warp") or at right angles to it
-    ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length.
-    `symmetric` makes the piece, cut whole, its own mirror image about the line.
+    ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length,
+    that of the whole line, unfolded. `symmetric` makes the piece, cut whole, its own mirror image about the line.
     """
 
     line: str = Field(min_length=1)

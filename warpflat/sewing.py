@@ -27,6 +27,7 @@ from warpflat.flattening import Flattening
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, given_options, relax
+from warpflat.surface.faded import faded
 from warpflat.ties import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
 from warpflat.together import Together
 
@@ -286,6 +287,8 @@ def _held_folds(state: Relaxation, whole: Together, folds: Mapping[str, IntArray
 def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     """The piece's layout with these vertices on one line along the grain and no face mirrored.
 
+    Moved sideways, each by as much as the line bends there; the move fades out across the piece, or it would press the faces beside.
+
     Raises:
         InputError: neither its pattern nor its development can be laid so.
     """
@@ -293,13 +296,15 @@ def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
         return piece.positions
     cells = piece.network.cell_arrays
     for layout in (piece.positions, piece.development.positions):
-        start = layout.copy()
-        start[vertices, 0] = start[vertices, 0].mean()
+        x, start = layout[vertices, 0], layout.copy()
+        start[:, 0] += faded(piece.faces, [(vertices, x.mean() - x)], [], len(start))
+        start[vertices, 0] = x.mean()
         if (cells.least_shares(start) > 0.01).all():
             return start
+    bend = np.ptp(piece.positions[vertices, 0])
     raise InputError(
-        f"piece {piece.surface.name!r} cannot be laid with a straight fold: its fold line bends too much on the body; "
-        "cut the whole piece (half = false), or ease the form there"
+        f"piece {piece.surface.name!r} cannot be laid with a straight fold: on its own its pattern bends by {1e3 * bend:.0f} mm there, and "
+        "straightened some of its faces would be mirrored; cut the whole piece (half = false), or ease the form there"
     )
 
 

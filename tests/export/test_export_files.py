@@ -5,6 +5,7 @@ import os
 import stat
 import subprocess
 import sys
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +14,16 @@ from export_meshes import dome
 
 import warpflat
 from warpflat.errors import InputError
-from warpflat.export import FrameWriter, PicturePiece, atomic_path, prepare_folder, write_json, write_obj, write_picture
+from warpflat.export import (
+    FrameWriter,
+    PicturePiece,
+    atomic_path,
+    output_folder,
+    prepare_folder,
+    write_json,
+    write_obj,
+    write_picture,
+)
 
 
 def test_file_appears_whole_and_nothing_else(tmp_path: Path) -> None:
@@ -124,6 +134,20 @@ def test_prepare_folder_creates_it_and_leaves_it_empty(tmp_path: Path) -> None:
     assert prepare_folder(tmp_path / "a" / "b") == tmp_path / "a" / "b"
     assert os.listdir(tmp_path / "a" / "b") == []
     prepare_folder(tmp_path / "a" / "b")
+
+
+def test_an_output_folder_stays_once_there_is_a_file_in_it(tmp_path: Path) -> None:
+    with output_folder(tmp_path / "a" / "b"):
+        assert (tmp_path / "a" / "b").is_dir()
+    assert not (tmp_path / "a").exists()
+    with suppress(KeyboardInterrupt), output_folder(tmp_path / "a" / "b") as folder:
+        (folder.parent / "kept").write_text("")
+        raise KeyboardInterrupt
+    assert os.listdir(tmp_path / "a") == ["kept"]
+    (tmp_path / "mine").mkdir()
+    with output_folder(tmp_path / "mine"):
+        pass
+    assert (tmp_path / "mine").is_dir()
 
 
 def test_prepare_folder_refuses_a_file_and_what_lies_below_it(tmp_path: Path) -> None:

@@ -188,6 +188,9 @@ def test_tube_can_be_opened_along_a_line(body: Mannequin) -> None:
     made = body.form(form)
     assert set(made.pieces["skirt"].edges) == {"waist", "knee", "centre back", "centre back 2"}
     assert [s.pieces for s in made.seams] == [("skirt", "skirt")]
+    # Across the cut the hip is one line all around.
+    hip = made.pieces["skirt"].surface.lines["hip"]
+    assert len(hip) == len(body.layout.lines["hip"])
 
 
 _FRONT = {"bricks": ["waist-knee/front-*"], "datum": "centre front"}
@@ -271,3 +274,32 @@ def test_a_line_that_opens_a_piece_runs_through_it(body: Mannequin, half: bool) 
     form = form_from_mapping("mine", {"pieces": {"a": {"bricks": ["waist-knee/*"], "open": ["hip"]}}})
     with pytest.raises(InputError, match=r"not one disk .* name another line to open it along"):
         body.form(form)
+
+
+def test_a_line_that_leaves_the_border_is_one_line_with_its_edge(body: Mannequin) -> None:
+    over = {"bricks": ["shoulder-hip/front-right-*", "chest-hip/front-left-centre"], "datum": "centre front"}
+    strap = {"bricks": ["bust-hip/front-left-centre", "shoulder-hip/front-left-side"], "datum": "princess front left"}
+    for recipe in (over, strap):
+        (piece,) = body.form(form_from_mapping("odd", {"pieces": {"front": recipe}})).pieces.values()
+        line = str(recipe["datum"])
+        edge, whole = piece.edges[line], piece.surface.lines[piece.datum]
+        assert piece.datum == line
+        assert np.array_equal(
+            np.sort(piece.grid_vertices[whole]), np.sort(np.intersect1d(body.layout.lines[line], piece.grid_vertices))
+        )
+        assert len(edge) < len(whole)
+        assert set(edge.tolist()) < set(whole.tolist())
+
+
+def test_every_part_of_a_line_is_kept(body: Mannequin) -> None:
+    """Two straps: what crosses both is there twice, and what goes on under the neckline once."""
+    straps = {"front": {"bricks": ["bust-hip/front-*-centre", "shoulder-hip/front-*-side"], "datum": "centre front"}}
+    (piece,) = body.form(form_from_mapping("straps", {"pieces": straps})).pieces.values()
+    lines = piece.surface.lines
+    for line in ("chest front", "chest front 2"):
+        assert line not in piece.edges
+        assert set(piece.grid_vertices[lines[line]]) < set(body.layout.lines["chest front"].tolist())
+    assert not set(lines["chest front"].tolist()) & set(lines["chest front 2"].tolist())
+    assert "bust 2" not in lines
+    assert set(piece.edges["bust"].tolist()) < set(lines["bust"].tolist())
+    assert len(lines["bust"]) == len(np.intersect1d(body.layout.lines["bust"], piece.grid_vertices))

@@ -71,6 +71,25 @@ def test_an_edge_sewn_to_several_whole_edges_stays_one(mannequins):
     assert len({side.reversed for side in chain}) == 1, "front and back lie on the same side of the cap"
 
 
+def test_a_line_that_leaves_the_border_is_drawn_inside_and_carries_the_grain(mannequins):
+    """An asymmetric front: its centre is the border from the neck to the chest, and inside the piece from there to the hip."""
+    bricks = ["shoulder-hip/front-right-*", "chest-hip/front-left-centre"]
+    form = form_from_mapping("over", {"pieces": {"front": {"bricks": bricks, "datum": "centre front"}}})
+    body = mannequins["EU 38"]
+    garment = flatten_form(body, body.form(form), fabric="woven")
+    flat, piece = garment.pieces["front"], garment.form.pieces["front"]
+    pattern, _ = pattern_of_garment({"": garment}, name="over")
+    drawn = pattern.pieces[""][0].internal_lines["centre front"]
+    # From hip to chest, as the edge of its name begins there.
+    edge = flat.positions[piece.edges["centre front"]]
+    assert np.ptp(drawn[:, 1]) > 2 * np.ptp(edge[:, 1])
+    assert np.abs(edge - drawn[-1]).sum(axis=1).min() < 1e-12
+    # The whole line's chord is upright, not that of its short edge.
+    whole = flat.positions[flat.datum]
+    assert abs(whole[-1, 0] - whole[0, 0]) < 1e-6
+    assert len(whole) == len(drawn) + len(edge) - 1
+
+
 def test_an_edge_that_is_sewn_in_part_is_split_there(mannequins):
     """A skirt's front between the side seams, its sides longer than those of a back that ends at the thigh."""
     form = form_from_mapping(

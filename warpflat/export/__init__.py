@@ -6,7 +6,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpflat.export.atomic import atomic_path, file_in, prepare_folder, require_writable
+    from warpflat.export.atomic import atomic_path, file_in, output_folder, prepare_folder, require_writable
     from warpflat.export.metrics import write_json
     from warpflat.export.obj import write_obj
     from warpflat.export.picture import PicturePiece, write_picture
@@ -18,6 +18,7 @@ __all__ = [
     "PicturePiece",
     "atomic_path",
     "file_in",
+    "output_folder",
     "prepare_folder",
     "require_writable",
     "validate_usd",
@@ -31,6 +32,7 @@ _HOME = {
     "PicturePiece": "picture",
     "atomic_path": "atomic",
     "file_in": "atomic",
+    "output_folder": "atomic",
     "prepare_folder": "atomic",
     "require_writable": "atomic",
     "validate_usd": "usd_validation",

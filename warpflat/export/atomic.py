@@ -16,7 +16,15 @@ from pathlib import Path
 from warpflat.errors import InputError
 from warpflat.names import checked_name
 
-__all__ = ["atomic_path", "file_in", "hidden_beside", "prepare_folder", "remove_unfinished", "require_writable"]
+__all__ = [
+    "atomic_path",
+    "file_in",
+    "hidden_beside",
+    "output_folder",
+    "prepare_folder",
+    "remove_unfinished",
+    "require_writable",
+]
 
 # .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
 _HIDDEN = re.compile(r"\..*-warpflat-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{8}(\.\w+)?")
@@ -142,6 +150,23 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
         raise InputError(f"output folder {folder} cannot be written: {_reason(error)}; choose another one") from error
     remove_unfinished(folder)
     return folder
+
+
+@contextmanager
+def output_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+    """The output folder for a run that may yet fail: what it has made of it goes again if nothing has been written there.
+
+    Raises:
+        InputError: as :func:`prepare_folder`.
+    """
+    folder = Path(path)
+    made = [each for each in (folder, *folder.parents) if not each.exists()]
+    try:
+        yield prepare_folder(folder)
+    finally:
+        for each in made:
+            with suppress(OSError):  # it holds files
+                each.rmdir()
 
 
 def _reason(error: OSError) -> str:

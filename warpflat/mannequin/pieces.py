@@ -27,10 +27,11 @@ class FormPiece:
     """One piece of cloth on the body.
 
     Attributes:
-        surface: the piece; its `lines` hold every feature line that runs through it and every edge.
+        surface: the piece; its `lines` hold every feature line that runs through it and every edge. An edge that goes on inside
+            as the same feature line is there with all of it.
         edges: the border, counter-clockwise from outside, cut where one feature line ends and the next begins: vertex
             indices of the piece along each edge, both ends included.
-        datum: the feature line to develop from; a name in `surface.lines`.
+        datum: the feature line to develop from; a name in `surface.lines`. Of one that falls into parts the longest.
         fold: the edge that lies on the fold if this is a half piece, else None.
         grid_vertices: #V, for each vertex of the piece its vertex on the mannequin.
         face_brick: #F, for each face its brick's name.
@@ -127,24 +128,24 @@ def _piece(
     rows = _faces_of(layout, bricks)
     corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened))
     edges = _edges(layout, corners, grid_vertices, name, opened=bool(opened))
-    lines = dict(edges) | {
-        line: ids for line, ids in _inner_lines(layout, corners, grid_vertices).items() if line not in edges
-    }
+    lines = _lines(layout, corners, grid_vertices, edges)
     fold = fold_among(edges, opened, name) if folded else None
     surface = Surface(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
-    if datum and datum not in lines:
+    wished = datum or fold
+    along = [line for line in lines if _is_of(line, wished)] if wished else list(lines)[:1]
+    if not along:
         raise InputError(f"form: piece {name}: its datum {datum!r} does not run through it: {nearest(datum, lines)}")
-    if fold and len(np.intersect1d(lines[datum or fold], edges[fold])) == 1:
+    if fold and len(np.intersect1d(lines[datum if datum in lines else along[0]], edges[fold])) == 1:
         raise InputError(
             f"form: piece {name}: its datum {datum!r} runs across the fold, {fold}, along which a half piece is laid: "
             f"datum = {fold!r}, or cut it whole: half = false"
         )
     names = list(layout.bricks)
     return FormPiece(
-        surface=surface, edges=edges, datum=datum or fold or next(iter(lines)), fold=fold, grid_vertices=grid_vertices,
+        surface=surface, edges=edges, datum=max(along, key=lambda line: len(lines[line])), fold=fold, grid_vertices=grid_vertices,
         face_brick=tuple(names[i] for i in layout.face_brick[rows]),
     )  # fmt: skip
 
@@ -245,28 +246,66 @@ def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str, *, opene
     return edges
 
 
-def _inner_lines(layout: Layout, corners: Ids, grid_vertices: Ids) -> dict[str, Ids]:
-    """Feature lines inside the piece, as vertex indices of the piece; the longest run of each."""
-    once = {int(g): i for i, g in enumerate(grid_vertices)}
-    present = {
-        (min(a, b), max(a, b))
-        for k in range(4)
-        for a, b in zip(corners[:, k].tolist(), corners[:, (k + 1) % 4].tolist(), strict=True)
-    }
-    found: dict[str, Ids] = {}
+def _lines(layout: Layout, corners: Ids, grid_vertices: Ids, edges: Mapping[str, Ids]) -> dict[str, Ids]:
+    """Every edge and, as vertex indices of the piece, the runs of feature lines inside it, the longest of a line first.
+
+    Where an edge goes on inside as the same line, its name means both.
+    """
+    lines = dict(edges)
+    for line, runs in _inner_runs(layout, corners, grid_vertices).items():
+        own = [edge for edge in edges if _is_of(edge, line)]
+        for run in sorted(runs, key=len, reverse=True):
+            whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in own})
+            lines[border or _unique(line, lines)] = np.array(whole, np.int32)
+    return lines
+
+
+def _is_of(name: str, line: str) -> bool:
+    """Whether a name is that of a feature line or of a further part of it."""
+    return name == line or (name.startswith(f"{line} ") and name[len(line) + 1 :].isdigit())
+
+
+def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[int], str | None]:
+    """A run and what goes on at its ends, as one line; the first of the names that this has."""
+    joined: set[str] = set()
+    for name in list(edges) * len(edges):
+        ids = edges[name]
+        if name in joined or run[0] == run[-1]:
+            continue
+        if run[0] in (ids[0], ids[-1]):
+            run = [*(ids if ids[-1] == run[0] else ids[::-1]), *run[1:]]
+        elif run[-1] in (ids[0], ids[-1]):
+            run = [*run, *(ids if ids[0] == run[-1] else ids[::-1])[1:]]
+        else:
+            continue
+        joined.add(name)
+    return run, next((name for name in edges if name in joined), None)
+
+
+def _inner_runs(layout: Layout, corners: Ids, grid_vertices: Ids) -> dict[str, list[list[int]]]:
+    """By feature line its runs inside the piece, off the border, as vertex indices of the piece."""
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    mesh_edges, faces = np.unique(ends, axis=0, return_counts=True)
+    # Off the border, and so off all that is doubled, an edge of the mannequin is one of the piece.
+    inner: dict[tuple[int, int], int] = {}
+    for u, v in mesh_edges[faces == 2].tolist():
+        a, b = int(grid_vertices[u]), int(grid_vertices[v])
+        inner[a, b], inner[b, a] = v, u
+    found: dict[str, list[list[int]]] = {}
     for line, ids in layout.lines.items():
-        runs: list[list[int]] = [[]]
+        runs: list[list[int]] = []
         for a, b in itertools.pairwise(ids.tolist()):
-            u, v = once.get(a, -1), once.get(b, -1)
-            if u >= 0 and v >= 0 and (min(u, v), max(u, v)) in present:
-                runs[-1] = [*(runs[-1] or [u]), v]
-            elif runs[-1]:
-                runs.append([])
-        runs = [r for r in runs if r]
-        if len(runs) > 1 and ids[0] == ids[-1] and runs[0][0] == once.get(int(ids[0])) == runs[-1][-1]:
+            if (a, b) not in inner:
+                continue
+            u, v = inner[b, a], inner[a, b]
+            if runs and runs[-1][-1] == u:
+                runs[-1].append(v)
+            else:
+                runs.append([u, v])
+        if len(runs) > 1 and runs[0][0] == runs[-1][-1]:
             runs[0] = [*runs.pop(), *runs[0][1:]]
         if runs:
-            found[line] = np.array(max(runs, key=len), np.int32)
+            found[line] = runs
     return found
 
 

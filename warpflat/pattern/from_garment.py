@@ -469,18 +469,19 @@ def _piece(
         allowance = rules.allowance(name, part.name, kind)
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
-    lines = {key: ids for key, ids in piece.surface.lines.items() if key not in piece.edges}
+    border = list(piece.edges.values())
+    along = inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
         name=name,
         size=size,
         fabric=flat.fabric.name,
         quantity=quantity,
         edges=edges,
-        internal_lines=inner_lines(lines, list(piece.edges.values()), flat.positions),
+        internal_lines=inner_lines(piece.surface.lines, border, flat.positions),
         grain=grain_of(
             np.concatenate([edge.points[:-1] for edge in edges]),
             flat,
-            None if piece.datum in piece.edges else flat.positions[piece.surface.lines[piece.datum]],
+            max(along.values(), key=len, default=None),
         ),
     )
 
