@@ -50,7 +50,7 @@ BoolArray = NDArray[np.bool_]
 _SOFT = 35.0
 _FEW = 1_200
 # Work units of cycles between triangles after which others go on: whole steps in a soft cloth, from the latter K/G on at once, plain steps
-# with a membrane. On clean meshes cycles are at rest by then; slivers, and cloth that wrinkles, would take them ten thousands.
+# with a membrane that is not the same in all directions. On clean meshes cycles are at rest by then; slivers would take them ten thousands.
 _PATIENCE = 600.0
 _VERY_SOFT = 200.0
 _PATIENCE_WITH_MEMBRANE = 300.0
@@ -125,7 +125,7 @@ def _patience(network: SpringNetwork) -> float:
     if network.surface.is_quad.any():
         return math.inf
     if network.model == "membrane":
-        return _PATIENCE_WITH_MEMBRANE
+        return math.inf if network.fabric.is_isotropic else _PATIENCE_WITH_MEMBRANE
     if not whole_steps_pay(network):
         return math.inf
     return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE

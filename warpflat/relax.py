@@ -64,7 +64,8 @@ class RelaxOptions:
     Attributes:
         time_step: h [s]. The minimum does not depend on it; steps to it stop falling above 1e-3.
         energy_tolerance: eq. (11): relative change of the energy per step.
-        residual_tolerance: largest force on a vertex over the mean force of the springs.
+        residual_tolerance: largest force on a vertex over the mean force of the springs; after whole steps (`warpflat.whole_steps`) it is
+            enough, too, that forces could release next to nothing.
         max_steps: a state that has taken so many is not stepped on, and says so (`converged` is false); with levels, their work counts in
             steps of the piece's own mesh, and a cycle that has begun is ended.
         check_every: steps between two looks at energies and convergence.
