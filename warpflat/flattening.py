@@ -398,9 +398,7 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
     """The datum as vertex indices, its name, and a note where it was chosen."""
     if datum is None:
         line = choose_datum(surface)
-        length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
-        ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
-        return line, "datum", [f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"]
+        return line, "datum", [chosen_datum_note(surface, line)]
     if isinstance(datum, str):
         if datum not in surface.lines:
             raise InputError(
@@ -417,6 +415,13 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
     # A pattern lies as the piece hangs on the body (+y is up), whichever way its line happens to run.
     downward = chord[1] < -0.1 * float(np.linalg.norm(chord))
     return np.ascontiguousarray(line[::-1] if downward else line), name, []
+
+
+def chosen_datum_note(surface: Surface, line: IntArray) -> str:
+    """What is said of a datum that nobody gave: vertex indices of the line on the surface."""
+    length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
+    ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
+    return f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"
 
 
 def _device(name: str | None) -> wp.Device:
