@@ -29,7 +29,7 @@ from warpflat.running import Relaxed, Run, relax_runs
 from warpflat.strain import LayoutErrors, WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, line_from_indices, read_surface
-from warpflat.tightness import Wear, WornFit, assess_fit
+from warpflat.tightness import Wear, WornFit, assess_fit, unused_stretch
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
@@ -239,7 +239,18 @@ def flatten(
     surface = given_surface(surface, units)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
-    return finish([start(surface, datum, settings, callback)])[0]
+    started = start(surface, datum, settings, callback)
+    _refuse_unused_stretch(started)
+    return finish([started])[0]
+
+
+def _refuse_unused_stretch(piece: Started) -> None:
+    """Which threads run around the body is known once a piece is developed; of several pieces each has its own, and a note says so."""
+    wear, notes = piece.run.wear, piece.run.notes
+    unused = [] if wear is None else [unused_stretch(wear, around) for around in ("warp", "weft")]
+    for told in unused:
+        if told in notes:
+            raise InputError(f"piece {piece.run.surface.name!r}: wear: {told}; leave it out, or the pressure")
 
 
 def given_surface(surface: Surface | str | Path, units: str | None) -> Surface:

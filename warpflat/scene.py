@@ -130,6 +130,10 @@ class SceneTable(Table):
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
         if self.mannequin is not None and (self.cuts or self.auto_cut):
             raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.surface is not None and self.half:
+            raise ValueError(
+                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] kinds = { left = \"fold\" }"
+            )
         for number, seam in enumerate(self.seams):
             if self.mannequin is None and seam.sides is None:
                 raise ValueError(

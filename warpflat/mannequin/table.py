@@ -36,6 +36,12 @@ class MannequinTable(Table):
     def _one_source(self) -> MannequinTable:
         if sum(source is not None for source in (self.size, self.measurements, self.scan)) != 1:
             raise ValueError('give the body in one way: size = "EU 38", [mannequin.measurements], or scan = "FILE"')
+        of_scan = [key for key in ("units", "up", "facing", "landmarks", "mirror") if getattr(self, key)]
+        if self.scan is None and of_scan:
+            body = "size" if self.size is not None else "measurements"
+            raise ValueError(
+                f"given with {body}, but of a scan only: {', '.join(of_scan)}; leave it out, or give a scan"
+            )
         return self
 
 
