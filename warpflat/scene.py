@@ -232,7 +232,7 @@ def run_scene(
 
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is told before the folder is made
-    folder = prepare_folder(out)
+    folder = prepare_folder(out, _files_for_all(settings))
     if settings.mannequin is not None:
         from warpflat.scene_garment import run_garment
 
@@ -265,6 +265,14 @@ def run_scene(
         sources=scene_sources(scene),
         notes=(*result.notes, *story.notes),
     )
+
+
+def _files_for_all(settings: SceneTable) -> list[str]:
+    """The files of a run that do not bear a piece's name."""
+    output, formats = settings.output, settings.pattern.formats
+    pattern = [f"pattern.{ending}" for ending in ("pdf", "json") if ending in formats]
+    frames = ["frames.usdc"] if FrameSchedule(output).wanted else []
+    return ["metrics.json", *frames, *(["picture.png"] if output.picture else []), *pattern]
 
 
 def flatten_scene(

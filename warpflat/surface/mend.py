@@ -137,7 +137,10 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
         InputError: of another shape, or not finite; names the vertex.
     """
     try:
-        positions = np.array(vertices, dtype=np.float64)
+        given = np.asarray(vertices)
+        if np.iscomplexobj(given):
+            raise TypeError("a place in space is of real numbers")
+        positions = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError("vertices must be numbers, #V by 3") from error
     if positions.size == 0:
@@ -353,7 +356,8 @@ def _check_border(faces: NDArray[np.int32]) -> None:
     loops = border_loops(faces)
     if not loops:
         raise InputError(
-            "the surface is closed (it has no border): cut it open, or give the part that becomes one piece of cloth"
+            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
+            "becomes one piece of cloth; [[cuts]] cut what is flat already"
         )
     handles = (2 - len(loops) - euler_characteristic(faces)) // 2
     if handles:

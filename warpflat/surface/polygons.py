@@ -39,14 +39,20 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
         if not np.issubdtype(polygons.dtype, np.integer):
             raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
         return polygons.astype(np.int64)
-    rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+    try:
+        rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
+        corners = [np.asarray(row).ravel() for row in rows]
+        flat = np.concatenate([np.empty(0, dtype=np.int64), *(row.astype(np.int64) for row in corners)])
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError("faces must be lists of vertex indices, one list per face") from error
     if not rows:
         raise InputError("there are no faces")
-    try:
-        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
-        flat = np.concatenate([np.asarray(row, dtype=np.int64).ravel() for row in rows])
-    except (TypeError, ValueError) as error:
-        raise InputError("faces must be lists of vertex indices, one list per face") from error
+    wrong = next((n for n, row in enumerate(corners) if len(row) and not np.issubdtype(row.dtype, np.integer)), None)
+    if wrong is not None:
+        raise InputError(
+            f"face {wrong} (counted from 0) is {rows[wrong]!r}; its corners must be integers (vertex indices)"
+        )
     short = np.flatnonzero(count < 3)
     if len(short):
         raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, expect, nearest
 from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import make_surface
@@ -76,6 +76,7 @@ def read_surface(
     Raises:
         InputError: one line that names the file.
     """
+    expect(path, (str, PathLike), "path", "that of a mesh file")
     file = Path(path)
     try:
         if name:
