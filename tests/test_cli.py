@@ -179,6 +179,15 @@ def test_a_bad_mesh_is_refused_in_one_line(warpflat: Run, text: str, message: st
     assert not list(Path("out").glob("*/*"))
 
 
+def test_components_are_chosen_by_the_option(warpflat: Run):
+    Path("two.obj").write_text(SQUARE + FAR)
+    told = mistake(warpflat("flatten", "two.obj", "--units", "m"))
+    assert "choose it with --component largest or a number from 0 to 1" in told
+    for wrong in ("big", "-1"):
+        told = mistake(warpflat("flatten", "two.obj", "--units", "m", "--component", wrong))
+        assert 'component: should be "largest" or a number from 0' in told
+
+
 def test_two_border_loops_are_flattened_or_refused_in_one_line(warpflat: Run):
     Path("ring.obj").write_text(RING)
     result = warpflat("flatten", "ring.obj", "--units", "m")

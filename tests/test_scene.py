@@ -114,7 +114,20 @@ DOME = "[surface]\nshape = 'dome'\n"
         ("fabrik = 'woven'\n" + DOME, r"fabrik: unknown key 'fabrik'; did you mean 'fabric'\? valid: "),
         ("[surface]\nshpe = 'dome'\n", r"surface.shpe: unknown key 'shpe'; did you mean 'shape'"),
         ("[surface]\nflie = 'x.obj'\n", r"surface.flie: unknown key 'flie'; did you mean 'file'"),
-        ("[surface]\nshape = 'dome'\nfile = 'x.obj'\n", r"surface.shape: unknown key"),
+        (
+            "[surface]\nshape = 'dome'\nfile = 'x.obj'\n",
+            r"surface: give the surface by its file or by a shape, not both",
+        ),
+        (
+            "[surface]\nfile = 'x.obj'\ncomponent = 'big'\n",
+            r"surface.component: should be \"largest\" or a number from 0, .* got 'big'$",
+        ),
+        ("[surface]\nfile = 'x.obj'\ncomponent = -1\n", r"surface.component: should be \"largest\" or .* got -1$"),
+        (
+            DOME + "[lines.a]\nfrom = 1\nto = 2\nvia = 3\n",
+            r"lines.a.via: .* valid: border, curve, from, plane, to, vertices",
+        ),
+        (DOME + "[lines.a]\nfrom_ = 1\nto = 2\n", r"lines.a.from_: unknown key 'from_'; did you mean 'from'\?"),
         ("[surface]\nfile = 3\n", r"surface.file: should be a valid string, got 3"),
         ("surface = 'dome'\n", r"surface: "),
         (DOME + "[relax]\nmax_step = 3\n", r"relax.max_step: unknown key 'max_step'; did you mean 'max_steps'"),

@@ -248,7 +248,7 @@ def flatten(
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
-    if options["component"] is not None and options["component"].isdecimal():
+    if options["component"] is not None and re.fullmatch(r"-?[0-9]+", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "grain_angle", "model"):
         if options[key] is not None:
@@ -264,7 +264,10 @@ def flatten(
         # A USD curve becomes a line of its name.
         tables["datum"] = datum.rstrip("/").rpartition("/")[2]
     scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
-    return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+    try:
+        return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+    except InputError as error:
+        raise InputError(str(error).replace('component = "largest"', "--component largest")) from None
 
 
 @cli.command()
