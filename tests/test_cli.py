@@ -154,6 +154,41 @@ def test_terminating_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypa
     assert list(Path("out/cap").iterdir()) == []
 
 
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX has terminals that hang up")
+def test_a_terminal_that_is_closed_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        assert warpflat("run", "cap.toml") == (129, "", "")
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert list(Path("out/cap").iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
+@pytest.mark.parametrize("command", [["fabrics"], ["fabrics", "--json"], ["--help"]])
+def test_output_that_cannot_be_written_is_one_line(command: list[str]):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "warpflat", *command], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert (done.returncode, done.stderr) == (
+        2,
+        "warpflat: cannot write to standard output: no space left on device\n",
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes standard error")
+@pytest.mark.parametrize("closed", ["2>&-", "2</dev/null"], ids=["closed", "read only"])
+def test_a_good_run_is_one_with_standard_error_closed_too(tmp_path: Path, closed: str):
+    (tmp_path / "cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
+    command = f"{sys.executable} -m warpflat run {tmp_path / 'cap.toml'} --out {tmp_path / 'out'}"
+    assert subprocess.run(["/bin/sh", "-c", f"{command} > {tmp_path / 'told'} {closed}"], check=False).returncode == 0
+    assert "converged" in (tmp_path / "told").read_text()
+
+
 # --- bad input
 
 
