@@ -223,6 +223,43 @@ def test_components_are_chosen_by_the_option(warpflat: Run):
         assert 'component: should be "largest" or a number from 0' in told
 
 
+def test_parts_that_meet_without_common_vertices_are_told_so(warpflat: Run):
+    """Two quads, the second half as high as the first and beside it: a T-junction."""
+    Path("tee.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 .5 0\nv 1 .5 0\nf 1 2 3 4\nf 5 6 7 8\n"
+    )
+    told = mistake(warpflat("flatten", "tee.obj", "--units", "m"))
+    assert (
+        "though they meet: vertices of one lie on edges of another (a T-junction: vertex 7 on the edge between 1 and 2"
+        in told
+    )
+    Path("apart.obj").write_text(SQUARE + FAR)
+    assert "though they meet" not in mistake(warpflat("flatten", "apart.obj", "--units", "m"))
+
+
+def test_a_mesh_that_its_reader_trips_over_is_told_in_words(warpflat: Run):
+    Path("short.ply").write_bytes(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        b"property list uchar float tags\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        + b"\0"
+        * 9
+    )
+    told = mistake(warpflat("flatten", "short.ply", "--units", "m"))
+    assert re.search(
+        r"short.ply: not a readable PLY file: damaged, cut short, .*; save it again with vertices and", told
+    )
+
+
+def test_a_pattern_is_exported_from_its_folder_or_its_file(warpflat: Run):
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
+    assert warpflat("run", "cap.toml", "--out", "out")[0] == 0
+    Path("out/cap.svg").unlink()
+    assert warpflat("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
+    assert Path("out/cap.svg").exists()
+    told = mistake(warpflat("export", "out/cap.obj", "--format", "svg"))
+    assert told == "out/cap.obj: is a file; give the folder of a run, where its pattern.json lies"
+
+
 def test_two_border_loops_are_flattened_or_refused_in_one_line(warpflat: Run):
     Path("ring.obj").write_text(RING)
     result = warpflat("flatten", "ring.obj", "--units", "m")

@@ -523,6 +523,8 @@ def export(
     """
     from warpflat.pattern_files import export_pattern
 
+    if folder.name == "pattern.json" and folder.is_file():
+        folder = folder.parent
     files = [export_pattern(folder, kind, dialect=dialect, paper=paper, sizes=sizes or None) for kind in formats]
     if not quiet:
         click.echo(f"{folder}: {', '.join(files)}")

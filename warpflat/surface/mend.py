@@ -35,7 +35,7 @@ from warpflat.surface.topology import (
     mesh_edges,
     orient,
 )
-from warpflat.surface.weld import welding
+from warpflat.surface.weld import t_junction, welding
 from warpflat.words import counted
 
 __all__ = ["checked_positions", "make_surface"]
@@ -237,6 +237,13 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
     if component is None:
         if len(sizes) > 1:
+            if (meeting := t_junction(mesh.vertices, mesh.faces, label)) is not None:
+                vertex, a, b = meeting
+                raise InputError(
+                    f"{len(sizes):,} components that share no edge, though they meet: vertices of one lie on edges of another (a "
+                    f"T-junction: vertex {vertex} on the edge between {a} and {b}, counted from 0); give both the same vertices there, or "
+                    f"choose one with {valid}"
+                )
             raise InputError(
                 f"{len(sizes):,} components that share no edge, of {_sizes(sizes[rank])} faces; a piece is one: choose "
                 f"it with {valid}, or give each in a file of its own"

@@ -178,8 +178,10 @@ def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
         scene = trimesh.load_scene(str(file), process=False, **options)
     # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
     except Exception as error:
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise InputError(f"not a readable {suffix[1:].upper()} file ({reason[:120]})") from error
+        raise InputError(
+            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
+            "vertices and faces alone"
+        ) from error
     meshes = list(_instances(scene))
     if prim is not None:
         names = [node for node, _, _ in meshes]
