@@ -154,6 +154,41 @@ def test_terminating_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypa
     assert not Path("out").exists()
 
 
+@pytest.mark.skipif(os.name != "posix", reason="only POSIX has terminals that hang up")
+def test_a_terminal_that_is_closed_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
+    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
+    try:
+        assert warpflat("run", "cap.toml") == (129, "", "")
+        assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
+    finally:
+        signal.signal(signal.SIGHUP, before)
+    assert list(Path("out/cap").iterdir()) == []
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="there is no device that is full")
+@pytest.mark.parametrize("command", [["fabrics"], ["fabrics", "--json"], ["--help"]])
+def test_output_that_cannot_be_written_is_one_line(command: list[str]):
+    with open("/dev/full", "w") as full:
+        done = subprocess.run(
+            [sys.executable, "-m", "warpflat", *command], stdout=full, stderr=subprocess.PIPE, text=True, check=False
+        )
+    assert (done.returncode, done.stderr) == (
+        2,
+        "warpflat: cannot write to standard output: no space left on device\n",
+    )
+
+
+@pytest.mark.skipif(os.name != "posix", reason="a shell closes standard error")
+@pytest.mark.parametrize("closed", ["2>&-", "2</dev/null"], ids=["closed", "read only"])
+def test_a_good_run_is_one_with_standard_error_closed_too(tmp_path: Path, closed: str):
+    (tmp_path / "cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
+    command = f"{sys.executable} -m warpflat run {tmp_path / 'cap.toml'} --out {tmp_path / 'out'}"
+    assert subprocess.run(["/bin/sh", "-c", f"{command} > {tmp_path / 'told'} {closed}"], check=False).returncode == 0
+    assert "converged" in (tmp_path / "told").read_text()
+
+
 # --- bad input
 
 
@@ -177,6 +212,52 @@ def test_a_bad_mesh_is_refused_in_one_line(warpflat: Run, text: str, message: st
     assert told.startswith("bad.obj: ")
     assert re.search(message, told), told
     assert not list(Path("out").glob("*/*"))
+
+
+def test_components_are_chosen_by_the_option(warpflat: Run):
+    Path("two.obj").write_text(SQUARE + FAR)
+    told = mistake(warpflat("flatten", "two.obj", "--units", "m"))
+    assert "choose it with --component largest or a number from 0 to 1" in told
+    for wrong in ("big", "-1"):
+        told = mistake(warpflat("flatten", "two.obj", "--units", "m", "--component", wrong))
+        assert 'component: should be "largest" or a number from 0' in told
+
+
+def test_parts_that_meet_without_common_vertices_are_told_so(warpflat: Run):
+    """Two quads, the second half as high as the first and beside it: a T-junction."""
+    Path("tee.obj").write_text(
+        "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 1 0 0\nv 2 0 0\nv 2 .5 0\nv 1 .5 0\nf 1 2 3 4\nf 5 6 7 8\n"
+    )
+    told = mistake(warpflat("flatten", "tee.obj", "--units", "m"))
+    assert (
+        "though they meet: vertices of one lie on edges of another (a T-junction: vertex 7 on the edge between 1 and 2"
+        in told
+    )
+    Path("apart.obj").write_text(SQUARE + FAR)
+    assert "though they meet" not in mistake(warpflat("flatten", "apart.obj", "--units", "m"))
+
+
+def test_a_mesh_that_its_reader_trips_over_is_told_in_words(warpflat: Run):
+    Path("short.ply").write_bytes(
+        b"ply\nformat binary_little_endian 1.0\nelement vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+        b"property list uchar float tags\nelement face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        + b"\0"
+        * 9
+    )
+    told = mistake(warpflat("flatten", "short.ply", "--units", "m"))
+    assert re.search(
+        r"short.ply: not a readable PLY file: damaged, cut short, .*; save it again with vertices and", told
+    )
+
+
+def test_a_pattern_is_exported_from_its_folder_or_its_file(warpflat: Run):
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 5\n" + BARE)
+    assert warpflat("run", "cap.toml", "--out", "out")[0] == 0
+    Path("out/cap.svg").unlink()
+    assert warpflat("export", "out/pattern.json", "--format", "svg")[:2] == (0, "out: cap.svg\n")
+    assert Path("out/cap.svg").exists()
+    told = mistake(warpflat("export", "out/cap.obj", "--format", "svg"))
+    assert told == "out/cap.obj: is a file; give the folder of a run, where its pattern.json lies"
 
 
 def test_two_border_loops_are_flattened_or_refused_in_one_line(warpflat: Run):

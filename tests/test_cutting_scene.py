@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 
 from warpflat.cli import main
+from warpflat.cutting import CutPlan, cut_surfaces
 from warpflat.errors import InputError
+from warpflat.flattening import flatten
 from warpflat.pattern.read_json import read_pattern_json
 from warpflat.scene import make_scene, run_scene
+from warpflat.surface import line_between, read_surface
 
 pxr = pytest.importorskip("pxr")
 
@@ -117,10 +120,46 @@ def test_the_pattern_draws_darts_as_they_are_measured_with_their_tips_moved_back
     assert np.linalg.norm(drawn[0] - mouth) == pytest.approx(np.linalg.norm(points[1] - points[0]), abs=3e-3)
 
 
-def test_a_tip_moved_back_too_far_is_a_note(tmp_path: Path):
-    cuts = [{"name": "d", "line": "bust", "part": [0.0, 0.27], "tip_back": 0.2}]
+@pytest.mark.parametrize(
+    ("part", "tip_back", "room"),
+    [([0.0, 0.27], 0.2, "cut's length, "), ([0.2, 0.6], 0.12, "cut's half, ")],
+    ids=["dart", "fish-eye"],
+)
+def test_a_tip_moved_back_by_more_than_the_cut_is_refused_at_once(
+    part: list[float], tip_back: float, room: str, tmp_path: Path
+):
+    cuts = [{"name": "d", "line": "bust", "part": part, "tip_back": tip_back}]
+    with pytest.raises(InputError, match=rf"cuts\[0\]: tip_back is {1e3 * tip_back:.1f} mm; .* less than the {room}"):
+        run_scene(scene(cuts=cuts, **QUIET), tmp_path, on_progress=lambda at: pytest.fail("it was relaxed"))
+
+
+def test_a_tip_moved_back_too_far_for_the_dart_as_it_lies_is_a_note(tmp_path: Path):
+    cuts = [{"name": "d", "line": "bust", "part": [0.0, 0.27], "tip_back": 0.142}]
     result = run_scene(scene(cuts=cuts, **QUIET), tmp_path)
-    assert any("dart 'd': tip_back is 200.0 mm; it must be 0 or more and less than" in note for note in result.notes)
+    assert any("dart 'd': tip_back is 142.0 mm; it must be 0 or more and less than" in note for note in result.notes)
+
+
+def test_a_tube_that_cuts_are_to_open_is_told_what_opens_it(tmp_path: Path):
+    """Cuts are made on the flat piece, which a tube cannot be; cut open on the body it can."""
+    rim = [(0.05 * np.cos(a), 0.05 * np.sin(a)) for a in np.linspace(0.0, 2 * np.pi, 24, endpoint=False)]
+    lines = [f"v {x} {0.1 * row} {z}" for row in range(3) for x, z in rim]
+    lines += [
+        "f " + " ".join(str(24 * (row + up) + (k + on) % 24 + 1) for up, on in ((0, 0), (0, 1), (1, 1), (1, 0)))
+        for row in range(2)
+        for k in range(24)
+    ]
+    (tmp_path / "tube.obj").write_text("\n".join(lines))
+    surface = {"file": str(tmp_path / "tube.obj"), "units": "m"}
+    data = {"surface": surface, "cuts": [{"name": "x", "from": 0, "to": 48}], **QUIET}
+    made = make_scene(data, name="tube", folder=tmp_path, where="tube.toml")
+    told = r"closed tube .*: cut it open along a line first, in the mesh .*cut_surfaces; \[\[cuts\]\] cut what is flat"
+    with pytest.raises(InputError, match=told):
+        run_scene(made, tmp_path / "out")
+    tube = read_surface(tmp_path / "tube.obj", units="m")
+    (open_tube,) = cut_surfaces(tube, [CutPlan(name="x", paths=(line_between(tube, 0, 48),))])
+    flat = flatten(open_tube, device="cpu")
+    assert flat.converged
+    assert flat.measures["length_error"] < 1e-3
 
 
 def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):

@@ -16,7 +16,7 @@ from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
 from warpflat.membrane import Model
 from warpflat.shapes import make_shape
-from warpflat.surface import Surface
+from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import half_edges_of
 from warpflat.tightness import Wear
 
@@ -175,6 +175,39 @@ def test_collapsed_faces_are_refused_by_name(dome: Flattening, collapse: Any, me
     vertices = collapse(dome.surface.vertices, dome.surface.faces)
     with pytest.raises(InputError, match=message):
         change_surface(dome, replace(dome.surface, vertices=vertices) if as_surface else vertices)
+
+
+@pytest.mark.parametrize("as_surface", [False, True], ids=["vertices", "surface"])
+def test_quads_whose_sides_cross_are_refused_as_in_flattening(dome: Flattening, as_surface: bool):
+    vertices = np.random.default_rng(0).random(dome.surface.vertices.shape)
+    with pytest.raises(InputError, match="a quad whose sides cross"):
+        make_surface(vertices, dome.surface.faces)
+    with pytest.raises(InputError, match=r"piece 'dome': face 4 \(.*\) has become a quad whose sides cross"):
+        change_surface(dome, replace(dome.surface, vertices=vertices) if as_surface else vertices)
+
+
+def test_the_note_on_a_chosen_datum_is_of_the_surface_as_it_is_now():
+    first = flatten(make_shape("dome", resolution=9), device="cpu")
+    after = change_surface(first, 1.5 * first.surface.vertices)
+    assert [note for note in first.notes if "53.0 cm" in note]
+    assert [note for note in after.notes if note.startswith("datum chosen")] == [
+        first.notes[0].replace("53.0 cm", "79.4 cm")
+    ]
+
+
+@pytest.mark.parametrize("as_surface", [False, True], ids=["vertices", "surface"])
+def test_what_a_file_has_several_times_at_one_place_moves_together(as_surface: bool):
+    """As an STL has it, a vertex per corner of a face: the OBJ that is written lists them all."""
+    shape = make_shape("dome", resolution=9, triangles=True)
+    corners = shape.faces[:, :3]
+    read = make_surface(
+        shape.vertices[corners].reshape(-1, 3), np.arange(corners.size).reshape(-1, 3), split_corners=True
+    )
+    assert len(read.input_vertices) > len(read.vertices)
+    vertices = read.vertices * [1.0, 1.2, 1.0]
+    given = replace(read, vertices=vertices) if as_surface else vertices
+    after = change_surface(flatten(read, device="cpu"), given)
+    np.testing.assert_allclose(after.surface.input_vertices, read.input_vertices * [1.0, 1.2, 1.0], atol=1e-12)
 
 
 @pytest.mark.parametrize("fabric", [3, None, ["denim"]])

@@ -326,3 +326,13 @@ def test_every_measured_value_is_listed():
     assert set(value_names()) == {
         *MEASURED, "poisson_ratio", "strain_limit", "compression_factor", "curve_warp", "curve_weft"
     }  # fmt: skip
+
+
+def test_what_is_no_name_and_no_list_of_files_is_told():
+    with pytest.raises(InputError, match="name is of type int; it must be that of a fabric"):
+        find_fabric(3)  # type: ignore[arg-type]
+    for wrong in (3, "cloth.toml"):
+        with pytest.raises(InputError, match=r"extra_files is of type .*; it must be a list of the paths of files"):
+            load_library(wrong)  # type: ignore[arg-type]
+    with pytest.raises(InputError, match="a path in extra_files is of type int"):
+        load_library([3])  # type: ignore[list-item]

@@ -24,8 +24,9 @@ from warpflat.errors import InputError
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, Progress, flatten
 from warpflat.relax import RelaxOptions, Solver
+from warpflat.scene import make_scene, run_scene
 from warpflat.shapes import make_shape
-from warpflat.surface import Surface, border_edges, make_surface, mesh_edges
+from warpflat.surface import Surface, border_edges, make_surface, mesh_edges, read_surface
 
 FloatArray = NDArray[np.float64]
 
@@ -523,3 +524,22 @@ def test_what_is_no_surface_and_no_pattern_is_one_line():
     for call, arguments, message in wrong:
         with pytest.raises(InputError, match=message):
             call(*arguments)
+
+
+def test_paths_of_a_wrong_type_are_told():
+    with pytest.raises(InputError, match="path is of type int; it must be that of a mesh file"):
+        read_surface(3)  # type: ignore[arg-type]
+    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device="cpu")
+    with pytest.raises(InputError, match="folder is of type NoneType; it must be the path of one"):
+        pattern.save(None)  # type: ignore[arg-type]
+
+
+def test_a_folder_where_a_file_is_to_be_is_told_before_anything_is_written(tmp_path: Path):
+    (tmp_path / "metrics.json").mkdir()
+    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device="cpu")
+    with pytest.raises(InputError, match=r"metrics.json is a folder, where a file is to be written; remove it"):
+        pattern.save(tmp_path)
+    scene = make_scene({"surface": {"shape": "dome"}}, name="dome", folder=tmp_path, where="dome.toml")
+    with pytest.raises(InputError, match=r"metrics.json is a folder"):
+        run_scene(scene, tmp_path, on_progress=lambda at: pytest.fail("it was flattened"))
+    assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]

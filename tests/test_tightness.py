@@ -85,6 +85,21 @@ def test_threads_that_run_around_are_found_and_a_pressure_out_of_reach_is_told()
     assert result.fit.strain_warp.max() == pytest.approx(NET.strain_limit, rel=1e-3)
 
 
+def test_a_stretch_that_the_pressure_overrides_is_refused():
+    with pytest.raises(InputError, match=r"give stretch_warp or stretch_weft, that of the other threads, not both"):
+        Wear(pressure=1000.0, stretch_warp=0.1, stretch_weft=0.1)
+    wear, told = Wear(pressure=1000.0, stretch_weft=0.1), r"stretch_weft = 0.1 has no effect: weft runs around the body"
+    with pytest.raises(InputError, match=rf"piece 'cylinder': wear: {told}.*; leave it out, or the pressure"):
+        warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device="cpu")
+    # Of several pieces each has its own threads around the body.
+    (piece,) = warpflat.flatten_all([sleeve()], fabric=NET, datum="centre", wear=wear, device="cpu")
+    assert any(note.startswith("stretch_weft = 0.1 has no effect") for note in piece.notes)
+    used = warpflat.flatten(
+        sleeve(), fabric=NET, datum="centre", wear=Wear(pressure=1000.0, stretch_warp=0.1), device="cpu"
+    )
+    assert not any("no effect" in note for note in used.notes)
+
+
 def test_a_given_pattern_is_judged():
     surface = sleeve(resolution=17)
     flat = warpflat.flatten(surface, fabric="denim", datum="centre", device="cpu").positions

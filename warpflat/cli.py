@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import math
 import os
@@ -11,9 +12,9 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, TextIO
 
 import click
 
@@ -27,13 +28,14 @@ if TYPE_CHECKING:
 
 __all__ = ["cli", "main"]
 
-DONE, NOT_CONVERGED, BAD_INPUT, INTERRUPTED, TERMINATED = 0, 1, 2, 130, 143
+DONE, NOT_CONVERGED, BAD_INPUT, HUNG_UP, INTERRUPTED, TERMINATED = 0, 1, 2, 129, 130, 143
 
 _EXIT_CODES = """\b
 Exit codes:
   0    done
   1    done, but a piece did not converge or has flipped faces, in whatever size
   2    bad input; one line says what is wrong, where, and what would be right
+  129  the terminal was closed
   130  interrupted
   143  terminated"""
 
@@ -60,7 +62,7 @@ class _Interrupted(Exception):
 
 
 class _Terminated(BaseException):
-    pass
+    """With the signal's number."""
 
 
 class _Group(click.Group):
@@ -74,8 +76,9 @@ class _Group(click.Group):
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
+    _open_stderr()
     try:
-        with _stopped_by_sigterm():
+        with _stopped_by_signals():
             code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
@@ -87,32 +90,67 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except (KeyboardInterrupt, click.Abort, _Interrupted):
         click.echo("warpflat: interrupted", err=True)
         return INTERRUPTED
-    except _Terminated:
+    except _Terminated as ended:
+        if ended.args[0] != signal.SIGTERM:
+            return HUNG_UP  # nobody is there to be told
         click.echo("warpflat: terminated", err=True)
         return TERMINATED
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
+    except OSError as error:
+        if error.filename is not None:
+            raise  # of a file, which whoever opens it answers for
+        _drop_output()
+        return _fail(f"cannot write to standard output: {(error.strerror or str(error)).lower()}")
+
+
+def _open_stderr() -> None:
+    """Where standard error is closed, open it on nothing: what is told there is lost, no file that is opened takes its number."""
+    if not _is_open(sys.stderr):
+        sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
+        if sys.stderr.fileno() != 2:
+            os.dup2(sys.stderr.fileno(), 2)
+
+
+def _is_open(stream: TextIO | None) -> bool:
+    """Whether it can be written to, if it is a file: what a shell has closed may be another file by now, to be read only."""
+    try:
+        os.write(-1 if stream is None else stream.fileno(), b"")
+    except (AttributeError, io.UnsupportedOperation):
+        return True
+    except OSError:
+        return False
+    return True
+
+
+def _drop_output() -> None:
+    """What could not be written is tried again at the end of the process, which would fail once more."""
+    with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nothing:
+        os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
 @contextmanager
-def _stopped_by_sigterm() -> Iterator[None]:
-    """Let SIGTERM end what is going on by an exception, as SIGINT does, so that no temporary file stays; a second one ends it at once."""
+def _stopped_by_signals() -> Iterator[None]:
+    """Let SIGTERM, and SIGHUP as a terminal that closes, end what is going on by an exception, as SIGINT does, so that no temporary file
+    stays; a second one ends it at once."""
 
-    def stop(*_: object) -> None:
-        signal.signal(signal.SIGTERM, signal.SIG_DFL)
-        raise _Terminated
+    def stop(number: int, _: object) -> None:
+        signal.signal(number, signal.SIG_DFL)
+        raise _Terminated(number)
 
-    # Elsewhere it is ignored, or the business of whoever has called; only a process's main thread may ask for it.
-    ours = threading.current_thread() is threading.main_thread() and signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
-    if ours:
-        signal.signal(signal.SIGTERM, stop)
+    # Elsewhere it is ignored, as by nohup, or the business of whoever has called; only a process's main thread may ask for it.
+    main_thread = threading.current_thread() is threading.main_thread()
+    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    ours = [number for number in known if main_thread and signal.getsignal(number) is signal.SIG_DFL]
+    for number in ours:
+        signal.signal(number, stop)
     try:
         yield
     finally:
-        if ours:
-            signal.signal(signal.SIGTERM, signal.SIG_DFL)
+        for number in ours:
+            signal.signal(number, signal.SIG_DFL)
 
 
 def _fail(message: str) -> int:
@@ -249,7 +287,7 @@ def flatten(
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
-    if options["component"] is not None and options["component"].isdecimal():
+    if options["component"] is not None and re.fullmatch(r"-?[0-9]+", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "grain_angle", "model"):
         if options[key] is not None:
@@ -265,7 +303,10 @@ def flatten(
         # A USD curve becomes a line of its name.
         tables["datum"] = datum.rstrip("/").rpartition("/")[2]
     scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
-    return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+    try:
+        return _run(scene, out, quiet=quiet, as_json=as_json, device=device)
+    except InputError as error:
+        raise InputError(str(error).replace('component = "largest"', "--component largest")) from None
 
 
 @cli.command()
@@ -521,6 +562,8 @@ def export(
     """
     from warpflat.pattern_files import export_pattern
 
+    if folder.name == "pattern.json" and folder.is_file():
+        folder = folder.parent
     files = [export_pattern(folder, kind, dialect=dialect, paper=paper, sizes=sizes or None) for kind in formats]
     if not quiet:
         click.echo(f"{folder}: {', '.join(files)}")

@@ -512,7 +512,8 @@ def _refuse_tubes(surface: Surface) -> None:
             size = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1).sum()
             raise InputError(
                 f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
-                f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first"
+                f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first, in the mesh (its vertices "
+                "doubled there) or by warpflat.cutting.cut_surfaces; [[cuts]] cut what is flat already"
             )
 
 

@@ -16,14 +16,16 @@ from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
 from warpflat.errors import InputError, expect, expect_callback
 from warpflat.fabric import Fabric, as_fabric
-from warpflat.flattening import Flattening
+from warpflat.flattening import Flattening, chosen_datum_note
 from warpflat.progress import Progress
 from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Run, relax_runs
 from warpflat.surface import Surface, degenerate_faces
 from warpflat.surface.mend import checked_positions
 from warpflat.surface.paths import path_length
+from warpflat.surface.polygons import crossed_quads
 from warpflat.surface.topology import components_of
+from warpflat.surface.weld import weld_map
 
 __all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
 
@@ -77,8 +79,8 @@ def change_surface(
         The piece on that surface, with the same cuts. Its development stays that of the surface before.
 
     Raises:
-        InputError: the mesh is another one, a vertex is not finite, a face has collapsed, an option out of its bounds, or the piece has
-            been sewn.
+        InputError: the mesh is another one, a vertex is not finite, a face has collapsed or its sides cross, an option out of its bounds,
+            or the piece has been sewn.
     """
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     before, options = result.surface, given_options(relax)
@@ -101,7 +103,10 @@ def change_surface(
     run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     gone_on = _gone_on(result, run, result.positions)
-    return replace(gone_on, surface=surface, cuts=cuts)
+    # How long the datum is, if it was chosen, is told of the surface as it is now.
+    chosen, now = (chosen_datum_note(of, result.datum) for of in (before, surface))
+    notes = tuple(now if note == chosen else note for note in gone_on.notes)
+    return replace(gone_on, surface=surface, cuts=cuts, notes=notes)
 
 
 def expect_unsewn(result: Flattening) -> None:
@@ -122,16 +127,30 @@ def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
                 f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
                 f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
             )
+        vertices = checked_positions(surface.vertices)
+        # Of a surface made by `replace(surface, vertices=...)` what was read has not moved with it.
+        if not np.array_equal(given.input_vertices[given.input_index], vertices):
+            surface = replace(given, input_vertices=_as_read(before, vertices), input_index=before.input_index)
     else:
         surface = _with_vertices(before, given)
-    collapsed = degenerate_faces(checked_positions(surface.vertices), surface.faces, _COLLAPSED)
-    if len(collapsed):
-        corners = ", ".join(str(v) for v in surface.faces[collapsed[0]].tolist() if v >= 0)
-        more = f" (and {len(collapsed) - 1:,} more like it)" if len(collapsed) > 1 else ""
-        raise InputError(
-            f"piece {surface.name!r}: face {collapsed[0]} (vertices {corners}) has collapsed to a line or a point{more}; faces need an area"
-        )
+        vertices = surface.vertices
+    collapsed = degenerate_faces(vertices, surface.faces, _COLLAPSED)
+    _refuse_faces(surface, collapsed, "has collapsed to a line or a point", "faces need an area")
+    crossed = crossed_quads(vertices, surface.faces)
+    _refuse_faces(
+        surface,
+        crossed,
+        "has become a quad whose sides cross, or is folded by more than 90 degrees",
+        "move its vertices along with those around them",
+    )
     return surface
+
+
+def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right: str) -> None:
+    if len(wrong):
+        corners = ", ".join(str(v) for v in surface.faces[wrong[0]].tolist() if v >= 0)
+        more = f" (and {len(wrong) - 1:,} more like it)" if len(wrong) > 1 else ""
+        raise InputError(f"piece {surface.name!r}: face {wrong[0]} (vertices {corners}) {what}{more}; {right}")
 
 
 def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
@@ -146,9 +165,21 @@ def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
             f"piece {before.name!r} has {len(before.vertices):,} vertices, not {len(vertices):,}: give them all, in the order of its "
             "surface.vertices, or flatten another mesh afresh"
         )
+    return replace(before, vertices=vertices, input_vertices=_as_read(before, vertices))
+
+
+def _as_read(before: Surface, vertices: FloatArray) -> FloatArray:
+    """#I by 3, the vertices as they were read, moved: what was read several times at one place, as in an STL, stays at one."""
     as_read = before.input_vertices.copy()
+    if len(as_read) > len(vertices):
+        place = weld_map(before.input_vertices)
+        at_place = np.full(len(place), -1, dtype=np.int32)
+        at_place[place[before.input_index]] = np.arange(len(vertices), dtype=np.int32)
+        goes = at_place[place] >= 0
+        as_read[goes] = vertices[at_place[place[goes]]]
+    # Where several vertices lay at one place, each has its own now.
     as_read[before.input_index] = vertices
-    return replace(before, vertices=vertices, input_vertices=as_read)
+    return as_read
 
 
 def relax_cut(

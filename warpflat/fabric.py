@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
+from os import PathLike
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.errors import InputError, is_number, nearest
+from warpflat.errors import InputError, expect, is_number, nearest
 
 __all__ = [
     "DEFAULT_FABRIC",
@@ -207,8 +208,13 @@ def load_library(extra_files: Iterable[str | Path] = ()) -> dict[str, Fabric]:
     """
     from warpflat.fabric_file import read_fabrics, read_shipped_fabrics
 
+    if isinstance(extra_files, (str, PathLike)) or not isinstance(extra_files, Iterable):
+        raise InputError(
+            f"extra_files is of type {type(extra_files).__name__}; it must be a list of the paths of files"
+        )
     library = read_shipped_fabrics()
     for path in extra_files:
+        expect(path, (str, PathLike), "a path in extra_files", "a str or Path")
         library.update(read_fabrics(Path(path), library))
     return library
 
@@ -219,6 +225,7 @@ def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabri
     Raises:
         InputError: there is none; names the nearest.
     """
+    expect(name, str, "name", f"that of a fabric, such as {DEFAULT_FABRIC!r}")
     if library is None:
         library = load_library()
     wanted = _plain(name)

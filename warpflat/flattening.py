@@ -29,7 +29,7 @@ from warpflat.running import Relaxed, Run, relax_runs
 from warpflat.strain import LayoutErrors, WornStrain, layout_errors, strain_energy, worn_strain
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, line_from_indices, read_surface
-from warpflat.tightness import Wear, WornFit, assess_fit
+from warpflat.tightness import Wear, WornFit, assess_fit, unused_stretch
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
@@ -239,7 +239,18 @@ def flatten(
     surface = given_surface(surface, units)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
-    return finish([start(surface, datum, settings, callback)])[0]
+    started = start(surface, datum, settings, callback)
+    _refuse_unused_stretch(started)
+    return finish([started])[0]
+
+
+def _refuse_unused_stretch(piece: Started) -> None:
+    """Which threads run around the body is known once a piece is developed; of several pieces each has its own, and a note says so."""
+    wear, notes = piece.run.wear, piece.run.notes
+    unused = [] if wear is None else [unused_stretch(wear, around) for around in ("warp", "weft")]
+    for told in unused:
+        if told in notes:
+            raise InputError(f"piece {piece.run.surface.name!r}: wear: {told}; leave it out, or the pressure")
 
 
 def given_surface(surface: Surface | str | Path, units: str | None) -> Surface:
@@ -398,9 +409,7 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
     """The datum as vertex indices, its name, and a note where it was chosen."""
     if datum is None:
         line = choose_datum(surface)
-        length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
-        ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
-        return line, "datum", [f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"]
+        return line, "datum", [chosen_datum_note(surface, line)]
     if isinstance(datum, str):
         if datum not in surface.lines:
             raise InputError(
@@ -417,6 +426,13 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
     # A pattern lies as the piece hangs on the body (+y is up), whichever way its line happens to run.
     downward = chord[1] < -0.1 * float(np.linalg.norm(chord))
     return np.ascontiguousarray(line[::-1] if downward else line), name, []
+
+
+def chosen_datum_note(surface: Surface, line: IntArray) -> str:
+    """What is said of a datum that nobody gave: vertex indices of the line on the surface."""
+    length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
+    ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
+    return f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"
 
 
 def _device(name: str | None) -> wp.Device:

@@ -493,14 +493,11 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
             look = state.last
         chunk = min(options.check_every, options.max_steps - state.steps)
         state.sweep(chunk, stepped)
-        look = state.look(chunk)
         state.hold_upright()
+        look = state.look(chunk)
         if state.matrix is not None and state.steps % _FOLLOW_EVERY < chunk:
             state.matrix.follow(state.position)
         if watch is not None:
             watch(state, look.total, float(look.residual.max()))
-    if state.steps > first and state.upright:
-        # Turned upright after the last look.
-        state.last = replace(state.last, energies=state.piece_energies())
     state.give(whole)
     return whole.outcome(first, work, begun=begun)

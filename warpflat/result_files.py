@@ -55,7 +55,9 @@ def write_results(
     from warpflat.export import prepare_folder, write_picture
     from warpflat.leftovers import write_metrics
 
-    to = prepare_folder(folder)
+    to = prepare_folder(
+        folder, ["metrics.json", *(["frames.usdc"] if frames else []), *(["picture.png"] if picture else [])]
+    )
     files = []
     for result in results:
         files.append(result.write_obj(to))

@@ -130,6 +130,10 @@ class SceneTable(Table):
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
         if self.mannequin is not None and (self.cuts or self.auto_cut):
             raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.surface is not None and self.half:
+            raise ValueError(
+                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] kinds = { left = \"fold\" }"
+            )
         for number, seam in enumerate(self.seams):
             if self.mannequin is None and seam.sides is None:
                 raise ValueError(
@@ -226,7 +230,7 @@ def run_scene(
     """
     from warpflat.export import output_folder
 
-    with output_folder(out) as folder:
+    with output_folder(out, _files_for_all(scene.settings)) as folder:
         if scene.settings.mannequin is not None:
             from warpflat.scene_garment import run_garment
 
@@ -278,6 +282,14 @@ def _run_surface(
         sources=scene_sources(scene),
         notes=(*result.notes, *story.notes),
     )
+
+
+def _files_for_all(settings: SceneTable) -> list[str]:
+    """The files of a run that do not bear a piece's name."""
+    output, formats = settings.output, settings.pattern.formats
+    pattern = [f"pattern.{ending}" for ending in ("pdf", "json") if ending in formats]
+    frames = ["frames.usdc"] if FrameSchedule(output).wanted else []
+    return ["metrics.json", *frames, *(["picture.png"] if output.picture else []), *pattern]
 
 
 def flatten_scene(

@@ -133,10 +133,23 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
         with told_by(f"cuts[{number}]"):
             part = (0.0, 1.0) if table.part is None else (table.part[0], table.part[1])
             row = line_part(surface, table.line or drawn[number], part)
+            _check_tip_back(surface, row, table.tip_back)
         paths.setdefault(name, []).append(row)
         tip_back[name] = max(tip_back.get(name, 0.0), table.tip_back)
     plans = tuple(CutPlan(name=name, paths=tuple(rows), tip_back=tip_back[name]) for name, rows in paths.items())
     return CutStory(surface=surface, plans=plans, first_auto=len(plans))
+
+
+def _check_tip_back(surface: Surface, path: NDArray[np.int32], tip_back: float) -> None:
+    """See that something is left of the dart, or of the fish-eye with two tips inside, that the path opens into."""
+    from warpflat.surface.drawn_legs import check_tip_back
+    from warpflat.surface.paths import path_length
+    from warpflat.surface.topology import border_loops
+
+    border = {vertex for loop in border_loops(surface.faces) for vertex in loop.tolist()}
+    inside = sum(vertex not in border for vertex in path[[0, -1]].tolist())
+    if inside and tip_back > 0.0:
+        check_tip_back(tip_back, path_length(surface, [path]) / inside, "cut's length" if inside == 1 else "cut's half")
 
 
 def _path(surface: Surface, table: CutTable) -> SurfacePath:

@@ -5,8 +5,9 @@ from __future__ import annotations
 import dataclasses
 from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
-from pydantic import ConfigDict, Discriminator, Field, Tag, create_model, model_validator
+from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, create_model, model_validator
 
+from warpflat.errors import is_number
 from warpflat.relax import RelaxOptions
 from warpflat.toml_file import Table
 
@@ -44,10 +45,13 @@ class PlaneTable(Table):
     normal: Point
 
 
-Component = Annotated[
-    Annotated[Literal["largest"], Tag("word")] | Annotated[int, Field(ge=0), Tag("number")],
-    Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
-]
+def _as_component(value: Any) -> Any:
+    if value != "largest" and not (is_number(value, whole=True) and value >= 0):
+        raise ValueError(f'should be "largest" or a number from 0, largest first; got {value!r}')
+    return value
+
+
+Component = Annotated[Literal["largest"] | int, BeforeValidator(_as_component)]
 
 
 def text_or_table(value: Any) -> str:
@@ -61,6 +65,13 @@ class FileSurface(Table):
     units: str | None = None
     component: Component | None = None
     prim: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_source(cls, data: Any) -> Any:
+        if isinstance(data, dict) and {"file", "shape"} <= data.keys():
+            raise ValueError("give the surface by its file or by a shape, not both")
+        return data
 
 
 class ShapeSurface(Table):

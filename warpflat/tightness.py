@@ -23,7 +23,7 @@ from warpflat.strain_map import smooth_to_vertices
 from warpflat.surface import Surface
 from warpflat.surface.curvature import curvature_tensors
 
-__all__ = ["MAPS", "Misfit", "Wear", "WornFit", "assess_fit", "assess_pattern", "meant_stretch"]
+__all__ = ["MAPS", "Misfit", "Wear", "WornFit", "assess_fit", "assess_pattern", "meant_stretch", "unused_stretch"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -70,6 +70,11 @@ class Wear:
                 raise InputError(
                     f"wear: {key} = {value:g} {unit}".rstrip() + f"; must be 0 to {highest:g} {unit}{hint}"
                 )
+        if self.pressure and self.stretch_warp > 0.0 and self.stretch_weft > 0.0:
+            raise InputError(
+                "wear: a pressure sets the stretch of the threads that run around the body: give stretch_warp or stretch_weft, that of "
+                "the other threads, not both"
+            )
 
     @property
     def is_tight(self) -> bool:
@@ -371,9 +376,21 @@ def meant_stretch(
     stretch[:, around] = 1.0 + 0.5 * (low + high)
     short = float(face_area[low > fabric.strain_limit - 1e-6].sum() / face_area.sum())
     notes = [f"pressure {wear.pressure:g} Pa by stretch along {thread}, which runs around the body"]
+    if unused := unused_stretch(wear, thread):
+        notes.append(unused)
     if short > 0.001:
         notes.append(
             f"{wear.pressure:g} Pa cannot be reached within {fabric.name}'s limit of {100 * fabric.strain_limit:.3g} % on "
             f"{100 * short:.0f} % of the piece: too flat, or the cloth too soft"
         )
     return stretch, tuple(notes)
+
+
+def unused_stretch(wear: Wear, around: str) -> str:
+    """What is said of a stretch that a pressure overrides, along the threads ("warp" or "weft") around the body; "" if there is none."""
+    value = wear.stretch_warp if around == "warp" else wear.stretch_weft
+    if not (wear.pressure and value > 0.0):
+        return ""
+    return (
+        f"stretch_{around} = {value:g} has no effect: {around} runs around the body, and the pressure sets its stretch"
+    )

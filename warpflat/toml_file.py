@@ -129,8 +129,7 @@ def _below(annotation: Any, step: int | str) -> Any:
     found: Any = None
     for member in _members(annotation):
         if isinstance(member, type) and issubclass(member, BaseModel):
-            if step in member.model_fields:
-                found = member.model_fields[str(step)].annotation
+            found = _fields(member).get(str(step), found)
         elif get_origin(member) in (dict, Mapping) or get_origin(member) in (list, tuple):
             found = get_args(member)[-1] if get_origin(member) in (dict, Mapping) else get_args(member)[0]
     return found
@@ -141,8 +140,13 @@ def _keys(annotation: Any) -> list[str]:
         key
         for member in _members(annotation)
         if isinstance(member, type) and issubclass(member, BaseModel)
-        for key in member.model_fields
+        for key in _fields(member)
     ]
+
+
+def _fields(model: type[BaseModel]) -> dict[str, Any]:
+    """Annotations by the keys that a file has for them."""
+    return {field.alias or name: field.annotation for name, field in model.model_fields.items()}
 
 
 def _guess(given: Any, annotation: Any) -> str:

@@ -9,11 +9,11 @@ import platform
 import re
 import time
 import uuid
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from warpflat.errors import InputError
+from warpflat.errors import InputError, expect
 from warpflat.names import checked_name
 
 __all__ = [
@@ -130,14 +130,15 @@ def atomic_path(final: str | os.PathLike[str]) -> Iterator[Path]:
             temporary.unlink()
 
 
-def prepare_folder(path: str | os.PathLike[str]) -> Path:
-    """Create the output folder, parents included, and make sure that files can be written into it.
+def prepare_folder(path: str | os.PathLike[str], files: Iterable[str] = ()) -> Path:
+    """Create the output folder, parents included, and make sure that files, those of the names given too, can be written into it.
 
     What killed runs have left half-written there is removed (see `remove_unfinished`).
 
     Raises:
-        InputError: it is a file, lies below a file, or cannot be created or written.
+        InputError: it is a file, lies below a file, cannot be created or written, or has a folder where a file is to be.
     """
+    expect(path, (str, os.PathLike), "folder", "the path of one")
     folder = Path(path)
     if folder.exists() and not folder.is_dir():
         raise InputError(f"output folder {folder} is a file; give a folder, or a name that is not taken")
@@ -148,12 +149,17 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
         probe.unlink()
     except OSError as error:
         raise InputError(f"output folder {folder} cannot be written: {_reason(error)}; choose another one") from error
+    for file in files:
+        if (folder / file).is_dir():
+            raise InputError(
+                f"{folder / file} is a folder, where a file is to be written; remove it, or choose another folder"
+            )
     remove_unfinished(folder)
     return folder
 
 
 @contextmanager
-def output_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
+def output_folder(path: str | os.PathLike[str], files: Iterable[str] = ()) -> Iterator[Path]:
     """The output folder for a run that may yet fail: what it has made of it goes again if nothing has been written there.
 
     Raises:
@@ -162,7 +168,7 @@ def output_folder(path: str | os.PathLike[str]) -> Iterator[Path]:
     folder = Path(path)
     made = [each for each in (folder, *folder.parents) if not each.exists()]
     try:
-        yield prepare_folder(folder)
+        yield prepare_folder(folder, files)
     finally:
         for each in made:
             with suppress(OSError):  # it holds files

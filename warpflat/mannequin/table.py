@@ -43,6 +43,12 @@ class MannequinTable(Table):
             )
         if self.scan is not None and self.table is not None:
             raise ValueError("table completes measurements; a scan has its own: leave it out")
+        of_scan = [key for key in ("units", "up", "facing", "landmarks", "mirror") if getattr(self, key)]
+        if self.scan is None and of_scan:
+            body = "size" if self.size is not None else "measurements"
+            raise ValueError(
+                f"given with {body}, but of a scan only: {', '.join(of_scan)}; leave it out, or give a scan"
+            )
         return self
 
     @property

@@ -35,6 +35,8 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
         data = json.loads(path.read_text(encoding="utf-8-sig"))
     except FileNotFoundError:
         raise InputError(f"{path}: no such file; a run leaves a pattern.json in its folder") from None
+    except NotADirectoryError:
+        raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise InputError(f"{path}: cannot be read as JSON ({' '.join(str(error).split())})") from None
     try:

@@ -35,7 +35,7 @@ from warpflat.surface.topology import (
     mesh_edges,
     orient,
 )
-from warpflat.surface.weld import welding
+from warpflat.surface.weld import t_junction, welding
 from warpflat.words import counted
 
 __all__ = ["checked_positions", "make_surface"]
@@ -137,7 +137,10 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
         InputError: of another shape, or not finite; names the vertex.
     """
     try:
-        positions = np.array(vertices, dtype=np.float64)
+        given = np.asarray(vertices)
+        if np.iscomplexobj(given):
+            raise TypeError("a place in space is of real numbers")
+        positions = np.array(given, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise InputError("vertices must be numbers, #V by 3") from error
     if positions.size == 0:
@@ -234,6 +237,13 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
     valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
     if component is None:
         if len(sizes) > 1:
+            if (meeting := t_junction(mesh.vertices, mesh.faces, label)) is not None:
+                vertex, a, b = meeting
+                raise InputError(
+                    f"{len(sizes):,} components that share no edge, though they meet: vertices of one lie on edges of another (a "
+                    f"T-junction: vertex {vertex} on the edge between {a} and {b}, counted from 0); give both the same vertices there, or "
+                    f"choose one with {valid}"
+                )
             raise InputError(
                 f"{len(sizes):,} components that share no edge, of {_sizes(sizes[rank])} faces; a piece is one: choose "
                 f"it with {valid}, or give each in a file of its own"
@@ -353,7 +363,8 @@ def _check_border(faces: NDArray[np.int32]) -> None:
     loops = border_loops(faces)
     if not loops:
         raise InputError(
-            "the surface is closed (it has no border): cut it open, or give the part that becomes one piece of cloth"
+            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
+            "becomes one piece of cloth; [[cuts]] cut what is flat already"
         )
     handles = (2 - len(loops) - euler_characteristic(faces)) // 2
     if handles:

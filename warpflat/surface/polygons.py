@@ -10,7 +10,14 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
 
-__all__ = ["distinct_corners", "list_some", "padded_polygons", "split_non_convex_quads", "split_polygons"]
+__all__ = [
+    "crossed_quads",
+    "distinct_corners",
+    "list_some",
+    "padded_polygons",
+    "split_non_convex_quads",
+    "split_polygons",
+]
 
 
 def list_some(indices: ArrayLike, most: int = 8) -> str:
@@ -32,14 +39,20 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
         if not np.issubdtype(polygons.dtype, np.integer):
             raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
         return polygons.astype(np.int64)
-    rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+    try:
+        rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
+        corners = [np.asarray(row).ravel() for row in rows]
+        flat = np.concatenate([np.empty(0, dtype=np.int64), *(row.astype(np.int64) for row in corners)])
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError("faces must be lists of vertex indices, one list per face") from error
     if not rows:
         raise InputError("there are no faces")
-    try:
-        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
-        flat = np.concatenate([np.asarray(row, dtype=np.int64).ravel() for row in rows])
-    except (TypeError, ValueError) as error:
-        raise InputError("faces must be lists of vertex indices, one list per face") from error
+    wrong = next((n for n, row in enumerate(corners) if len(row) and not np.issubdtype(row.dtype, np.integer)), None)
+    if wrong is not None:
+        raise InputError(
+            f"face {wrong} (counted from 0) is {rows[wrong]!r}; its corners must be integers (vertex indices)"
+        )
     short = np.flatnonzero(count < 3)
     if len(short):
         raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
@@ -158,24 +171,10 @@ def split_non_convex_quads(
         InputError: naming the quad whose sides cross.
     """
     quads = np.flatnonzero(faces[:, 3] >= 0)
-    p = vertices[faces[quads]]
-    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
-    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
-    before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
-    chord = np.linalg.norm(after - before, axis=2)
-    mean = np.linalg.norm(after - p, axis=2).mean(axis=1)
-    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit)
-    height = twice / np.maximum(chord, np.finfo(float).tiny)
-    inward = height <= tolerance * mean[:, None]
-    # Where no corner spans an area there is no inside: that is a sliver, not a matter of convexity.
-    spread = np.linalg.norm(np.cross(p - before, after - p), axis=2).max(axis=1)
-    thin = spread <= tolerance * mean * np.maximum(chord, np.linalg.norm(after - p, axis=2)).max(axis=1)
-    folded = (inward.sum(axis=1) > 1) & (height.min(axis=1) < -tolerance * mean)
-    void = np.linalg.norm(normal, axis=1) <= tolerance * mean * chord.max(axis=1)
-    crossed = np.flatnonzero((folded | void) & ~thin)
-    if len(crossed):
+    height, inward, thin, crossed = _quad_corners(vertices[faces[quads]], tolerance)
+    if crossed.any():
         raise InputError(
-            f"face {origin[quads[crossed[0]]]} (counted from 0) is a quad whose sides cross, or is folded by more than "
+            f"face {origin[quads[np.argmax(crossed)]]} (counted from 0) is a quad whose sides cross, or is folded by more than "
             "90 degrees; list its corners in order around it, or give triangles"
         )
     cut = inward.any(axis=1) & ~thin
@@ -189,3 +188,28 @@ def split_non_convex_quads(
     second = np.column_stack([turned[:, 0], turned[:, 2], turned[:, 3], none])
     # Each second half directly behind its first keeps the order of the input faces.
     return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]
+
+
+def crossed_quads(vertices: NDArray[np.float64], faces: NDArray[np.int32], tolerance: float = 1e-3) -> NDArray[np.intp]:
+    """Which faces (#F by 4) are quads whose sides cross, or that are folded by more than 90 degrees."""
+    quads = np.flatnonzero(faces[:, 3] >= 0)
+    return quads[_quad_corners(vertices[faces[quads]], tolerance)[3]]
+
+
+def _quad_corners(p: NDArray[np.float64], tolerance: float) -> tuple[NDArray[Any], ...]:
+    """Of quads, #Q by 4 by 3: #Q by 4, the height of each corner over the diagonal before it, and whether it is straight or inward; #Q,
+    which are slivers; #Q, whose sides cross."""
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
+    chord = np.linalg.norm(after - before, axis=2)
+    mean = np.linalg.norm(after - p, axis=2).mean(axis=1)
+    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit)
+    height = twice / np.maximum(chord, np.finfo(float).tiny)
+    inward = height <= tolerance * mean[:, None]
+    # Where no corner spans an area there is no inside: that is a sliver, not a matter of convexity.
+    spread = np.linalg.norm(np.cross(p - before, after - p), axis=2).max(axis=1)
+    thin = spread <= tolerance * mean * np.maximum(chord, np.linalg.norm(after - p, axis=2)).max(axis=1)
+    folded = (inward.sum(axis=1) > 1) & (height.min(axis=1) < -tolerance * mean)
+    void = np.linalg.norm(normal, axis=1) <= tolerance * mean * chord.max(axis=1)
+    return height, inward, thin, (folded | void) & ~thin

@@ -11,7 +11,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.errors import InputError, nearest
+from warpflat.errors import InputError, expect, nearest
 from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import make_surface
@@ -76,6 +76,7 @@ def read_surface(
     Raises:
         InputError: one line that names the file.
     """
+    expect(path, (str, PathLike), "path", "that of a mesh file")
     file = Path(path)
     try:
         if name:
@@ -177,8 +178,10 @@ def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
         scene = trimesh.load_scene(str(file), process=False, **options)
     # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
     except Exception as error:
-        reason = next(iter(str(error).splitlines()), "") or type(error).__name__
-        raise InputError(f"not a readable {suffix[1:].upper()} file ({reason[:120]})") from error
+        raise InputError(
+            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
+            "vertices and faces alone"
+        ) from error
     meshes = list(_instances(scene))
     if prim is not None:
         names = [node for node, _, _ in meshes]

@@ -8,10 +8,12 @@ from numpy.typing import NDArray
 from warpflat.surface.polygons import distinct_corners
 from warpflat.surface.topology import components, euler_characteristic, half_edges
 
-__all__ = ["is_sheet", "weld_map", "welding"]
+__all__ = ["is_sheet", "t_junction", "weld_map", "welding"]
 
 # Share of the bounding box's diagonal within which vertices count as one place: float32's resolution.
 _SAME_PLACE = 1e-7
+# A vertex lies on an edge within this share of its length, and so far from its ends at least.
+_ON_EDGE, _OFF_ENDS = 1e-3, 1e-2
 
 
 def weld_map(vertices: NDArray[np.float64]) -> NDArray[np.int32]:
@@ -87,3 +89,36 @@ def welding(
         elif part_chosen or not sheet:
             return None, ""
     return place, f"vertices that lay at the same place as another one joined to it: {joined:,}"
+
+
+def t_junction(
+    vertices: NDArray[np.float64], faces: NDArray[np.int32], part: NDArray[np.integer]
+) -> tuple[int, int, int] | None:
+    """A vertex at the border of one part that lies on a border edge of another, and this edge's ends; None where there is none.
+
+    Args:
+        vertices: #V by 3, positions [m].
+        faces: #F by 4.
+        part: #F, the part of each.
+    """
+    from scipy.spatial import cKDTree
+
+    he = half_edges(faces)
+    border = np.flatnonzero(he.count[he.edge] == 1)
+    ends, own = he.edges[he.edge[border]], part[he.face[border]]
+    start, way = vertices[ends[:, 0]], vertices[ends[:, 1]] - vertices[ends[:, 0]]
+    length = np.linalg.norm(way, axis=1)
+    if not length.any():
+        return None
+    places, first = np.unique(he.tail[border], return_index=True)
+    near = cKDTree(vertices[places]).query_ball_point(start + 0.5 * way, (0.5 + _ON_EDGE) * length)
+    for edge, found in enumerate(near):
+        found = np.asarray(found, dtype=np.int64)
+        found = found[own[first[found]] != own[edge]]
+        to = vertices[places[found]] - start[edge]
+        along = to @ way[edge] / max(length[edge] ** 2, np.finfo(float).tiny)
+        off = np.linalg.norm(to - along[:, None] * way[edge], axis=1)
+        on = (off < _ON_EDGE * length[edge]) & (along > _OFF_ENDS) & (along < 1.0 - _OFF_ENDS)
+        if on.any():
+            return int(places[found[np.argmax(on)]]), int(ends[edge, 0]), int(ends[edge, 1])
+    return None
