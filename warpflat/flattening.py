@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.coarsen import levels_meanwhile
 from warpflat.darts import AppliedCut, measure_cut
-from warpflat.develop import Development, choose_datum, develop
+from warpflat.develop import Development, chosen_datum, develop
 from warpflat.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
 from warpflat.heap import give_back
@@ -397,10 +397,10 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
 def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:
     """The datum as vertex indices, its name, and a note where it was chosen."""
     if datum is None:
-        line = choose_datum(surface)
+        line, along = chosen_datum(surface)
         length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
         ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
-        return line, "datum", [f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"]
+        return line, "datum", [f"datum chosen: {along}, {100 * length:.1f} cm ({ends})"]
     if isinstance(datum, str):
         if datum not in surface.lines:
             raise InputError(
