@@ -360,6 +360,7 @@ def finish(pieces: Sequence[Started]) -> list[Flattening]:
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
         again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
+        astray=[piece.run.astray(piece.development) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
