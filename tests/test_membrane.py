@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 from dataclasses import replace
 from pathlib import Path
@@ -170,3 +171,35 @@ def test_a_piece_far_astray_at_the_start_is_flat_in_the_end_in_cloth_soft_in_she
     edges = mesh_edges(comb.faces)
     flat, body = (np.linalg.norm(np.diff(p[edges], axis=1)[:, 0], axis=1) for p in (piece.positions, comb.vertices))
     np.testing.assert_allclose(flat, body, rtol=1e-6)
+
+
+def bump(height: float) -> warpflat.Surface:
+    x, y = np.meshgrid(np.linspace(-0.2, 0.2, 25), np.linspace(-0.2, 0.2, 25))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[:-1, :-1], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 3)
+    return make_surface(np.stack([x, y, height * np.exp(-(x * x + y * y) / 0.003)], axis=-1).reshape(-1, 3), faces)
+
+
+def test_faces_that_open_are_told_of_with_their_place(tmp_path: Path):
+    piece = warpflat.flatten(bump(0.25), fabric="denim", model="membrane", grain_angle=30.0, device="cpu")
+    (note,) = set(piece.measures["notes"]) - set(piece.notes)
+    told = piece.measures["opened"]
+    corners = piece.faces[told["face"], :3]
+    flat, body = piece.positions[corners], piece.surface.vertices[corners]
+    np.testing.assert_allclose(told["in_pattern"], flat.mean(axis=0))
+    np.testing.assert_allclose(told["at"], body.mean(axis=0))
+    area = 0.5 * np.linalg.norm(np.cross(body[1] - body[0], body[2] - body[0]))
+    assert told["times"] == pytest.approx(0.5 * np.linalg.det(flat[1:] - flat[0]) / area, rel=1e-9)
+    assert told["times"] > 4.0
+    assert told["flat_area_m2"] > 2.0 * told["area_m2"]
+    assert f"face {told['face']} around (" in note
+    assert 'make a dart or a seam, or take model = "springs" or a fabric that shears less' in note
+    assert (
+        note
+        in json.loads((tmp_path / piece.save(tmp_path, picture=False, frames=False)[-1]).read_text())["pieces"][
+            "piece"
+        ]["notes"]
+    )
+    gentle = warpflat.flatten(bump(0.02), fabric="denim", model="membrane", grain_angle=30.0, device="cpu")
+    assert gentle.measures["opened"] is None
+    assert gentle.told == gentle.notes

@@ -23,6 +23,7 @@ from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
 from warpflat.heap import give_back
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
+from warpflat.opened import Opened, opened_faces
 from warpflat.progress import Progress, Stage
 from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Relaxed, Run, relax_runs
@@ -121,6 +122,16 @@ class Flattening:
         return self.worn.energy_density
 
     @cached_property
+    def opened(self) -> Opened | None:
+        """The faces that are more than twice as large as on the body, if they matter."""
+        return opened_faces(self)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """`notes`, and what is to be said of the pattern as it lies."""
+        return self.notes if self.opened is None else (*self.notes, self.opened.words(self.network.model))
+
+    @cached_property
     def measures(self) -> dict[str, Any]:
         """The piece's entry in `metrics.json`."""
         from warpflat.wear_report import wear_measures
@@ -147,7 +158,8 @@ class Flattening:
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
             "energy": energy_report(self.network.surface, self.worn.energy),
-            "notes": list(self.notes),
+            "opened": None if self.opened is None else self.opened.as_dict(),
+            "notes": list(self.told),
         }
 
     def metrics(self) -> dict[str, Any]:

@@ -259,7 +259,7 @@ def run_scene(
         more={} if sewn is None else sewn.metrics(),
         frames=wanted,
         sources=scene_sources(scene),
-        notes=(*result.notes, *story.notes),
+        notes=(*result.told, *story.notes),
     )
 
 
