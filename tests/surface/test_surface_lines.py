@@ -222,6 +222,16 @@ def test_sides_of_a_piece_that_wraps_round_are_refused_where_they_cannot_be_told
         line_on_border(tube, "left")
 
 
+def test_sides_that_curl_a_little_out_of_sight_end_at_the_corners():
+    """A back with a square neckline, through 220 degrees: from the front its outermost points lie beside its corners."""
+    vertices, quads = slit_tube(opening=np.radians(140), slit=-np.pi / 2)
+    row, column = np.divmod(np.arange(len(quads)), 24)
+    back = make_surface(vertices, quads[(row < 10) | (np.abs(column - 11.5) > 4)], name="back")
+    bottom, right = line_on_border(back, "bottom"), line_on_border(back, "right")
+    assert back.input_index[bottom].tolist() == list(range(25))
+    assert back.input_index[right].tolist() == list(range(24, 25 * 15, 25))
+
+
 def test_stretch_between_two_places(sheet):
     assert line_on_border(sheet, start=1, end=14).tolist() == [1, 0, 7, 14]
     assert line_on_border(sheet, start=[0.17, -0.1, 0], end=14).tolist() == [1, 0, 7, 14]

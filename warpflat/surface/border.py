@@ -28,6 +28,8 @@ _AWAY_SHARE = 0.02
 # this share of what each of them does.
 _CORNER = np.pi / 6
 _SHARPER = 0.6
+# A corner out of sight lies no further than this share of the border from the outermost point that is seen.
+_NEAR = 0.05
 # The best way to name four sides puts them apart by so much of the piece's size, and the others by no more than this share of that.
 _APART = 0.1
 _PLAINLY = 0.9
@@ -67,6 +69,7 @@ def line_on_border(
     piece's bounding rectangle. "left" and "right" run upwards, "top" and "bottom" from left to right. Where these are
     no corners, as on a piece that wraps round, they are the four at which the border itself turns most, measured on the surface;
     bottom and top then are the sides that lie lowest and highest, or left and right those furthest to either hand.
+    Where the sides curl but a little out of sight, each corner seen is moved to the one of the border beside it.
 
     Args:
         surface: where.
@@ -127,6 +130,9 @@ def _corners(surface: Surface, loop: NDArray[np.int32], side: str) -> dict[str, 
     if sharp is not None:
         return _named(surface, loop, sharp, side)
     if _turned_away(surface, towards) > _AWAY_SHARE:
+        near = {key: _corner_near(surface, loop, turn, place) for key, place in at.items()}
+        if len(set(near.values())) == 4 and turn[list(near.values())].min() > _CORNER:
+            return near
         raise InputError(
             f"{surface.name!r} wraps round, and its border does not turn at four corners only; give start and end instead of "
             f"side {side!r}"
@@ -137,6 +143,16 @@ def _corners(surface: Surface, loop: NDArray[np.int32], side: str) -> dict[str, 
             f"side {side!r}"
         )
     return at
+
+
+def _corner_near(surface: Surface, loop: NDArray[np.int32], turn: NDArray[np.float64], place: int) -> int:
+    """The position in the loop where the border turns most, not far from one: where a side curls a little out of sight, the outermost
+    point that is seen lies beside the corner."""
+    points = surface.vertices[np.append(loop, loop[0])]
+    station = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    way = np.abs(station[:-1] - station[place])
+    near = np.minimum(way, station[-1] - way) < _NEAR * station[-1]
+    return int(np.argmax(np.where(near, turn, -np.inf)))
 
 
 def _four_sharpest(turn: NDArray[np.float64]) -> NDArray[np.intp] | None:
