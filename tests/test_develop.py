@@ -10,6 +10,7 @@ from warpflat.cells import cells_of
 from warpflat.develop import (
     _winds_twice,
     choose_datum,
+    chosen_datum,
     develop,
     flat_layout,
     geodesic_layout,
@@ -412,6 +413,37 @@ def test_pieces_about_as_wide_as_long_hang_down(name: str):
     assert line[-1, 1] > line[0, 1]
     assert np.ptp(line[:, 1]) > 0.8 * np.ptp(surface.vertices[:, 1])
     assert np.ptp(line[:, 0]) < 0.2 * np.ptp(surface.vertices[:, 0])
+
+
+def leaning(surface: Surface, line: NDArray[np.int32], axis: NDArray[np.float64]) -> float:
+    """Degrees between the chord of a line and an axis."""
+    chord = surface.vertices[line[-1]] - surface.vertices[line[0]]
+    return float(np.degrees(np.arccos(np.clip(chord @ axis / np.linalg.norm(chord), -1.0, 1.0))))
+
+
+@pytest.mark.parametrize(
+    ("turned", "leans", "told"),
+    [
+        (0, 0, "upright through the middle, the piece being about as wide as long"),
+        (8, 8, "upright through the middle, the piece being about as wide as long"),
+        (20, 0, "along the long axis through the middle, the more upright of two about as long"),
+        (70, 90, "along the short axis through the middle, the more upright of two about as long"),
+        (83, 83, "upright through the middle, the piece being about as wide as long"),
+    ],
+)
+def test_a_piece_about_as_wide_as_long_that_lies_askew_keeps_to_its_nearer_axis(turned: int, leans: int, told: str):
+    x, y = np.meshgrid(np.linspace(-0.15, 0.15, 31), np.linspace(-0.175, 0.175, 36))
+    angle = np.radians(turned)
+    along = np.array([np.sin(angle), np.cos(angle), 0.0])
+    points = np.stack([x, y, 0.0 * x], axis=-1).reshape(-1, 3) @ np.array(
+        [[np.cos(angle), -np.sin(angle), 0.0], along, [0.0, 0.0, 1.0]]
+    )
+    i = np.arange(x.size).reshape(x.shape)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    surface = make_surface(points, quads)
+    line, said = chosen_datum(surface)
+    assert said == told
+    assert leaning(surface, line, along) == pytest.approx(leans, abs=2.5)
 
 
 def test_the_choice_does_not_depend_on_the_numbering_or_the_place():

@@ -260,6 +260,31 @@ def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):
     assert len(written.notes) == 1
     assert "no pattern was drawn" in written.notes[0]
     assert list(tmp_path.iterdir()) == []
+    assert written.metrics["pattern"]["not_drawn"] in written.notes[0]
+
+
+def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_exit_code(tmp_path: Path, capfd):
+    # A spiral ramp: developed, it goes round by more than a full turn.
+    turn, out = np.meshgrid(np.linspace(0, 2.6 * np.pi, 41), np.linspace(0.1, 0.2, 5))
+    ramp = np.stack([out * np.cos(turn), out * np.sin(turn), 0.03 * turn], axis=-1).reshape(-1, 3)
+    i = np.arange(len(ramp)).reshape(turn.shape) + 1
+    quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
+    lines = [f"v {x} {y} {z}" for x, y, z in ramp] + [f"f {a} {b} {c} {d}" for a, b, c, d in quads]
+    (tmp_path / "ramp.obj").write_text("\n".join(lines))
+    arguments = ["flatten", str(tmp_path / "ramp.obj"), "--units", "m", "--out", str(tmp_path / "out")]
+    assert main([*arguments, "--json"]) == 1
+    printed = capfd.readouterr()
+    why = json.loads(printed.out)["pattern"]["not_drawn"]
+    assert re.fullmatch(
+        r"piece 'ramp': the outline crosses itself at \(-?[\d.]+, -?[\d.]+\) mm in the plane: flat, the piece lies over itself "
+        "there; cut it apart, so that no piece does",
+        why,
+    )
+    assert printed.err == f"warpflat: no pattern was drawn: {why}\n"
+    assert json.loads((tmp_path / "out" / "metrics.json").read_text())["pattern"] == {"not_drawn": why}
+    # Once, not as a note too.
+    assert main(arguments) == 1
+    assert capfd.readouterr().err.count("no pattern was drawn") == 1
 
 
 def test_a_ragged_border_gets_a_wider_tolerance_and_says_so(tmp_path: Path):
@@ -431,7 +456,8 @@ def test_another_size_that_went_wrong_is_a_warning(
     (tmp_path / "scene.toml").write_text(NEST)
     assert main(["run", str(tmp_path / "scene.toml"), "--out", str(tmp_path / "out"), "--quiet"]) == 1
     warnings = capsys.readouterr().err.splitlines()
-    assert len(warnings) == 2
+    assert len(warnings) == 3
+    assert warnings[2].startswith("warpflat: no pattern was drawn: piece 'back' size EU 44: ")
     assert warnings[0].startswith("warpflat: size EU 44: front did not converge within ")
     assert re.match(r"warpflat: size EU 44: back has \d+ flipped faces; the pattern cannot be cut", warnings[1])
     sizes = json.loads((tmp_path / "out" / "metrics.json").read_text())["sizes"]

@@ -33,7 +33,7 @@ DONE, NOT_CONVERGED, BAD_INPUT, HUNG_UP, INTERRUPTED, TERMINATED = 0, 1, 2, 129,
 _EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge or has flipped faces, in whatever size
+  1    done, but a piece did not converge or has flipped faces, in whatever size, or a pattern could not be drawn
   2    bad input; one line says what is wrong, where, and what would be right
   129  the terminal was closed
   130  interrupted
@@ -605,10 +605,11 @@ def _run(
     folder = out if out is not None else Path("out") / scene.name
     with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
         result = run_scene(scene, folder, on_progress=bar, device=device, cuts=cuts)
+    warnings = warnings_of(result.metrics)
     if not (quiet or as_json):
         for note in result.notes:
-            click.echo(f"warpflat: note: {note}", err=True)
-    warnings = warnings_of(result.metrics)
+            if note not in warnings:
+                click.echo(f"warpflat: note: {note}", err=True)
     for warning in warnings:
         click.echo(f"warpflat: {warning}", err=True)
     if as_json:

@@ -131,7 +131,7 @@ def _price(joules: float | None) -> str:
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """One line for each piece that did not converge or has flipped faces, of every size."""
+    """One line for each piece that did not converge or has flipped faces, of every size, and for a pattern or marker that is missing."""
     lines = []
     given_up = metrics.get("sewing", {}).get("contradictory", False)
     for name, piece in metrics["pieces"].items():
@@ -154,6 +154,11 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         ]
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
+    lines += [
+        f"no {what} was {done}: {metrics[what][f'not_{done}']}"
+        for what, done in (("pattern", "drawn"), ("marker", "made"))
+        if f"not_{done}" in metrics.get(what, {})
+    ]
     return lines
 
 

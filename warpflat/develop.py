@@ -40,6 +40,7 @@ from warpflat.surface.vectors import norm, points_at
 __all__ = [
     "Development",
     "choose_datum",
+    "chosen_datum",
     "develop",
     "flat_layout",
     "geodesic_layout",
@@ -54,6 +55,11 @@ IntArray = NDArray[np.int32]
 _LEVEL = 1e-6
 # A line beside it is along the same section if its ends are as far apart, to this share.
 _AS_LONG = 0.05
+# A piece is about as wide as long from this share of its spreads (squares of lengths), and neither axis tells a direction from that.
+_AS_WIDE = 0.64
+_ALIKE = 0.95
+# A piece hangs by the vertical where one of its axes leans by no more than that from it (cosine): a bodice leans by 6.
+_HANGS = np.cos(np.radians(10.0))
 # A piece is flat if it strays no further from its plane, to this share of its size: single precision leaves that much.
 _FLAT = 1e-5
 _FEW_VERTICES = 100
@@ -91,11 +97,17 @@ class Development:
 def choose_datum(surface: Surface) -> IntArray:
     """The line along the piece's long axis through its middle, as vertex indices along edges.
 
-    The long axis is the first principal axis of the surface; where length and width are within a fifth of each other, and
-    one is nearer to the vertical (+y), that one. The line follows the section by the plane of that axis and the mean
-    normal, or a parallel one beside it whose line has its ends far more level. Of a band that this cuts crosswise, since it
-    curls, the line runs through the middle from end to end instead.
+    The long axis is the first principal axis of the surface. Where length and width are within a fifth of each other it is the
+    one of the two that is nearer to the vertical (+y), and the vertical itself where that leans by no more than 10 degrees from
+    it, or where both are so alike that neither tells a direction. The line follows the section by the plane of that axis and
+    the mean normal, or a parallel one beside it whose line has its ends far more level. Of a band that this cuts crosswise,
+    since it curls, the line runs through the middle from end to end instead.
     """
+    return chosen_datum(surface)[0]
+
+
+def chosen_datum(surface: Surface) -> tuple[IntArray, str]:
+    """`choose_datum`, and in words along what the line was laid."""
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -107,12 +119,7 @@ def choose_datum(surface: Surface) -> IntArray:
     spread = np.einsum("i,k,ikx,iky->xy", area, share, at, at)
     values, axes = np.linalg.eigh(spread / area.sum())
     facing = normal.sum(axis=0)
-    long_axis = axes[:, 2]
-    if values[1] > 0.64 * values[2]:
-        # Nearly as wide as long: let the grain hang down rather than run by the accident of a few millimetres.
-        up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
-        if np.linalg.norm(up) > 0.5:
-            long_axis = up / np.linalg.norm(up)
+    long_axis, told = _long_axis(values, axes, facing)
     long_axis = long_axis * _upwards(long_axis, long_axis)
     across = np.cross(long_axis, facing)
     if np.linalg.norm(across) < 1e-9 * max(float(np.linalg.norm(facing)), 1e-300) or not np.any(facing):
@@ -125,10 +132,26 @@ def choose_datum(surface: Surface) -> IntArray:
         along = (surface.vertices - centre) @ long_axis
         line = line_between(surface, int(along.argmin()), int(along.argmax()))
     band = line_along_band(surface, line)
-    line = line if band is None else band
+    line, told = (line, told) if band is None else (band, "along the middle of the band, from end to end")
     rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
     upwards = _upwards(rising, long_axis if band is None else rising)
-    return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32)
+    return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32), told
+
+
+def _long_axis(values: FloatArray, axes: FloatArray, facing: FloatArray) -> tuple[FloatArray, str]:
+    """The axis along which a piece is laid, and what it is: of its spreads (ascending), principal axes (columns) and summed normal."""
+    up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
+    size = float(np.linalg.norm(up))
+    if values[1] <= _AS_WIDE * values[2] or size <= 0.5:
+        return axes[:, 2], "along the long axis through the middle"
+    # Nearly as wide as long: let the grain hang down rather than run by the accident of a few millimetres.
+    leaning = np.abs(axes[:, 1:].T @ up) / size
+    if values[1] > _ALIKE * values[2] or leaning.max() > _HANGS:
+        return up / size, "upright through the middle, the piece being about as wide as long"
+    nearer = int(leaning.argmax())
+    return axes[
+        :, 1 + nearer
+    ], f"along the {('short', 'long')[nearer]} axis through the middle, the more upright of two about as long"
 
 
 def _upwards(direction: FloatArray, leading: FloatArray) -> int:

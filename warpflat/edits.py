@@ -16,7 +16,7 @@ from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
 from warpflat.errors import InputError, expect, expect_callback
 from warpflat.fabric import Fabric, as_fabric
-from warpflat.flattening import Flattening, chosen_datum_note
+from warpflat.flattening import Flattening, datum_extent
 from warpflat.progress import Progress
 from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Run, relax_runs
@@ -104,8 +104,8 @@ def change_surface(
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
     gone_on = _gone_on(result, run, result.positions)
     # How long the datum is, if it was chosen, is told of the surface as it is now.
-    chosen, now = (chosen_datum_note(of, result.datum) for of in (before, surface))
-    notes = tuple(now if note == chosen else note for note in gone_on.notes)
+    chosen, now = (datum_extent(of, result.datum) for of in (before, surface))
+    notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in gone_on.notes)
     return replace(gone_on, surface=surface, cuts=cuts, notes=notes)
 
 

@@ -17,12 +17,13 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.coarsen import levels_meanwhile
 from warpflat.darts import AppliedCut, measure_cut
-from warpflat.develop import Development, choose_datum, develop
+from warpflat.develop import Development, chosen_datum, develop
 from warpflat.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
 from warpflat.heap import give_back
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
+from warpflat.opened import Opened, opened_faces
 from warpflat.progress import Progress, Stage
 from warpflat.relax import RelaxOptions, given_options
 from warpflat.running import Relaxed, Run, relax_runs
@@ -121,6 +122,16 @@ class Flattening:
         return self.worn.energy_density
 
     @cached_property
+    def opened(self) -> Opened | None:
+        """The faces that are more than twice as large as on the body, if they matter."""
+        return opened_faces(self)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """`notes`, and what is to be said of the pattern as it lies."""
+        return self.notes if self.opened is None else (*self.notes, self.opened.words(self.network.model))
+
+    @cached_property
     def measures(self) -> dict[str, Any]:
         """The piece's entry in `metrics.json`."""
         from warpflat.wear_report import wear_measures
@@ -147,7 +158,8 @@ class Flattening:
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
             "energy": energy_report(self.network.surface, self.worn.energy),
-            "notes": list(self.notes),
+            "opened": None if self.opened is None else self.opened.as_dict(),
+            "notes": list(self.told),
         }
 
     def metrics(self) -> dict[str, Any]:
@@ -371,6 +383,7 @@ def finish(pieces: Sequence[Started]) -> list[Flattening]:
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
         again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
+        astray=[piece.run.astray(piece.development) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
@@ -408,8 +421,8 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
 def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:
     """The datum as vertex indices, its name, and a note where it was chosen."""
     if datum is None:
-        line = choose_datum(surface)
-        return line, "datum", [chosen_datum_note(surface, line)]
+        line, along = chosen_datum(surface)
+        return line, "datum", [f"datum chosen: {along}, {datum_extent(surface, line)}"]
     if isinstance(datum, str):
         if datum not in surface.lines:
             raise InputError(
@@ -428,11 +441,11 @@ def _datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, s
     return np.ascontiguousarray(line[::-1] if downward else line), name, []
 
 
-def chosen_datum_note(surface: Surface, line: IntArray) -> str:
-    """What is said of a datum that nobody gave: vertex indices of the line on the surface."""
+def datum_extent(surface: Surface, line: IntArray) -> str:
+    """How long a datum is (vertex indices of the line), and its ends as they were read."""
     length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
     ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
-    return f"datum chosen: along the long axis through the middle, {100 * length:.1f} cm ({ends})"
+    return f"{100 * length:.1f} cm ({ends})"
 
 
 def _device(name: str | None) -> wp.Device:

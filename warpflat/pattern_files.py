@@ -177,7 +177,7 @@ def export_pattern(
 def _drawn(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
-    """Make, draft and write a pattern; geometry that defeats it becomes a note."""
+    """Make, draft and write a pattern; geometry that defeats it becomes a note, and in `metrics.json` `not_drawn` of `pattern`."""
     from shapely.errors import ShapelyError
 
     from warpflat.export import prepare_folder
@@ -189,7 +189,8 @@ def _drawn(
         pattern, notes = make()
         drafted, told = _drafted(pattern, options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
-        return WrittenPattern(notes=(f"no pattern was drawn: {' '.join(str(error).split())}",))
+        why = " ".join(str(error).split())
+        return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
     notes = (*notes, *told)
     files = [
         _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
@@ -205,8 +206,7 @@ def _drawn(
         marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
         files += marked
         notes = (*notes, *told)
-        if plan:
-            metrics["marker"] = plan
+        metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
 
 
@@ -281,7 +281,7 @@ def _marker(
     try:
         marker = make_marker(drafted, cloth, seconds=seconds)
     except InputError as error:
-        return [], (f"no marker was made: {error}",), {}
+        return [], (f"no marker was made: {error}",), {"not_made": str(error)}
     files = [file_in(folder, name, ending) for ending in (".marker.svg", ".marker.json")]
     write_marker_svg(marker, files[0])
     placements: list[dict[str, Any]] = [

@@ -306,10 +306,11 @@ class Relaxation:
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
 
     def begin(self) -> Look:
-        """The look before the first step."""
+        """The look before the first step, by which only what is free of strain is at rest."""
         residual, gain, change = np.full((3, len(self.vertices)), np.inf)
-        never = np.zeros(len(self.vertices), dtype=bool)
-        return self._say(self.piece_energies(), residual=residual, gain=gain, change=change, at_rest=never)
+        energies = self.piece_energies()
+        at_rest = self._without_strain(energies[:, 0] + energies[:, 1])
+        return self._say(energies, residual=residual, gain=gain, change=change, at_rest=at_rest)
 
     def look(self, work: float) -> Look:
         """How energy and residual are now, so many steps' work after the last look."""

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.coarsen import coarser_surfaces
 from warpflat.develop import Development
-from warpflat.fabric import Fabric, grain_axes
+from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric, grain_axes
 from warpflat.joined import join_networks
 from warpflat.looks import Energies, Outcome
 from warpflat.membrane import Model
@@ -96,6 +96,19 @@ class Run:
         self.notes += [note for note in notes if note not in self.notes]
         return network
 
+    def reference_at(self, positions: FloatArray) -> SpringNetwork:
+        """The piece's network as an isotropic sheet that is worn as it lies: it shears no more easily than it stretches, and so leaves
+        a layout that is far astray by the straight way."""
+        reference = as_fabric(DEFAULT_FABRIC)
+        return SpringNetwork.build(
+            self.surface, reference, positions, grain_angle=self.grain_angle, device=self.device, model=self.model
+        )
+
+    def astray(self, development: Development) -> bool:
+        """Whether the piece is relaxed as an isotropic sheet first: a harmonic map is so far off, by kilojoules, that cloth soft in shear
+        would come to rest in folds of its threads."""
+        return development.method == "harmonic" and not self.fabric.is_isotropic
+
     def measured_again(self, *, mended: bool = False) -> int:
         """How many times at most directions are measured again: until they stand where another layout gives other springs, or other lengths
         for a stretch that is meant; once where they matter to a membrane's steps alone, or a `mended` layout says little of them."""
@@ -168,6 +181,7 @@ def relax_runs(
     starts: Sequence[FloatArray],
     *,
     again: Sequence[int],
+    astray: Sequence[bool] | None = None,
 ) -> list[Relaxed]:
     """Relax the pieces of several runs, those of a kind side by side.
 
@@ -176,15 +190,18 @@ def relax_runs(
         networks: of each, measured in its start.
         starts: of each, #V by 2 [m].
         again: for each, how many times at most directions are measured again: it is relaxed in rounds, and they are measured in between.
+        astray: for each, whether it is roughly relaxed as an isotropic sheet before; None of none.
     """
-    kinds: dict[tuple[bool, int], list[int]] = {}
+    kinds: dict[tuple[bool, int, bool], list[int]] = {}
     for number, (run, network) in enumerate(zip(runs, networks, strict=True)):
-        kinds.setdefault((_has_levels(run, network), again[number]), []).append(number)
+        kinds.setdefault((_has_levels(run, network), again[number], astray is not None and astray[number]), []).append(
+            number
+        )
     relaxed: dict[int, Relaxed] = {}
-    for (levels, times), numbers in kinds.items():
+    for (levels, times, led), numbers in kinds.items():
         own = [runs[number] for number in numbers]
         batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
-        relaxed |= zip(numbers, batch.relax(levels=levels, again=times), strict=True)
+        relaxed |= zip(numbers, batch.relax(levels=levels, again=times, astray=led), strict=True)
     for number, run in enumerate(runs):
         # Of the springs that the pattern has: those of a start that turned out otherwise are gone.
         run.notes += _off_grain(relaxed[number].network)
@@ -211,12 +228,17 @@ class _Batch:
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
 
-    def relax(self, *, levels: bool, again: int) -> list[Relaxed]:
-        """Relax them, in rounds between which directions are measured again, so many times at most."""
+    def relax(self, *, levels: bool, again: int, astray: bool) -> list[Relaxed]:
+        """Relax them, in rounds between which directions are measured again, so many times at most; as isotropic sheets first where
+        they are astray."""
         begun = time.perf_counter()
         begin = self._state.begin().energies
         stage = self._runs[0].stage_name
         self._tell(self._state, "develop" if stage == "relax" else stage)
+        if astray:
+            own, start = self._state.vertices, self._state.positions()
+            self._put([run.reference_at(start[at]) for run, at in zip(self._runs, own, strict=True)], start)
+            self._measure_again(levels)
         for _ in range(again):
             if self._measure_again(levels) <= _STANDS:
                 break

@@ -280,7 +280,7 @@ def _run_surface(
         more={} if sewn is None else sewn.metrics(),
         frames=wanted,
         sources=scene_sources(scene),
-        notes=(*result.notes, *story.notes),
+        notes=(*result.told, *story.notes),
     )
 
 

@@ -25,6 +25,7 @@ from warpflat.surface.untangle import signed_cell_areas
 __all__ = [
     "LayoutErrors",
     "WornStrain",
+    "face_areas",
     "layout_errors",
     "membrane_of",
     "signed_cell_areas",
@@ -127,15 +128,12 @@ class LayoutErrors:
 
 def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
     """Errors of a layout (#V by 2 [m]) of the network's surface."""
-    cells = network.cell_arrays
     he = half_edges_of(surface)
     edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
-    corner, face, weight = corner_triangles(cells.faces)
+    corner, face, _ = corner_triangles(network.cell_arrays.faces)
     signed = signed_cell_areas(corner, positions)
-    faces = len(surface.faces)
-    flat = np.bincount(face, weight * signed, minlength=faces)
-    body = np.bincount(face, cells.area, minlength=faces)
+    flat, body = face_areas(network, positions)
     border = he.count == 1
     border_space, border_plane = in_space[border].sum(), in_plane[border].sum()
     return LayoutErrors(
@@ -144,6 +142,16 @@ def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArra
         boundary_error=float(abs(border_plane - border_space) / border_space),
         flipped_faces=len(np.unique(face[signed <= 0])),
     )
+
+
+def face_areas(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """#F each, the faces' areas in a layout (#V by 2 [m]), negative where mirrored, and on the body [m2]."""
+    cells = network.cell_arrays
+    corner, face, weight = corner_triangles(cells.faces)
+    faces = len(network.surface.faces)
+    flat = np.bincount(face, weight * signed_cell_areas(corner, positions), minlength=faces)
+    body = np.bincount(face, cells.area, minlength=faces)
+    return np.asarray(flat, dtype=np.float64), np.asarray(body, dtype=np.float64)
 
 
 def _lengths(points: FloatArray, edges: NDArray[np.int32]) -> FloatArray:

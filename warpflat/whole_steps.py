@@ -169,8 +169,6 @@ def relax_whole(
         if call is not None:
             call(state, state.last.total, float(state.last.residual.max()))
 
-    free = state.last.potential <= state.negligible_energy
-    state.last = replace(state.last, at_rest=state.last.at_rest | free)
     if not state.last.at_rest.all():
         state.hold_upright()
         state.evaluate_at_rest()

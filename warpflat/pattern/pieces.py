@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -11,6 +13,9 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError, nearest
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 from warpflat.words import size_words
+
+if TYPE_CHECKING:
+    import shapely
 
 __all__ = [
     "DEFAULT_ALLOWANCE",
@@ -33,6 +38,8 @@ EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
 SAME_POINT = 1e-6
 #: How far [m] an edge on the fold of the cloth may stray from straight.
 FOLD_STRAIGHT = 5e-4
+# As Shapely tells a place: "Self-intersection[0.036 0.674]".
+_PLACE = re.compile(r"\[(\S+) (\S+)\]")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -373,9 +380,20 @@ def _check_outline(piece: Piece, where: str) -> None:
         raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
     polygon = shapely.Polygon(outline)
     if not polygon.is_valid or polygon.area <= 0:
-        raise InputError(f"{where}: the outline crosses itself ({shapely.is_valid_reason(polygon)} [m])")
+        raise InputError(f"{where}: the outline {_amiss(polygon)}")
     if not polygon.exterior.is_ccw:
         raise InputError(f"{where}: the outline runs clockwise; list its edges counter-clockwise")
+
+
+def _amiss(polygon: shapely.Polygon) -> str:
+    """What keeps a closed line from being an outline, and what to do about it."""
+    import shapely
+
+    if polygon.length <= 0 or polygon.convex_hull.area <= 1e-9 * polygon.length**2:
+        return "encloses no area"
+    place = _PLACE.search(shapely.is_valid_reason(polygon))
+    at = "" if place is None else f" at ({1e3 * float(place[1]):.1f}, {1e3 * float(place[2]):.1f}) mm in the plane"
+    return f"crosses itself{at}: flat, the piece lies over itself there; cut it apart, so that no piece does"
 
 
 def _check_straight(edge: Edge, where: str) -> None:
