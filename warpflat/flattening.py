@@ -20,7 +20,7 @@ from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, chosen_datum, develop
 from warpflat.errors import InputError, expect, expect_callback, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric
-from warpflat.heap import give_back
+from warpflat.heap import give_back_of
 from warpflat.membrane import Model, check_model
 from warpflat.network import SpringNetwork
 from warpflat.opened import Opened, opened_faces
@@ -39,9 +39,6 @@ __all__ = ["Flattening", "Progress", "Stage", "flatten"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-
-# On the way to the network of more triangles so much is freed that giving it back is worth a twentieth of the time.
-_MUCH_IS_FREED = 50_000
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -361,11 +358,12 @@ def start(
         model=settings.model,
         wear=settings.wear,
     )
+    give_back_of(surface)
     with levels_meanwhile(surface) if settings.options.solver == "multilevel" else nullcontext():
         development = run.let_go(develop(surface, line))
+    give_back_of(surface)
     network = run.network_at(development.positions)
-    if len(surface.vertices) > _MUCH_IS_FREED and not surface.is_quad.all():
-        give_back()
+    give_back_of(surface)
     return Started(
         run=run,
         datum_name=line_name,

@@ -16,6 +16,7 @@ from scipy.sparse import block_diag, csr_array
 
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
+from warpflat.heap import give_back_of
 from warpflat.joined import join_networks
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, record
@@ -154,6 +155,7 @@ class Levels:
         ladders = [
             rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
         ]
+        give_back_of(finest.network.surface)
         depth = max(len(rungs) for rungs in ladders)
         for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
