@@ -138,32 +138,24 @@ def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeyp
 
 
 @pytest.mark.skipif(os.name != "posix", reason="only POSIX has signals that can be handled")
-def test_terminating_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
-    def terminate(*_: object) -> None:
-        os.kill(os.getpid(), signal.SIGTERM)
-
-    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", terminate)
+@pytest.mark.parametrize(
+    ("name", "code", "told"),
+    [("SIGTERM", 143, "warpflat: terminated\n"), ("SIGHUP", 129, "")],
+    ids=["terminated", "terminal closed"],
+)
+def test_a_signal_that_ends_a_run_leaves_no_half_file(
+    warpflat: Run, monkeypatch: pytest.MonkeyPatch, name: str, code: int, told: str
+):
+    number = getattr(signal, name)
+    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), number))
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     # Whatever it was before is what it is again.
-    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    before = signal.signal(number, signal.SIG_DFL)
     try:
-        assert warpflat("run", "cap.toml") == (143, "", "warpflat: terminated\n")
-        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        assert warpflat("run", "cap.toml") == (code, "", told)
+        assert signal.getsignal(number) is signal.SIG_DFL
     finally:
-        signal.signal(signal.SIGTERM, before)
-    assert not Path("out").exists()
-
-
-@pytest.mark.skipif(os.name != "posix", reason="only POSIX has terminals that hang up")
-def test_a_terminal_that_is_closed_leaves_no_half_file(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
-    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), signal.SIGHUP))
-    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
-    before = signal.signal(signal.SIGHUP, signal.SIG_DFL)
-    try:
-        assert warpflat("run", "cap.toml") == (129, "", "")
-        assert signal.getsignal(signal.SIGHUP) is signal.SIG_DFL
-    finally:
-        signal.signal(signal.SIGHUP, before)
+        signal.signal(number, before)
     assert not Path("out").exists()
 
 

@@ -114,7 +114,7 @@ class _Cycles:
 
 
 def levels_pay(network: SpringNetwork) -> bool:
-    """Whether cycles take less work than plain steps: always but for a soft cloth on a small mesh of triangles."""
+    """Whether cycles take less work than plain or whole steps: always but for a soft cloth on a small mesh of triangles."""
     if network.surface.is_quad.all():
         return True
     return network.vertex_count > _FEW or network.fabric.softness < _SOFT

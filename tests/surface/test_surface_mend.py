@@ -11,6 +11,7 @@ from surface_meshes import check_invariants, cylinder, grid, scattered
 
 from warpflat.errors import InputError
 from warpflat.surface import border_loops, degenerate_faces, make_surface, read_surface, triangulate
+from warpflat.surface.polygons import _quad_corners, crossed_quads
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")
@@ -429,3 +430,17 @@ def test_real_shirt_front_has_its_welded_vertices():
     assert surface.vertices.shape == (3743, 3)
     assert len(surface.faces) == 7177
     assert surface.notes == ()
+
+
+@pytest.mark.parametrize("spread", [0.02, 0.3, 1.0])
+def test_crossed_quads_are_those_that_a_look_at_every_quad_finds(spread: float):
+    rng = np.random.default_rng(5)
+    corners = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.0], [0.0, 1.0, 0.0]])
+    vertices = (corners + rng.normal(scale=spread, size=(2000, 4, 3))).reshape(-1, 3)
+    vertices[:400:8] = vertices[2:402:8]  # some without any area
+    faces = np.arange(8000, dtype=np.int32).reshape(-1, 4)
+    faces[::7, 3] = -1
+    quads = np.flatnonzero(faces[:, 3] >= 0)
+    expected = quads[_quad_corners(vertices[faces[quads]], 1e-3)[3]]
+    assert len(expected) or spread < 0.1
+    np.testing.assert_array_equal(crossed_quads(vertices, faces), expected)

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.surface.vectors import cross, dot, points_at
 
 __all__ = [
     "crossed_quads",
@@ -193,7 +194,18 @@ def split_non_convex_quads(
 def crossed_quads(vertices: NDArray[np.float64], faces: NDArray[np.int32], tolerance: float = 1e-3) -> NDArray[np.intp]:
     """Which faces (#F by 4) are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
-    return quads[_quad_corners(vertices[faces[quads]], tolerance)[3]]
+    doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]
+    return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
+
+
+def _may_cross(vertices: NDArray[np.float64], quads: NDArray[np.int32], tolerance: float) -> NDArray[np.bool_]:
+    """#Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
+    p = points_at(vertices, quads.T)
+    side, diagonal = np.roll(p, -1, axis=1) - p, p[:, 2:] - p[:, :2]
+    normal = cross(diagonal[:, 0], diagonal[:, 1])
+    turning = dot(cross(np.roll(side, 1, axis=1), side), normal[:, None])
+    longest = dot(side, side).max(axis=0) * dot(diagonal, diagonal).max(axis=0)
+    return np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))
 
 
 def _quad_corners(p: NDArray[np.float64], tolerance: float) -> tuple[NDArray[Any], ...]:
