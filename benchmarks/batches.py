@@ -50,10 +50,11 @@ def main() -> None:
     parser.add_argument("--shapes", nargs="+", choices=["dome", "bodice"], default=["dome", "bodice"])
     parser.add_argument("--fabric", default="woven")
     parser.add_argument("--triangles", action="store_true")
+    parser.add_argument("--device", default="cpu", help="of Warp, such as cuda:0")
     parser.add_argument("--repeats", type=int, default=3)
     chosen = parser.parse_args()
     wp.config.quiet = True
-    given = {"fabric": chosen.fabric, "datum": "centre", "device": "cpu"}
+    given = {"fabric": chosen.fabric, "datum": "centre", "device": chosen.device}
     warpflat.flatten_all(sizes_of("dome", 200, chosen.triangles), **given)
     for size in chosen.sizes:
         for shape in chosen.shapes:

@@ -89,6 +89,7 @@ def main() -> None:
     parser.add_argument("--sizes", type=int, nargs="+", default=[10_000], metavar="VERTICES")
     parser.add_argument("--shapes", nargs="+", choices=["dome", "bodice"], default=["dome", "bodice"])
     parser.add_argument("--kinds", nargs="+", choices=["grid", "irregular"], default=["grid", "irregular"])
+    parser.add_argument("--device", default="cpu", help="of Warp, such as cuda:0")
     parser.add_argument("--repeats", type=int, default=5)
     chosen = parser.parse_args()
     wp.config.quiet = True
@@ -97,7 +98,7 @@ def main() -> None:
         for kind in chosen.kinds:
             for shape in chosen.shapes:
                 mesh = KINDS[kind](shape, size)
-                given = {"fabric": CLOTH, "datum": mesh.datum, "device": "cpu"}
+                given = {"fabric": CLOTH, "datum": mesh.datum, "device": chosen.device}
                 start = warpflat.flatten(mesh.surface, **given)
                 count = len(mesh.surface.vertices)
                 print(f"{mesh.name}, {count:,} vertices")

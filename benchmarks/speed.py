@@ -66,6 +66,8 @@ OURS: dict[str, dict[str, Any]] = {
 _MOST_VERTICES = {"L-BFGS": 200_000, "SLIM": 200_000, "LSCM": 200_000, "warpflat plain": 50_000}
 
 
+# A Warp device, and threads of the CPU if that is it.
+Place = tuple[str, int | None]
 # Energy [J], seconds since the beginning, and work units, as the callback sees them.
 Look = tuple[float, float, float]
 
@@ -98,10 +100,16 @@ class Row:
     area_error: float = math.nan
     flips: int = -1
     folds: bool = False
+    device: str = "cpu"
     threads: int | None = None
     memory_bytes: float | None = None
     bytes_per_second: float | None = None
     failure: str = ""
+
+    @property
+    def place(self) -> Place:
+        """Where ours ran."""
+        return self.device, self.threads
 
 
 @dataclass(kw_only=True)
@@ -111,16 +119,16 @@ class Runner:
     mesh: Mesh
     repeats: int
     limit: float
-    threads: Sequence[int]
+    places: Sequence[Place]
 
     def rows(self, peers: Sequence[str], ours: Sequence[str]) -> list[Row]:
         """One for each solver and start, with the seconds to the common target."""
         size = len(self.mesh.surface.vertices)
         rows, flat = [], None
         for name in ours:
-            for threads in self.threads:
+            for place in self.places:
                 if size <= _MOST_VERTICES.get(name, 10**9):
-                    row, flat = self._ours(name, threads)
+                    row, flat = self._ours(name, place)
                     rows.append(row)
         if flat is None:
             flat = _developed_only(self.mesh)
@@ -134,13 +142,13 @@ class Runner:
         )
         for row in rows:
             # One measure for everybody: our own energies were of the networks as built for each run.
-            row.energy = problem.energy.value(self._layouts[row.solver, row.threads])
+            row.energy = problem.energy.value(self._layouts[row.solver, row.place])
         runs = self._peers(problem, flat, peers)
         target = ALLOWANCE * min(
             [row.energy for row in rows if row.flips == 0] + [clock.best_energy for _, clock in runs], default=math.inf
         )
         for row in rows:
-            looks = self._looks[row.solver, row.threads]
+            looks = self._looks[row.solver, row.place]
             # Its own energies may be of springs measured in another layout; what counts is its last, by the common measure.
             scale = row.energy / looks[-1][0]
             reached = [look for look in looks if scale * look[0] <= target]
@@ -151,8 +159,10 @@ class Runner:
             rows.append(row)
         return rows
 
-    def _ours(self, name: str, threads: int) -> tuple[Row, Flattening]:
-        os.environ["WARPFLAT_THREADS"] = str(threads)
+    def _ours(self, name: str, place: Place) -> tuple[Row, Flattening]:
+        device, threads = place
+        if threads is not None:
+            os.environ["WARPFLAT_THREADS"] = str(threads)
         best: tuple[float, Flattening, list[Look]] | None = None
         for _ in range(self.repeats):
             looks: list[Look] = []
@@ -164,7 +174,7 @@ class Runner:
                 looks.append((at.spring_energy + at.guard_energy, now() - begun, at.work_units))
 
             flat = warpflat.flatten(
-                surface, fabric=CLOTH, datum=self.mesh.datum, device="cpu", callback=look, **OURS[name]
+                surface, fabric=CLOTH, datum=self.mesh.datum, device=device, callback=look, **OURS[name]
             )
             seconds = now() - begun
             if best is None or seconds < best[0]:
@@ -172,8 +182,8 @@ class Runner:
         assert best is not None
         seconds, flat, looks = best
         last = flat.stages[-1]
-        self._looks[name, threads] = [*looks, (last.potential_j, seconds, last.work_units)]
-        self._layouts[name, threads] = flat.positions
+        self._looks[name, place] = [*looks, (last.potential_j, seconds, last.work_units)]
+        self._layouts[name, place] = flat.positions
         errors = layout_errors(flat.network.surface, flat.network, flat.positions)
         relaxing = sum(stage.seconds for stage in flat.stages if stage.name != "develop")
         units = sum(stage.work_units for stage in flat.stages)
@@ -190,6 +200,7 @@ class Runner:
                 area_error=errors.area_error,
                 flips=errors.flipped_faces,
                 folds=errors.flipped_faces > 0,
+                device=device,
                 threads=threads,
                 memory_bytes=buffer_bytes(flat.network),
                 bytes_per_second=step_bytes(flat.network) * units / max(relaxing, 1e-9),
@@ -254,8 +265,8 @@ class Runner:
         return row
 
     def __post_init__(self) -> None:
-        self._layouts: dict[tuple[str, int | None], FloatArray] = {}
-        self._looks: dict[tuple[str, int | None], list[Look]] = {}
+        self._layouts: dict[tuple[str, Place], FloatArray] = {}
+        self._looks: dict[tuple[str, Place], list[Look]] = {}
 
 
 _PEERS: dict[str, Solver] = {"majorize": majorize_with("SuperLU"), "ARAP": arap, "SLIM": slim, "L-BFGS": lbfgs}
@@ -289,7 +300,9 @@ def print_rows(rows: Sequence[Row]) -> None:
         f"{head[7]:>11s} {head[8]:>7s} {head[9]:>7s} {head[10]:>6s}  notes"
     )
     for row in rows:
-        name = row.solver if row.threads is None else f"{row.solver}, {row.threads} thr."
+        name = row.solver
+        if name in OURS:
+            name += f", {row.device}" if row.threads is None else f", {row.threads} thr."
         notes = [row.failure] if row.failure else []
         if row.folds:
             notes.append("folds later" if row.flips == 0 else "folds")
@@ -326,6 +339,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--solvers", nargs="*", choices=list(OURS), default=list(OURS), help="of ours")
     parser.add_argument("--peers", nargs="*", choices=list(_PEERS), default=list(_PEERS))
     parser.add_argument("--threads", type=int, nargs="+", default=None, help="numbers of threads to run ours with")
+    parser.add_argument("--devices", nargs="+", default=["cpu"], help="of Warp, to run ours on, such as cpu cuda:0")
     parser.add_argument("--repeats", type=int, default=3, help="the fastest counts")
     parser.add_argument("--limit", type=float, default=60.0, help="seconds that a peer may take")
     parser.add_argument(
@@ -356,14 +370,20 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]
     if "real" in chosen.kinds:
         makers += [lambda mesh=mesh: mesh for mesh in real_meshes()]
+    places: list[Place] = []
+    for device in chosen.devices:
+        places += [(device, count) for count in threads] if device == "cpu" else [(device, None)]
+        if device != "cpu":
+            print(f"{device}: {wp.get_device(device).name}")
     # Kernels are compiled and loaded before anything is timed.
-    warm = KINDS["irregular"]("dome", 200)
-    for name in chosen.solvers:
-        warpflat.flatten(warm.surface, fabric=CLOTH, datum=warm.datum, device="cpu", **OURS[name])
+    for warm in (KINDS[kind]("dome", 200) for kind in KINDS):
+        for name in chosen.solvers:
+            for device in chosen.devices:
+                warpflat.flatten(warm.surface, fabric=CLOTH, datum=warm.datum, device=device, **OURS[name])
     every: list[Row] = []
     for make in makers:
         mesh = make()
-        rows = Runner(mesh=mesh, repeats=chosen.repeats, limit=chosen.limit, threads=threads).rows(
+        rows = Runner(mesh=mesh, repeats=chosen.repeats, limit=chosen.limit, places=places).rows(
             chosen.peers, chosen.solvers
         )
         if chosen.memory:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
+from devices import DEVICE
 from scipy.spatial import cKDTree
 
 import warpflat
@@ -56,7 +57,7 @@ def outline_difference(one: Flattening, other: Flattening) -> float:
 
 def check(surfaces: Sequence[Surface], **options: object) -> list[Flattening]:
     """That all at once give what one after the other do."""
-    given = {"fabric": CLOTH, "datum": "centre", "device": "cpu", **options}
+    given = {"fabric": CLOTH, "datum": "centre", "device": DEVICE, **options}
     batch = flatten_all(surfaces, **given)
     assert len(batch) == len(surfaces)
     for surface, piece in zip(surfaces, batch, strict=True):
@@ -125,16 +126,16 @@ def test_the_membrane_worn_stretched():
 
 def test_repeated_pieces_are_as_alone_bit_for_bit():
     """Nothing of one piece gets to another: of the same three each is what one alone is."""
-    alone = flatten(shape("dome", 21), fabric=CLOTH, datum="centre", device="cpu")
-    for piece in flatten_all([shape("dome", 21) for _ in range(3)], fabric=CLOTH, datum="centre", device="cpu"):
+    alone = flatten(shape("dome", 21), fabric=CLOTH, datum="centre", device=DEVICE)
+    for piece in flatten_all([shape("dome", 21) for _ in range(3)], fabric=CLOTH, datum="centre", device=DEVICE):
         np.testing.assert_allclose(piece.positions, alone.positions, atol=1e-12)
         assert piece.stages[-1].steps == alone.stages[-1].steps
 
 
 def test_a_piece_of_a_batch_can_be_cut():
     surfaces = [shape("dome", 21), shape("bodice", 17)]
-    piece = flatten_all(surfaces, fabric=CLOTH, datum="centre", device="cpu")[0]
-    alone = flatten(surfaces[0], fabric=CLOTH, datum="centre", device="cpu")
+    piece = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE)[0]
+    alone = flatten(surfaces[0], fabric=CLOTH, datum="centre", device=DEVICE)
     path = np.arange(21 * 21, dtype=np.int32).reshape(21, 21)[:12, 6]
     plan = CutPlan(name="dart", paths=(path,))
     assert potential(cut(piece, plan)) == pytest.approx(potential(cut(alone, plan)), rel=1e-3)
@@ -143,7 +144,7 @@ def test_a_piece_of_a_batch_can_be_cut():
 def test_datums_of_their_own_and_a_chosen_one():
     surfaces = [shape("dome", 13), shape("bodice", 13)]
     line = surfaces[1].lines["centre"]
-    given, chosen = flatten_all(surfaces[::-1], fabric=CLOTH, datum=[line, None], device="cpu")
+    given, chosen = flatten_all(surfaces[::-1], fabric=CLOTH, datum=[line, None], device=DEVICE)
     np.testing.assert_array_equal(given.datum, line)
     assert chosen.notes[-1].startswith("datum chosen")
 
@@ -158,7 +159,7 @@ def test_what_is_told_on_the_way():
         layouts[number].append(progress.positions())
         assert progress.face_energy_density().shape == (len(surfaces[number].faces),)
 
-    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device="cpu", callback=hear)
+    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE, callback=hear)
     for number, piece in enumerate(batch):
         assert told[number][0].stage == "develop"
         assert told[number][0].step == 0
@@ -172,7 +173,7 @@ def test_what_is_told_on_the_way():
 
 def test_a_work_limit_is_told_of_those_that_met_it():
     surfaces = [shape("bodice", 33), make_surface(*flat_sheet(), lines={"centre": np.arange(4, 49, 9)})]
-    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device="cpu", relax=RelaxOptions(max_steps=20))
+    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=20))
     assert [piece.converged for piece in batch] == [False, True]
 
 
@@ -190,19 +191,19 @@ def test_nothing_is_nothing():
 def test_what_is_wrong_with_a_piece_is_told_with_its_name():
     surfaces = [shape("dome", 9), shape("bodice", 9)]
     with pytest.raises(InputError, match=r"piece 'bodice 1' has no line 'center' for its datum; did you mean 'centre'"):
-        flatten_all(surfaces, datum=["centre", "center"], device="cpu")
+        flatten_all(surfaces, datum=["centre", "center"], device=DEVICE)
     with pytest.raises(InputError, match=r"^vertex 5000 does not exist in 'bodice 1'"):
-        flatten_all(surfaces, datum=["centre", [0, 5000]], device="cpu")
+        flatten_all(surfaces, datum=["centre", [0, 5000]], device=DEVICE)
     with pytest.raises(
         InputError, match=r"^piece 'bodice 1' \(surface 1\): a line needs at least two different vertices"
     ):
-        flatten_all(surfaces, datum=["centre", [3, 3]], device="cpu")
+        flatten_all(surfaces, datum=["centre", [3, 3]], device=DEVICE)
     with pytest.raises(InputError, match=r"datum has 1 entries for 2 surfaces"):
-        flatten_all(surfaces, datum=["centre"], device="cpu")
+        flatten_all(surfaces, datum=["centre"], device=DEVICE)
     with pytest.raises(InputError, match=r"^unknown fabric 'wooven'"):
-        flatten_all(surfaces, fabric="wooven", datum="centre", device="cpu")
+        flatten_all(surfaces, fabric="wooven", datum="centre", device=DEVICE)
     with pytest.raises(InputError, match=r"^relax: max_steps = 0"):
-        flatten_all(surfaces, relax=RelaxOptions(max_steps=0), datum="centre", device="cpu")
+        flatten_all(surfaces, relax=RelaxOptions(max_steps=0), datum="centre", device=DEVICE)
 
 
 def test_it_is_offered_beside_flatten():
@@ -216,7 +217,7 @@ def test_it_is_offered_beside_flatten():
 def networks(**options: object) -> list[SpringNetwork]:
     surfaces = [shape("dome", 9, triangles=True), shape("bodice", 7), shape("saddle", 8, triangles=True)]
     return [
-        SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device="cpu", **options) for surface in surfaces
+        SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE, **options) for surface in surfaces
     ]
 
 
@@ -252,7 +253,7 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, s
                 part.surface,
                 CLOTH,
                 part.surface.vertices[:, :2],
-                device="cpu",
+                device=DEVICE,
                 model=model,
                 stretch=np.full((len(part.surface.faces), 2), 1.02 + 0.01 * number),
             )
@@ -277,8 +278,8 @@ def test_pieces_brake_each_on_its_own():
     surfaces = [shape("dome", 9), shape("bodice", 11), shape("saddle", 9)]
     parts, starts = [], []
     for surface in surfaces:
-        starts.append(1.1 * flatten(surface, fabric=CLOTH, datum="centre", device="cpu").development.positions)
-        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device="cpu"))
+        starts.append(1.1 * flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
+        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
     joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
     alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
     joined.sweep(60)
@@ -290,7 +291,7 @@ def test_pieces_brake_each_on_its_own():
 
 def test_levels_of_unlike_pieces_are_joined():
     surfaces = [shape("dome", 33), shape("dome", 9), shape("bodice", 21)]
-    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device="cpu") for each in surfaces]
+    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
     start = np.concatenate([each.vertices[:, :2] for each in surfaces])
     levels = Levels(Relaxation(join_networks(parts), RelaxOptions(), start=start))
     # The dome of 9 by 9 has none, and stays, as the bodice's of 11 by 11 does.
@@ -301,8 +302,8 @@ def test_pieces_that_leave_are_given_back():
     surfaces = [shape("dome", 13), shape("bodice", 15)]
     parts, starts = [], []
     for surface in surfaces:
-        starts.append(flatten(surface, fabric=CLOTH, datum="centre", device="cpu").development.positions)
-        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device="cpu"))
+        starts.append(flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
+        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
     whole = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
     outcome = relax(whole)
     assert outcome.converged
@@ -322,7 +323,7 @@ def test_pieces_that_leave_are_given_back():
 
 def test_pieces_that_are_done_are_cycled_no_more():
     surfaces = [shape("dome", 13), shape("bodice", 13), shape("saddle", 13), shape("dome", 13, size=0.8)]
-    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device="cpu") for each in surfaces]
+    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
     start = np.concatenate([each.vertices[:, :2] for each in surfaces])
     state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
     state.begin()
@@ -338,9 +339,9 @@ def test_pieces_that_are_done_are_cycled_no_more():
 
 def test_what_is_cycled_apart_comes_to_the_same_minimum(monkeypatch: pytest.MonkeyPatch):
     surfaces = [shape("bodice", 33), shape("dome", 17), shape("bodice", 17, size=1.2)]
-    starts = [flatten(each, fabric="woven", datum="centre", device="cpu").development.positions for each in surfaces]
+    starts = [flatten(each, fabric="woven", datum="centre", device=DEVICE).development.positions for each in surfaces]
     parts = [
-        SpringNetwork.build(each, find_fabric("woven"), start, device="cpu")
+        SpringNetwork.build(each, find_fabric("woven"), start, device=DEVICE)
         for each, start in zip(surfaces, starts, strict=True)
     ]
     energies = []

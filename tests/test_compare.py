@@ -9,6 +9,7 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 from warpflat.cli import main
 from warpflat.compare import Comparison, compare_fabrics, comparison_table, outline, save_comparison
@@ -25,7 +26,9 @@ def scene_in(folder: Path, text: str = TEXT) -> Scene:
 
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory: pytest.TempPathFactory) -> Comparison:
-    return compare_fabrics(scene_in(tmp_path_factory.mktemp("compare")), ["denim", "jersey", "power-net"], device="cpu")
+    return compare_fabrics(
+        scene_in(tmp_path_factory.mktemp("compare")), ["denim", "jersey", "power-net"], device=DEVICE
+    )
 
 
 def test_fabrics_are_compared_with_the_first(comparison: Comparison):
@@ -167,11 +170,11 @@ formats = []
 def test_all_else_is_what_a_run_makes_in_that_fabric(tmp_path: Path, text: str, pieces: list[str]):
     """Seams, constraints and the legs of darts included."""
     scene = scene_in(tmp_path, text)
-    found = compare_fabrics(scene, ["denim", "jersey"], device="cpu")
+    found = compare_fabrics(scene, ["denim", "jersey"], device=DEVICE)
     assert found.pieces == pieces
     for fabric in found.fabrics:
         run = replace(scene, settings=scene.settings.model_copy(update={"fabric": fabric}))
-        metrics = run_scene(run, tmp_path / fabric, device="cpu").metrics
+        metrics = run_scene(run, tmp_path / fabric, device=DEVICE).metrics
         for name in pieces:
             rows = (tmp_path / fabric / f"{name}.obj").read_text().splitlines()
             flat = np.array([row.split()[1:] for row in rows if row.startswith("vt ")], dtype=float)

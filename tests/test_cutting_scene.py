@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 from warpflat.cli import main
 from warpflat.cutting import CutPlan, cut_surfaces
@@ -157,7 +158,7 @@ def test_a_tube_that_cuts_are_to_open_is_told_what_opens_it(tmp_path: Path):
         run_scene(made, tmp_path / "out")
     tube = read_surface(tmp_path / "tube.obj", units="m")
     (open_tube,) = cut_surfaces(tube, [CutPlan(name="x", paths=(line_between(tube, 0, 48),))])
-    flat = flatten(open_tube, device="cpu")
+    flat = flatten(open_tube, device=DEVICE)
     assert flat.converged
     assert flat.measures["length_error"] < 1e-3
 

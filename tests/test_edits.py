@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 from warpflat.cutting import CutPlan, cut
 from warpflat.edits import change_fabric, change_surface
@@ -40,11 +41,11 @@ def moved(surface: Surface) -> Surface:
 @pytest.mark.parametrize("triangles", [False, True])
 def test_changing_the_fabric_gives_what_flattening_in_it_gives(triangles: bool):
     surface = make_shape("bodice", resolution=33, triangles=triangles)
-    first = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
+    first = flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE)
     stages: list[str] = []
     fabric = replace(cloth(250.0), name="softer cloth")
     changed = change_fabric(first, fabric, callback=lambda at: stages.append(at.stage))
-    fresh = flatten(surface, fabric=fabric, datum="centre", device="cpu")
+    fresh = flatten(surface, fabric=fabric, datum="centre", device=DEVICE)
     assert changed.converged
     assert changed.flipped_faces == 0
     assert changed.fabric is fabric
@@ -69,8 +70,8 @@ def apart(first: Flattening, second: Flattening) -> float:
 def test_a_cloth_of_other_threads_gives_what_flattening_in_it_gives(before: str, after: str, triangles: bool):
     """Springs between triangles are of the directions in which they lie, and another cloth turns them."""
     surface = make_shape("bodice", resolution=25, triangles=triangles)
-    changed = change_fabric(flatten(surface, fabric=before, datum="centre", device="cpu"), after)
-    fresh = flatten(surface, fabric=after, datum="centre", device="cpu")
+    changed = change_fabric(flatten(surface, fabric=before, datum="centre", device=DEVICE), after)
+    fresh = flatten(surface, fabric=after, datum="centre", device=DEVICE)
     assert changed.converged
     assert minimum(changed) == pytest.approx(minimum(fresh), rel=3e-3)
     assert apart(changed, fresh) < 2e-4
@@ -86,7 +87,7 @@ def test_a_cloth_of_other_threads_gives_what_flattening_in_it_gives(before: str,
 def test_a_tight_pattern_is_measured_where_it_lies(wear: Wear, model: Model, triangles: bool):
     """Threads are shortened along where they run in the end: a pattern that goes on in its own cloth stays."""
     surface = make_shape("bodice", resolution=25, triangles=triangles)
-    first = flatten(surface, fabric="power-net", datum="centre", wear=wear, model=model, device="cpu")
+    first = flatten(surface, fabric="power-net", datum="centre", wear=wear, model=model, device=DEVICE)
     again = change_fabric(first, "power-net")
     assert first.converged
     assert minimum(again) == pytest.approx(minimum(first), rel=3e-3)
@@ -98,7 +99,7 @@ def test_a_tight_pattern_is_measured_where_it_lies(wear: Wear, model: Model, tri
 def test_a_moved_surface_gives_what_flattening_it_afresh_gives(triangles: bool, with_cut: bool):
     surface = make_shape("bodice", resolution=33, triangles=triangles)
     plan = CutPlan(name="dart", paths=(np.arange(33 * 33, dtype=np.int32).reshape(33, 33)[:14, 10],))
-    given = {"fabric": cloth(200.0), "datum": "centre", "device": "cpu"}
+    given = {"fabric": cloth(200.0), "datum": "centre", "device": DEVICE}
     first = flatten(surface, **given)
     first = cut(first, plan) if with_cut else first
     other, stages = moved(surface), set[str]()
@@ -123,7 +124,7 @@ def test_a_moved_surface_gives_what_flattening_it_afresh_gives(triangles: bool, 
 
 @pytest.fixture(scope="module")
 def dome() -> Flattening:
-    return flatten(make_shape("dome", resolution=9), datum="centre", device="cpu")
+    return flatten(make_shape("dome", resolution=9), datum="centre", device=DEVICE)
 
 
 def test_moved_vertices_alone_are_the_same_mesh(dome: Flattening):
@@ -187,7 +188,7 @@ def test_quads_whose_sides_cross_are_refused_as_in_flattening(dome: Flattening, 
 
 
 def test_the_note_on_a_chosen_datum_is_of_the_surface_as_it_is_now():
-    first = flatten(make_shape("dome", resolution=9), device="cpu")
+    first = flatten(make_shape("dome", resolution=9), device=DEVICE)
     after = change_surface(first, 1.5 * first.surface.vertices)
     assert [note for note in first.notes if "53.0 cm" in note]
     assert [note for note in after.notes if note.startswith("datum chosen")] == [
@@ -206,7 +207,7 @@ def test_what_a_file_has_several_times_at_one_place_moves_together(as_surface: b
     assert len(read.input_vertices) > len(read.vertices)
     vertices = read.vertices * [1.0, 1.2, 1.0]
     given = replace(read, vertices=vertices) if as_surface else vertices
-    after = change_surface(flatten(read, device="cpu"), given)
+    after = change_surface(flatten(read, device=DEVICE), given)
     np.testing.assert_allclose(after.surface.input_vertices, read.input_vertices * [1.0, 1.2, 1.0], atol=1e-12)
 
 
@@ -219,7 +220,7 @@ def test_what_is_no_fabric_is_told(dome: Flattening, fabric: Any):
 
 
 def test_another_mesh_is_refused():
-    first = flatten(make_shape("dome", resolution=9), datum="centre", device="cpu")
+    first = flatten(make_shape("dome", resolution=9), datum="centre", device=DEVICE)
     for other in (make_shape("dome", resolution=11), make_shape("dome", resolution=9, triangles=True)):
         with pytest.raises(InputError, match=r"another mesh .* flatten it afresh"):
             change_surface(first, other)

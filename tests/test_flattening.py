@@ -13,6 +13,7 @@ import hypothesis
 import numpy as np
 import pytest
 import trimesh
+from devices import DEVICE
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -49,7 +50,7 @@ def polygon_areas(points: FloatArray, faces: NDArray[np.int32]) -> FloatArray:
 
 @pytest.fixture(scope="module")
 def dome() -> Flattening:
-    return flatten(make_shape("dome", resolution=17), fabric=cloth(200.0), datum="centre", device="cpu")
+    return flatten(make_shape("dome", resolution=17), fabric=cloth(200.0), datum="centre", device=DEVICE)
 
 
 # --- measures
@@ -101,7 +102,7 @@ def test_springs_and_membrane_agree_on_the_energy_that_is_left():
     """Two discretisations of the same cloth: nearer the finer the mesh."""
     far = []
     for resolution in (9, 33):
-        piece = flatten(make_shape("saddle", resolution=resolution), fabric=cloth(200.0), datum="centre", device="cpu")
+        piece = flatten(make_shape("saddle", resolution=resolution), fabric=cloth(200.0), datum="centre", device=DEVICE)
         far.append(abs(piece.measures["strain_energy_j"] / piece.measures["spring_energy_j"] - 1))
     assert far[1] < 0.25
     assert far[1] < far[0] + 0.02
@@ -122,7 +123,7 @@ def test_the_pattern_stands_on_its_datum(dome: Flattening):
 @pytest.mark.parametrize("shape", ["cylinder", "cone", "strip"])
 def test_a_piece_that_can_be_developed_keeps_every_edge(shape: str, triangles: bool):
     surface = make_shape(shape, resolution=17, triangles=triangles)
-    piece = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu")
+    piece = flatten(surface, fabric=cloth(200.0), datum="centre", device=DEVICE)
     assert piece.converged
     edges = mesh_edges(surface.faces)
     np.testing.assert_allclose(lengths(piece.positions, edges), lengths(surface.vertices, edges), rtol=1e-6)
@@ -159,7 +160,7 @@ def test_a_finer_mesh_does_not_move_the_outline(shape, shear, triangles, resolut
             make_shape(shape, resolution=resolution, triangles=triangles),
             fabric=cloth(shear),
             datum="centre",
-            device="cpu",
+            device=DEVICE,
         )
         assert piece.converged
         assert piece.flipped_faces == 0
@@ -183,7 +184,7 @@ def slit_cone(around: int, down: int) -> Surface:
 
 def test_a_first_round_that_only_turns_the_layout_leaves_steps_for_the_second():
     """A cone in a soft cloth is free of strain, and the first round went on until it was strained by 1e-9, to the step limit."""
-    flat = flatten(slit_cone(33, 17), fabric="denim", device="cpu")
+    flat = flatten(slit_cone(33, 17), fabric="denim", device=DEVICE)
     assert flat.stages[-1].converged
     assert flat.stages[-1].steps < 10_000
     assert flat.measures["length_error"] < 1e-8
@@ -194,7 +195,7 @@ def test_a_stiffer_direction_is_strained_less(triangles: bool):
     surface = make_shape("dome", resolution=13, triangles=triangles)
     strains = {}
     for weft in (1000.0, 250.0):
-        piece = flatten(surface, fabric=cloth(100.0, weft=weft), datum="centre", device="cpu")
+        piece = flatten(surface, fabric=cloth(100.0, weft=weft), datum="centre", device=DEVICE)
         assert piece.converged
         assert piece.flipped_faces == 0
         strains[weft] = np.abs(piece.worn.strain[:, :2]).mean(axis=0)
@@ -205,7 +206,7 @@ def test_a_stiffer_direction_is_strained_less(triangles: bool):
 def test_a_cylinder_keeps_its_pattern_whatever_the_cloth_and_its_grain(triangles: bool):
     surface = make_shape("cylinder", resolution=13, triangles=triangles)
     for grain_angle in (0.0, 45.0, 90.0):
-        piece = flatten(surface, fabric=cloth(50.0, weft=300.0), datum="centre", grain_angle=grain_angle, device="cpu")
+        piece = flatten(surface, fabric=cloth(50.0, weft=300.0), datum="centre", grain_angle=grain_angle, device=DEVICE)
         assert piece.converged
         assert piece.measures["length_error"] < 1e-6
 
@@ -213,7 +214,7 @@ def test_a_cylinder_keeps_its_pattern_whatever_the_cloth_and_its_grain(triangles
 def test_on_the_bias_the_same_piece_takes_another_shape():
     surface = make_shape("dome", resolution=13)
     straight, bias = (
-        flatten(surface, fabric=cloth(30.0), datum="centre", grain_angle=angle, device="cpu") for angle in (0.0, 45.0)
+        flatten(surface, fabric=cloth(30.0), datum="centre", grain_angle=angle, device=DEVICE) for angle in (0.0, 45.0)
     )
     assert bias.converged
     assert bias.flipped_faces == 0
@@ -225,14 +226,14 @@ def test_on_the_bias_the_same_piece_takes_another_shape():
 
 def test_a_quarter_turn_of_the_grain_swaps_warp_and_weft():
     surface = make_shape("saddle", resolution=13)
-    turned = flatten(surface, fabric=cloth(100.0, weft=400.0), datum="centre", grain_angle=90.0, device="cpu")
+    turned = flatten(surface, fabric=cloth(100.0, weft=400.0), datum="centre", grain_angle=90.0, device=DEVICE)
     swapped = flatten(
         surface,
         fabric=Fabric(
             name="swapped", stiffness_warp=400.0, stiffness_weft=1000.0, shear_stiffness=100.0, areal_density=0.15
         ),
         datum="centre",
-        device="cpu",
+        device=DEVICE,
     )
     assert turned.measures["spring_energy_j"] == pytest.approx(swapped.measures["spring_energy_j"], rel=1e-9)
     np.testing.assert_allclose(turned.worn.strain[:, [1, 0]], swapped.worn.strain[:, :2], atol=1e-9)
@@ -250,7 +251,7 @@ def test_the_callback_sees_the_development_and_every_step():
             assert progress.positions().shape == (81, 2)
             assert progress.face_energy_density().shape == (64,)
 
-    piece = flatten(make_shape("dome", resolution=9), fabric=cloth(200.0), datum="centre", device="cpu", callback=look)
+    piece = flatten(make_shape("dome", resolution=9), fabric=cloth(200.0), datum="centre", device=DEVICE, callback=look)
     assert seen[0][:2] == ("develop", 0)
     assert [step for stage, step, *_ in seen[1:] if stage == "relax"] == list(range(1, piece.stages[-1].steps + 1))
     assert seen[0][2] == pytest.approx(piece.stages[0].spring_energy_j)
@@ -263,7 +264,7 @@ def test_positions_handed_out_are_copies():
         make_shape("dome", resolution=9),
         fabric=cloth(200.0),
         datum="centre",
-        device="cpu",
+        device=DEVICE,
         callback=lambda progress: kept.append(progress.positions()),
     )
     assert not np.array_equal(kept[0], kept[1])
@@ -274,7 +275,7 @@ def test_a_step_limit_is_reported_not_hidden():
         make_shape("dome", resolution=17),
         fabric=cloth(200.0),
         datum="centre",
-        device="cpu",
+        device=DEVICE,
         relax=RelaxOptions(max_steps=12, solver="plain"),
     )
     assert not piece.converged
@@ -290,7 +291,7 @@ def test_a_limit_that_the_first_of_two_rounds_reaches_leaves_a_residual_too(solv
         make_shape("dome", resolution=17, triangles=True),
         fabric="woven",
         datum="centre",
-        device="cpu",
+        device=DEVICE,
         relax=RelaxOptions(max_steps=2, solver=solver),
     )
     residual = piece.stages[-1].residual
@@ -302,13 +303,13 @@ def test_a_limit_that_the_first_of_two_rounds_reaches_leaves_a_residual_too(solv
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
 def test_a_repeat_is_equal_bit_for_bit(triangles: bool):
     surface = make_shape("bodice", resolution=17, triangles=triangles)
-    one, two = (flatten(surface, fabric=cloth(50.0, weft=600.0), datum="centre", device="cpu") for _ in range(2))
+    one, two = (flatten(surface, fabric=cloth(50.0, weft=600.0), datum="centre", device=DEVICE) for _ in range(2))
     assert one.positions.tobytes() == two.positions.tobytes()
     assert one.history.tobytes() == two.history.tobytes()
 
 
 def test_without_a_datum_one_is_chosen_and_reported():
-    piece = flatten(make_shape("strip", resolution=17), fabric=cloth(200.0), device="cpu")
+    piece = flatten(make_shape("strip", resolution=17), fabric=cloth(200.0), device=DEVICE)
     np.testing.assert_array_equal(piece.datum, piece.surface.lines["centre"])
     assert any(note.startswith("datum chosen: along the long axis") for note in piece.notes)
 
@@ -345,14 +346,14 @@ def dome9() -> Surface:
 )
 def test_mistakes_are_told_in_one_line(arguments: dict, message: str):
     with pytest.raises(InputError, match=message) as told:
-        flatten(dome9(), **{"device": "cpu", **arguments})
+        flatten(dome9(), **{"device": DEVICE, **arguments})
     assert "\n" not in str(told.value)
 
 
 def test_a_datum_by_vertices_is_the_same_as_by_name():
     surface = dome9()
     by_name, by_vertices = (
-        flatten(surface, fabric=cloth(200.0), datum=datum, device="cpu")
+        flatten(surface, fabric=cloth(200.0), datum=datum, device=DEVICE)
         for datum in ("centre", surface.lines["centre"].tolist())
     )
     np.testing.assert_array_equal(by_name.positions, by_vertices.positions)
@@ -369,7 +370,7 @@ def test_closed_shapes_are_refused():
     right = np.roll(i, -1, axis=1)
     tube = make_surface(points, np.stack([i[:-1], right[:-1], right[1:], i[1:]], axis=-1).reshape(-1, 4))
     with pytest.raises(InputError, match=r"closed tube .*cut it open"):
-        flatten(tube, fabric=cloth(200.0), device="cpu")
+        flatten(tube, fabric=cloth(200.0), device=DEVICE)
 
 
 # --- files
@@ -379,7 +380,7 @@ def test_save_leaves_the_files_of_the_contract_and_they_read_back(tmp_path: Path
     from pxr import Usd, UsdGeom
 
     piece = flatten(
-        make_shape("hemisphere", resolution=9, opening=60.0), fabric=cloth(100.0), datum="centre", device="cpu"
+        make_shape("hemisphere", resolution=9, opening=60.0), fabric=cloth(100.0), datum="centre", device=DEVICE
     )
     files = piece.save(tmp_path / "out")
     assert sorted(files) == ["frames.usdc", "hemisphere.obj", "metrics.json", "picture.png"]
@@ -467,7 +468,7 @@ any_piece = hypothesis.settings(
 )
 def test_any_smooth_height_field_on_random_triangles_converges_unfolded(seed, steepness, waves, vertices, shear):
     surface = height_field(seed, steepness, waves, vertices, even_border=True)
-    piece = flatten(surface, fabric=cloth(shear), device="cpu")
+    piece = flatten(surface, fabric=cloth(shear), device=DEVICE)
     assert piece.flipped_faces == 0
     assert piece.converged
     assert total(piece, -1) <= total(piece, 0) * (1 + 1e-9)
@@ -483,7 +484,7 @@ def test_any_smooth_height_field_on_random_triangles_converges_unfolded(seed, st
 )
 def test_steep_ones_on_needles_stay_unfolded_even_where_they_do_not_converge(seed, steepness, waves, vertices, shear):
     surface = height_field(seed, steepness, waves, vertices, even_border=False)
-    piece = flatten(surface, fabric=cloth(shear), device="cpu", relax=RelaxOptions(max_steps=600))
+    piece = flatten(surface, fabric=cloth(shear), device=DEVICE, relax=RelaxOptions(max_steps=600))
     assert piece.flipped_faces == 0
     assert np.isfinite(piece.positions).all()
 
@@ -529,14 +530,14 @@ def test_what_is_no_surface_and_no_pattern_is_one_line():
 def test_paths_of_a_wrong_type_are_told():
     with pytest.raises(InputError, match="path is of type int; it must be that of a mesh file"):
         read_surface(3)  # type: ignore[arg-type]
-    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device="cpu")
+    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device=DEVICE)
     with pytest.raises(InputError, match="folder is of type NoneType; it must be the path of one"):
         pattern.save(None)  # type: ignore[arg-type]
 
 
 def test_a_folder_where_a_file_is_to_be_is_told_before_anything_is_written(tmp_path: Path):
     (tmp_path / "metrics.json").mkdir()
-    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device="cpu")
+    pattern = flatten(make_shape("dome", resolution=5), datum="centre", device=DEVICE)
     with pytest.raises(InputError, match=r"metrics.json is a folder, where a file is to be written; remove it"):
         pattern.save(tmp_path)
     scene = make_scene({"surface": {"shape": "dome"}}, name="dome", folder=tmp_path, where="dome.toml")

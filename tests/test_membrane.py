@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from devices import DEVICE
 from numpy.typing import NDArray
 
 import warpflat
@@ -35,7 +36,7 @@ def soft(ratio: float) -> Fabric:
 
 
 def membrane(shape: warpflat.Surface, fabric: Fabric | str, **options: object) -> warpflat.Flattening:
-    return warpflat.flatten(shape, fabric=fabric, datum="centre", model="membrane", device="cpu", **options)
+    return warpflat.flatten(shape, fabric=fabric, datum="centre", model="membrane", device=DEVICE, **options)
 
 
 def apart(a: NDArray[np.float64], b: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -78,7 +79,7 @@ def test_the_pattern_does_not_depend_on_the_start():
     options = RelaxOptions(residual_tolerance=2e-3)
     first = membrane(surface, fabric, relax=options)
     start = first.development.positions @ np.array([[1.2, 0.0], [0.15, 0.85]])
-    network = SpringNetwork.build(surface, fabric, start, model="membrane", device="cpu")
+    network = SpringNetwork.build(surface, fabric, start, model="membrane", device=DEVICE)
     datum = surface.lines["centre"]
     state = Relaxation(network, options, start=start, upright=[Upright(lower=int(datum[0]), upper=int(datum[-1]))])
     assert relax(state).converged
@@ -149,7 +150,7 @@ def test_an_unknown_model_is_refused():
 def test_real_meshes_relax_without_a_flip(scene: str, most: float):
     """The prototype of this model left 2.16 % and 5.17 %."""
     surface = scene_surface(load_scene(SCENES / f"{scene}.toml"))
-    result = warpflat.flatten(surface, fabric="isotropic", datum="centre front", model="membrane", device="cpu")
+    result = warpflat.flatten(surface, fabric="isotropic", datum="centre front", model="membrane", device=DEVICE)
     assert result.converged
     assert result.flipped_faces == 0
     assert result.measures["length_error"] < most
@@ -164,7 +165,7 @@ def test_a_piece_far_astray_at_the_start_is_flat_in_the_end_in_cloth_soft_in_she
     comb = make_surface(
         np.stack([x, y, 0.02 * np.sin(15 * x)], axis=-1).reshape(-1, 3), quads[(column % 8 != 4) | (row >= 15)]
     )
-    piece = warpflat.flatten(comb, fabric="denim", model="membrane", grain_angle=30.0, device="cpu")
+    piece = warpflat.flatten(comb, fabric="denim", model="membrane", grain_angle=30.0, device=DEVICE)
     assert piece.development.method == "harmonic"
     assert piece.converged
     assert piece.measures["spring_energy_j"] < 1e-9
@@ -181,7 +182,7 @@ def bump(height: float) -> warpflat.Surface:
 
 
 def test_faces_that_open_are_told_of_with_their_place(tmp_path: Path):
-    piece = warpflat.flatten(bump(0.25), fabric="denim", model="membrane", grain_angle=30.0, device="cpu")
+    piece = warpflat.flatten(bump(0.25), fabric="denim", model="membrane", grain_angle=30.0, device=DEVICE)
     (note,) = set(piece.measures["notes"]) - set(piece.notes)
     told = piece.measures["opened"]
     corners = piece.faces[told["face"], :3]
@@ -200,6 +201,6 @@ def test_faces_that_open_are_told_of_with_their_place(tmp_path: Path):
             "piece"
         ]["notes"]
     )
-    gentle = warpflat.flatten(bump(0.02), fabric="denim", model="membrane", grain_angle=30.0, device="cpu")
+    gentle = warpflat.flatten(bump(0.02), fabric="denim", model="membrane", grain_angle=30.0, device=DEVICE)
     assert gentle.measures["opened"] is None
     assert gentle.told == gentle.notes

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from devices import DEVICE
 from scipy.spatial import Delaunay
 
 from warpflat import flatten_all, network
@@ -62,7 +63,7 @@ def both(surface: Surface, shear: float, **options: object) -> tuple[Flattening,
         surface,
         fabric=cloth(shear),
         datum="centre",
-        device="cpu",
+        device=DEVICE,
         relax=replace(PLAIN, residual_tolerance=1e-3),
         **options,
     )
@@ -102,7 +103,7 @@ def test_the_membrane_too():
 @pytest.mark.parametrize("resolution", [51, 101])
 def test_on_a_grid_thirty_units_of_work_come_within_a_thousandth(shape: str, resolution: int):
     surface = make_shape(shape, resolution=resolution)
-    done = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = Relaxation(done.network, LEVELS, start=done.development.positions)
     seen: list[tuple[float, float]] = []
     relax_multilevel(state, watch=lambda now, energies, _: seen.append((now.work_units, energies.potential)))
@@ -134,7 +135,7 @@ def test_uneven_rows_take_sixty_units_too_and_stay_rows(shear: float):
     done = flatten(
         surface,
         fabric=cloth(shear),
-        device="cpu",
+        device=DEVICE,
         callback=lambda p: history.append((p.work_units, p.spring_energy + p.guard_energy)),
     )
     assert done.network.spring_arrays.long_quads > 4_000
@@ -158,7 +159,7 @@ def test_long_quads_take_sixty_units_too(columns: int, rows: int):
     done = flatten(
         surface,
         fabric=cloth(375.0),
-        device="cpu",
+        device=DEVICE,
         callback=lambda p: history.append((p.work_units, p.spring_energy + p.guard_energy)),
     )
     assert next(work for work, energy in history if energy <= 1.001 * minimum(done)) < 60.0
@@ -169,7 +170,7 @@ def test_long_quads_take_sixty_units_too(columns: int, rows: int):
 @pytest.mark.parametrize("kind", ["crack", "irregular"])
 def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
     surface = cracked(51, column=17) if kind == "crack" else irregular(2_500)
-    done = flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = Relaxation(done.network, LEVELS, start=done.development.positions)
     seen: list[tuple[float, float]] = []
     relax_multilevel(state, watch=lambda now, energies, _: seen.append((now.work_units, energies.potential)))
@@ -179,7 +180,7 @@ def test_elsewhere_sixty_units_come_within_a_thousandth(kind: str):
 @pytest.mark.parametrize(("height", "most"), [(0.5, 24.0), (0.8, 48.0)])
 def test_a_cut_opens_within_a_few_cycles(height: float, most: float):
     """It opens as a whole, which only the coarsest level finds out soon, and only if it goes to its end."""
-    done = flatten(make_shape("dome", resolution=51), fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(make_shape("dome", resolution=51), fabric=cloth(375.0), datum="centre", device=DEVICE)
     path = np.arange(51**2, dtype=np.int32).reshape(51, 51)[: int(51 * height), 17]
     seen: list[tuple[float, float]] = []
     after = cut(
@@ -200,7 +201,7 @@ def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousa
         "split bodice": lambda: make_shape("bodice", resolution=51, triangles=True),
         "crack near a border": lambda: cracked(51, column=5),
     }[kind]()
-    done = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu")
+    done = flatten(surface, fabric=cloth(shear), datum="centre", device=DEVICE)
     works, energies = [], []
     for solve in (relax, relax_multilevel):
         seen: list[tuple[float, float]] = []
@@ -225,7 +226,7 @@ def start_of(piece: Flattening) -> Relaxation:
 @pytest.mark.parametrize(("shape", "most"), [("dome", 3e-5), ("bodice", 5e-4)])
 def test_a_large_grid_is_relaxed_as_soon_as_a_small_one_is(shape: str, most: float, side: int):
     """What cubics leave is a few hundredths of a per cent of the energy at most, whether rows and columns can be halved or not."""
-    done = flatten(make_shape(shape, resolution=side), fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(make_shape(shape, resolution=side), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
     assert carry_up(state) is not None
     assert state.last.potential[0] < (1.0 + most) * minimum(done)
@@ -234,7 +235,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_small_one_is(shape: str, most: flo
 
 def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
     """Beside a crack a coarser level is one that cycles use; of that in between no network is made."""
-    done = flatten(cracked(101, column=34), fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(cracked(101, column=34), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
     below = carry_up(state)
     assert below is not None
@@ -247,13 +248,13 @@ def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
 
 def test_small_grids_and_triangles_rise_level_by_level():
     for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
-        state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device="cpu"))
+        state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE))
         assert carry_up(state) is None
 
 
 def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     """Where it is relaxed already, all that could be carried up lies higher."""
-    done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device="cpu")
+    done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device=DEVICE)
     ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
     state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
     before, load = state.begin(), np.random.default_rng(0).normal(size=done.positions.shape)
@@ -275,7 +276,7 @@ def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
 )
 def test_a_cycle_never_raises_the_energy_and_mirrors_nothing(triangles: bool, shear: float):
     surface = make_shape("bodice", resolution=33, triangles=triangles)
-    piece = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    piece = flatten(surface, fabric=cloth(shear), datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=1))
     state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
     energies = [state.energies().potential]
     relax_multilevel(state, watch=lambda s, e, r: energies.append(e.potential))
@@ -287,8 +288,8 @@ def test_a_cycle_never_raises_the_energy_and_mirrors_nothing(triangles: bool, sh
 def test_from_near_the_minimum_little_work_is_left(shape: str, triangles: bool, most: float):
     """A warmer cloth: the pattern of one fabric is the start of the next."""
     surface = make_shape(shape, resolution=33, triangles=triangles)
-    first = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu")
-    network = SpringNetwork.build(surface, cloth(180.0), first.positions, device="cpu")
+    first = flatten(surface, fabric=cloth(200.0), datum="centre", device=DEVICE)
+    network = SpringNetwork.build(surface, cloth(180.0), first.positions, device=DEVICE)
     works = []
     for start, nested in ((first.development.positions, True), (first.positions, False)):
         state = Relaxation(network, RelaxOptions(residual_tolerance=2e-2), start=start)
@@ -299,7 +300,7 @@ def test_from_near_the_minimum_little_work_is_left(shape: str, triangles: bool, 
 
 
 def test_a_cut_goes_on_from_the_layout_that_is_there():
-    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(200.0), datum="centre", device="cpu")
+    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(200.0), datum="centre", device=DEVICE)
     path = np.arange(33 * 33, dtype=np.int32).reshape(33, 33)[:17, 10]
     plan = CutPlan(name="dart", paths=(path,))
     released = cut(piece, plan)
@@ -310,7 +311,7 @@ def test_a_cut_goes_on_from_the_layout_that_is_there():
 
 def test_a_mesh_without_coarser_levels_is_relaxed_by_steps():
     surface = make_shape("dome", resolution=9)
-    piece = flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    piece = flatten(surface, fabric=cloth(200.0), datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=1))
     states = [Relaxation(piece.network, LEVELS, start=piece.development.positions) for _ in range(2)]
     outcomes = relax(states[0]), relax_multilevel(states[1])
     assert outcomes[0].steps == outcomes[1].steps
@@ -320,13 +321,13 @@ def test_a_mesh_without_coarser_levels_is_relaxed_by_steps():
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
 def test_a_repeat_is_equal_bit_for_bit(triangles: bool):
     surface = make_shape("bodice", resolution=33, triangles=triangles)
-    first, second = (flatten(surface, fabric=cloth(200.0), datum="centre", device="cpu") for _ in range(2))
+    first, second = (flatten(surface, fabric=cloth(200.0), datum="centre", device=DEVICE) for _ in range(2))
     np.testing.assert_array_equal(first.positions, second.positions)
 
 
 def test_a_work_limit_is_reported_not_hidden():
     options = RelaxOptions(solver="multilevel", max_steps=12)
-    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(20.0), datum="centre", device="cpu", relax=options)
+    piece = flatten(make_shape("dome", resolution=33), fabric=cloth(20.0), datum="centre", device=DEVICE, relax=options)
     assert not piece.converged
     assert piece.measures["stages"][-1]["converged"] is False
 
@@ -339,7 +340,7 @@ def test_steps_along_lines_bring_soft_cloth_to_the_same_minimum_in_less_work(kin
     done = []
     for softest in (network._SOFT, math.inf):
         monkeypatch.setattr(network, "_SOFT", softest)
-        piece = flatten(surface, fabric=cloth(1000.0 / 80.0), datum=datum, device="cpu", relax=exact)
+        piece = flatten(surface, fabric=cloth(1000.0 / 80.0), datum=datum, device=DEVICE, relax=exact)
         if kind == "crack":
             path = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:21, 12]
             piece = cut(piece, CutPlan(name="dart", paths=(path,)), relax=exact)
@@ -354,7 +355,7 @@ def test_steps_along_lines_bring_soft_cloth_to_the_same_minimum_in_less_work(kin
 @pytest.mark.parametrize("shear", [100.0, 10.0, 2.0])
 def test_a_step_along_lines_never_raises_the_energy_and_mirrors_nothing(shear: float):
     surface = make_shape("bodice", resolution=33)
-    piece = flatten(surface, fabric=cloth(shear), datum="centre", device="cpu", relax=RelaxOptions(max_steps=1))
+    piece = flatten(surface, fabric=cloth(shear), datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=1))
     state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
     made = Levels(state, mend=True)
     rng = np.random.default_rng(5)
@@ -371,7 +372,7 @@ def test_a_step_along_lines_never_raises_the_energy_and_mirrors_nothing(shear: f
 
 def test_pieces_with_and_without_lines_are_relaxed_side_by_side():
     surfaces = [make_shape("dome", resolution=33), make_shape("dome", resolution=33, triangles=True)]
-    given = {"fabric": cloth(1000.0 / 60.0), "device": "cpu", "relax": RelaxOptions(residual_tolerance=1e-3)}
+    given = {"fabric": cloth(1000.0 / 60.0), "device": DEVICE, "relax": RelaxOptions(residual_tolerance=1e-3)}
     together = flatten_all(surfaces, datum="centre", **given)
     for piece, surface in zip(together, surfaces, strict=True):
         assert piece.converged
@@ -382,7 +383,7 @@ def test_steps_go_along_lines_that_carry_the_threads_only():
     surface = make_shape("dome", resolution=33)
     for grain_angle, expected in ((0.0, True), (10.0, True), (90.0, True), (45.0, False)):
         flat = surface.vertices[:, :2]
-        network = SpringNetwork.build(surface, cloth(10.0), flat, grain_angle=grain_angle, device="cpu")
+        network = SpringNetwork.build(surface, cloth(10.0), flat, grain_angle=grain_angle, device=DEVICE)
         assert (network.line_arrays is not None) == expected
         made = Levels(Relaxation(network, LEVELS, start=flat), mend=True)
         assert [level.lines for level in made._levels] == [expected] * len(made.sizes)

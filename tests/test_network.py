@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.springs import compute_spring_energy
 
@@ -56,10 +57,10 @@ def equilateral(rings: int, side: float) -> Surface:
 
 
 def spring_energy(network: SpringNetwork, positions: NDArray[np.float64]) -> float:
-    energy = wp.zeros(network.vertex_count, dtype=wp.float64, device="cpu")
-    at = wp.array(positions, dtype=wp.vec2d, device="cpu")
+    energy = wp.zeros(network.vertex_count, dtype=wp.float64, device=DEVICE)
+    at = wp.array(positions, dtype=wp.vec2d, device=DEVICE)
     count = network.vertex_count
-    wp.launch(compute_spring_energy, dim=count, inputs=[at, network.springs, 0], outputs=[energy], device="cpu")
+    wp.launch(compute_spring_energy, dim=count, inputs=[at, network.springs, 0], outputs=[energy], device=DEVICE)
     return float(energy.numpy().sum())
 
 
@@ -94,7 +95,7 @@ def test_a_rectangle_under_uniform_strain_stores_the_membranes_energy(strain, hx
     """1/2 (C11 exx^2 + C22 eyy^2 + 2 C12 exx eyy + C66 gamma^2) A, with C12 = C66 = G as in any crossed lattice."""
     surface = sheet(6, 4, hx, hy)
     network = SpringNetwork.build(
-        surface, cloth(warp=warp, weft=weft, shear=shear), surface.vertices[:, :2], device="cpu"
+        surface, cloth(warp=warp, weft=weft, shear=shear), surface.vertices[:, :2], device=DEVICE
     )
     assert network.spring_arrays.lack is None
     e = np.array(STRAINS[strain])
@@ -108,7 +109,7 @@ def test_equilateral_triangles_store_an_isotropic_sheets_energy(strain: str):
     """Van Gelder 1998: exact for nu = 1/3 (plane stress); border springs have one triangle and so half of it."""
     k, nu = 1000.0, 1.0 / 3.0
     surface = equilateral(3, 0.01)
-    network = SpringNetwork.build(surface, cloth(shear=k / 2 / (1 + nu), nu=nu), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, cloth(shear=k / 2 / (1 + nu), nu=nu), surface.vertices[:, :2], device=DEVICE)
     e = np.array(STRAINS[strain])
     exx, eyy, gamma = e[0, 0], e[1, 1], 2 * e[0, 1]
     c = k / (1 - nu**2)
@@ -125,7 +126,7 @@ def test_the_grain_decides_which_edges_are_warp(grain_angle: float):
         cloth(warp=1500.0, weft=500.0, shear=100.0),
         surface.vertices[:, :2],
         grain_angle=grain_angle,
-        device="cpu",
+        device=DEVICE,
     )
     along_x, along_y = (energy_of_strain(network, np.diag(d)) / (25e-4 / 2) for d in ((1.0, 0.0), (0.0, 1.0)))
     wanted = (1500.0, 500.0) if grain_angle == 90.0 else (500.0, 1500.0)
@@ -136,7 +137,7 @@ def test_a_turned_grid_has_the_rotated_stiffness_on_the_bias():
     """At 45 degrees a square cell pulled along its edge is as stiff as C'11 = (K_warp + K_weft + 6 G) / 4."""
     surface = sheet(5, 5, 0.01, 0.01)
     network = SpringNetwork.build(
-        surface, cloth(warp=1200.0, weft=800.0, shear=100.0), surface.vertices[:, :2], grain_angle=45.0, device="cpu"
+        surface, cloth(warp=1200.0, weft=800.0, shear=100.0), surface.vertices[:, :2], grain_angle=45.0, device=DEVICE
     )
     assert energy_of_strain(network, np.diag([1.0, 0.0])) / (25e-4 / 2) == pytest.approx((2000 + 600) / 4, rel=1e-9)
     assert energy_of_strain(network, np.array([[0, 0.5], [0.5, 0]])) / (25e-4 / 2) == pytest.approx(1800 / 4, rel=1e-9)
@@ -158,7 +159,7 @@ def test_long_cells_store_what_the_fabric_does_but_for_less_that_couples_its_thr
     """C11, C22 and C66 as on square ones; C12 is what their weaker shear springs have."""
     surface, fabric = sheet(3, 3, hx, hy), cloth(warp=1000.0, weft=700.0, shear=200.0)
     positions = surface.vertices[:, :2]
-    network = SpringNetwork.build(surface, fabric, positions, grain_angle=grain_angle, device="cpu")
+    network = SpringNetwork.build(surface, fabric, positions, grain_angle=grain_angle, device=DEVICE)
     assert network.spring_arrays.long_quads == 9
     assert (network.spring_arrays.stiffness > 0).all()
     along_y, along_x, shear = quad_stiffness(fabric, np.deg2rad(grain_angle))
@@ -184,7 +185,7 @@ def test_a_vertex_is_held_against_its_four_neighbours_however_long_the_quads(she
     moved[:, axis] += 1e-6 * (-1.0) ** (row + column).ravel()
     stored = {}
     for model in MODELS:
-        network = SpringNetwork.build(surface, fabric, flat, device="cpu", model=model)
+        network = SpringNetwork.build(surface, fabric, flat, device=DEVICE, model=model)
         stored[model] = Relaxation(network, RelaxOptions(), start=moved).energies().potential
     assert stored["springs"] > 0.24 * stored["membrane"]
 
@@ -196,7 +197,7 @@ def test_quads_held_against_waves_store_nothing_of_their_shape_strained_uniforml
     number = np.arange(49).reshape(7, 7)
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     surface, flat = make_surface(vertices, faces), np.ascontiguousarray(vertices[:, :2])
-    network = SpringNetwork.build(surface, cloth(shear=375.0), flat, device="cpu")
+    network = SpringNetwork.build(surface, cloth(shear=375.0), flat, device=DEVICE)
     wave = network.spring_arrays.wave
     assert wave is not None
     assert wave.any(axis=1).sum() > 20
@@ -252,7 +253,7 @@ def test_rest_lengths_are_those_in_space_and_diagonals_go_over_the_unfolded_quad
 
 def test_every_spring_once_with_positive_stiffness_and_the_sum_around_each_vertex():
     surface = make_shape("saddle", resolution=9)
-    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device=DEVICE)
     s = network.spring_arrays
     assert (s.stiffness > 0).all()
     assert len(np.unique(np.sort(s.ends, axis=1), axis=0)) == len(s.ends) == network.spring_count
@@ -266,7 +267,7 @@ def test_every_spring_once_with_positive_stiffness_and_the_sum_around_each_verte
 def test_masses_add_up_to_the_cloth_and_none_is_zero(triangles: bool):
     surface = make_shape("dome", resolution=9, triangles=triangles)
     cells = cells_of(surface)
-    mass = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu").mass.numpy()
+    mass = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device=DEVICE).mass.numpy()
     assert (mass > 0).all()
     assert mass.sum() == pytest.approx(0.15 * cells.area.sum(), rel=1e-12)
     shares = np.bincount(cells.corner.ravel(), np.repeat(0.15 * cells.area / 3.0, 3))
@@ -287,8 +288,8 @@ def copied(arrays):
 def test_networks_of_one_surface_share_what_no_fabric_changes(split: int):
     surface = sheet(5, 5, 0.01, 0.012, split=split)
     flat = surface.vertices[:, :2]
-    one = SpringNetwork.build(surface, cloth(), flat, device="cpu")
-    other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device="cpu")
+    one = SpringNetwork.build(surface, cloth(), flat, device=DEVICE)
+    other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device=DEVICE)
     for struct, names in (
         ("springs", ("offset", "neighbor", "rest_length")),
         ("cells", ("face", "first", "laid", "offset", "slot")),
@@ -304,7 +305,7 @@ def test_networks_of_one_surface_share_what_no_fabric_changes(split: int):
 @pytest.mark.parametrize("split", [0, 7, 25])
 def test_a_network_of_other_arrays_lists_them_as_the_surfaces_own(split: int):
     surface = sheet(5, 5, 0.01, 0.012, split=split)
-    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device=DEVICE)
     other = replace(network, spring_arrays=copied(network.spring_arrays), cell_arrays=copied(network.cell_arrays))
     assert other.springs.neighbor.ptr != network.springs.neighbor.ptr
     for struct, names in (
@@ -319,7 +320,7 @@ def test_a_network_of_other_arrays_lists_them_as_the_surfaces_own(split: int):
 
 def test_a_network_of_longer_springs_and_larger_cells_has_these():
     surface = sheet(5, 5, 0.01, 0.012, split=7)
-    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device=DEVICE)
     s, c = network.spring_arrays, network.cell_arrays
     larger = replace(
         network,
@@ -335,7 +336,7 @@ def test_a_network_of_longer_springs_and_larger_cells_has_these():
 
 def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
     surface = sheet(4, 3, 0.01, 0.01, split=5)
-    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], model="membrane", device="cpu")
+    network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], model="membrane", device=DEVICE)
     before, lists = network.spring_arrays.listed_stiffness.copy(), network.springs.stiffness.ptr
     wished = np.random.default_rng(2).uniform(1.0, 9.0, network.spring_count)
     network.weigh(wished)
@@ -353,7 +354,7 @@ def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
 def test_the_guard_begins_where_the_shear_springs_lose_their_hold():
     surface = sheet(2, 2, 0.01, 0.01)
     network = SpringNetwork.build(
-        surface, cloth(warp=1500.0, weft=500.0, shear=100.0), surface.vertices[:, :2], device="cpu"
+        surface, cloth(warp=1500.0, weft=500.0, shear=100.0), surface.vertices[:, :2], device=DEVICE
     )
     np.testing.assert_allclose(network.cells.onset.numpy(), np.tile([100 / 1500, 100 / 500], (4, 1)))
 
@@ -362,19 +363,19 @@ def test_between_triangles_the_guard_begins_before_their_springs_lose_their_hold
     """Split squares sheared by g: only the diagonal is strained, by g/2, and the cloth stores K(45)/8 g^2 per area."""
     fabric, surface = cloth(shear=200.0), sheet(12, 12, 0.01, 0.01, split=144)
     flat = surface.vertices[:, :2]
-    network = SpringNetwork.build(surface, fabric, flat, device="cpu")
+    network = SpringNetwork.build(surface, fabric, flat, device=DEVICE)
     shear = 1e-5
     stored = spring_energy(network, flat + np.column_stack([shear * flat[:, 1], np.zeros(len(flat))]))
     assert network.shear_hold == pytest.approx(0.75 * 2.0 * stored / shear**2 / 0.12**2, rel=1e-3)
     np.testing.assert_allclose(network.cells.onset.numpy(), network.shear_hold / 1000.0)
-    few = SpringNetwork.build(sheet(12, 12, 0.01, 0.01, split=12), fabric, flat, device="cpu")
+    few = SpringNetwork.build(sheet(12, 12, 0.01, 0.01, split=12), fabric, flat, device=DEVICE)
     np.testing.assert_allclose(few.cells.onset.numpy(), 0.2)
 
 
 def test_a_compressed_thread_kinks_beyond_the_onset_and_the_guard_holds_it():
     """The reason for the guard: the second derivative of the energy along a zigzag of the weft threads."""
     surface = sheet(12, 12, 0.01, 0.01)
-    network = SpringNetwork.build(surface, cloth(shear=50.0), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, cloth(shear=50.0), surface.vertices[:, :2], device=DEVICE)
     columns = np.arange(13 * 13) % 13
     zigzag = np.column_stack([np.zeros(169), 1e-5 * (-1.0) ** columns])
 

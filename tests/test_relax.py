@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 import pytest
+from devices import DEVICE
 from numpy.typing import NDArray
 
 from warpflat.develop import develop
@@ -28,7 +29,7 @@ def cloth(shear: float) -> Fabric:
 
 def developed(surface: Surface, shear: float) -> tuple[SpringNetwork, FloatArray]:
     start = develop(surface, surface.lines["centre"]).positions
-    return SpringNetwork.build(surface, cloth(shear), start, device="cpu"), start
+    return SpringNetwork.build(surface, cloth(shear), start, device=DEVICE), start
 
 
 def springs_and_guard(network: SpringNetwork, positions: FloatArray) -> tuple[float, FloatArray]:
@@ -195,7 +196,7 @@ def test_a_developable_piece_comes_back_to_its_known_pattern(shape: str, triangl
     edges = mesh_edges(surface.faces)
     in_space = np.linalg.norm(np.diff(surface.vertices[edges], axis=1)[:, 0], axis=1)
     for start in (developed(surface, 200.0)[1], pressed):
-        network = SpringNetwork.build(surface, cloth(200.0), start, device="cpu")
+        network = SpringNetwork.build(surface, cloth(200.0), start, device=DEVICE)
         state = Relaxation(network, options, start=start)
         while not state.energies().potential <= state.negligible_energy:
             assert relax(state).steps > 0

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 from warpflat.fabric import as_fabric
 from warpflat.network import SpringNetwork
@@ -29,7 +30,7 @@ def test_what_is_left_is_the_chebyshev_polynomial_of_the_fourth_kind(steps: int)
 @pytest.fixture(scope="module")
 def at_rest() -> tuple[SpringNetwork, np.ndarray]:
     surface = make_shape("dome", resolution=13)
-    network = SpringNetwork.build(surface, as_fabric("isotropic"), surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, as_fabric("isotropic"), surface.vertices[:, :2], device=DEVICE)
     state = Relaxation(
         network, RelaxOptions(energy_tolerance=1e-10, residual_tolerance=1e-6), start=surface.vertices[:, :2]
     )

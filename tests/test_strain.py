@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 from warpflat.fabric import Fabric
 from warpflat.membrane import Model
@@ -32,7 +33,7 @@ def square(*, triangles: bool) -> Surface:
 
 
 def network_of(surface: Surface, grain_angle: float = 0.0) -> SpringNetwork:
-    return SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], grain_angle=grain_angle, device="cpu")
+    return SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], grain_angle=grain_angle, device=DEVICE)
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
@@ -60,7 +61,7 @@ def test_faces_have_the_mean_of_their_cells_by_area_and_their_energy_adds_up(mod
     bent = flat.vertices + np.column_stack([np.zeros((9, 2)), 0.2 * np.sin(3 * flat.vertices[:, 0])])
     surface = make_surface(bent, [[0, 1, 4, 3], [1, 2, 5], [1, 5, 4], [3, 4, 7, 6], [4, 5, 8, 7]])
     positions = bent[:, :2] * [1.0, 1.05] + 0.03 * np.random.default_rng(2).normal(size=(9, 2))
-    network = SpringNetwork.build(surface, CLOTH, positions, grain_angle=20.0, device="cpu", model=model)
+    network = SpringNetwork.build(surface, CLOTH, positions, grain_angle=20.0, device=DEVICE, model=model)
     worn = worn_strain(network, positions)
     assert strain_energy(network, positions) == pytest.approx(worn.energy.sum(), rel=1e-12)
     assert worn.energy.sum() > 0
@@ -72,7 +73,7 @@ def test_faces_have_the_mean_of_their_cells_by_area_and_their_energy_adds_up(mod
         for corner in cells.corner[of_face]:
             # alone, the cell is a triangle
             single = make_surface(surface.vertices[corner], [[0, 1, 2]])
-            lone = SpringNetwork.build(single, CLOTH, positions[corner], grain_angle=20.0, device="cpu", model=model)
+            lone = SpringNetwork.build(single, CLOTH, positions[corner], grain_angle=20.0, device=DEVICE, model=model)
             each.append(worn_strain(lone, positions[corner]))
         share = area[of_face] / area[of_face].sum()
         assert worn.area[face] == pytest.approx(area[of_face].sum(), rel=1e-12)

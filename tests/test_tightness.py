@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from devices import DEVICE
 
 import warpflat
 from warpflat.errors import InputError
@@ -38,7 +39,7 @@ def girth(surface: warpflat.Surface) -> float:
 def test_a_stretched_cylinder_has_the_closed_form_pattern_and_laplace_s_pressure(model: str, triangles: bool):
     surface = sleeve(triangles=triangles)
     result = warpflat.flatten(
-        surface, fabric=NET, datum="centre", model=model, wear=Wear(stretch_weft=0.2), device="cpu"
+        surface, fabric=NET, datum="centre", model=model, wear=Wear(stretch_weft=0.2), device=DEVICE
     )
     width, height = np.ptp(result.positions, axis=0)
     assert width == pytest.approx(girth(surface) / 1.2, rel=1e-6)
@@ -57,7 +58,7 @@ def test_a_stretched_cylinder_has_the_closed_form_pattern_and_laplace_s_pressure
 
 def test_tension_is_per_width_of_the_cloth_as_worn():
     wear = Wear(stretch_warp=0.1, stretch_weft=0.2)
-    result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device="cpu")
+    result = warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
     assert np.ptp(result.positions[:, 1]) == pytest.approx(HEIGHT / 1.1, rel=1e-6)
     expected = 0.2 * NET.stiffness_weft / 1.1
     assert float(np.median(result.fit.tension_weft)) == pytest.approx(expected, rel=1e-5)
@@ -68,7 +69,7 @@ def test_tension_is_per_width_of_the_cloth_as_worn():
 def test_a_cone_gets_the_pressure_asked_for(model: str):
     surface = make_shape("cone", bottom=0.03, top=0.04, height=0.2, angle=300.0)
     wear = Wear(pressure=800.0)
-    result = warpflat.flatten(surface, fabric=NET, datum="centre", model=model, wear=wear, device="cpu")
+    result = warpflat.flatten(surface, fabric=NET, datum="centre", model=model, wear=wear, device=DEVICE)
     np.testing.assert_allclose(result.fit.pressure, 800.0, rtol=0.03)
     # p = T / r along the girth: the wide end is stretched more.
     radius = np.hypot(*surface.vertices[surface.faces].mean(axis=1)[:, [0, 2]].T)
@@ -78,7 +79,7 @@ def test_a_cone_gets_the_pressure_asked_for(model: str):
 
 def test_threads_that_run_around_are_found_and_a_pressure_out_of_reach_is_told():
     result = warpflat.flatten(
-        sleeve(resolution=17), fabric=NET, datum="bottom", wear=Wear(pressure=5000.0), device="cpu"
+        sleeve(resolution=17), fabric=NET, datum="bottom", wear=Wear(pressure=5000.0), device=DEVICE
     )
     assert any("along warp, which runs around" in note for note in result.notes)
     assert any("cannot be reached within power-net's limit of 30 %" in note for note in result.notes)
@@ -90,19 +91,19 @@ def test_a_stretch_that_the_pressure_overrides_is_refused():
         Wear(pressure=1000.0, stretch_warp=0.1, stretch_weft=0.1)
     wear, told = Wear(pressure=1000.0, stretch_weft=0.1), r"stretch_weft = 0.1 has no effect: weft runs around the body"
     with pytest.raises(InputError, match=rf"piece 'cylinder': wear: {told}.*; leave it out, or the pressure"):
-        warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device="cpu")
+        warpflat.flatten(sleeve(), fabric=NET, datum="centre", wear=wear, device=DEVICE)
     # Of several pieces each has its own threads around the body.
-    (piece,) = warpflat.flatten_all([sleeve()], fabric=NET, datum="centre", wear=wear, device="cpu")
+    (piece,) = warpflat.flatten_all([sleeve()], fabric=NET, datum="centre", wear=wear, device=DEVICE)
     assert any(note.startswith("stretch_weft = 0.1 has no effect") for note in piece.notes)
     used = warpflat.flatten(
-        sleeve(), fabric=NET, datum="centre", wear=Wear(pressure=1000.0, stretch_warp=0.1), device="cpu"
+        sleeve(), fabric=NET, datum="centre", wear=Wear(pressure=1000.0, stretch_warp=0.1), device=DEVICE
     )
     assert not any("no effect" in note for note in used.notes)
 
 
 def test_a_given_pattern_is_judged():
     surface = sleeve(resolution=17)
-    flat = warpflat.flatten(surface, fabric="denim", datum="centre", device="cpu").positions
+    flat = warpflat.flatten(surface, fabric="denim", datum="centre", device=DEVICE).positions
     denim = find_fabric("denim")
     assert assess_pattern(surface, denim, flat).fits
     tight = assess_pattern(surface, denim, flat * [0.92, 1.0])
@@ -235,7 +236,7 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     from matplotlib.figure import Figure
 
     shapes = [sleeve(resolution=9), make_shape("cylinder", radius=0.03, height=0.15, angle=300.0, resolution=9)]
-    fitting, tight = (warpflat.flatten(shape, fabric=NET, datum="centre", device="cpu") for shape in shapes)
+    fitting, tight = (warpflat.flatten(shape, fabric=NET, datum="centre", device=DEVICE) for shape in shapes)
     results = [fitting, replace(tight, positions=tight.positions * [0.7, 1.0])]
     drawn: list[Figure] = []
 

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from devices import DEVICE
 from numpy.typing import NDArray
 
 from warpflat.develop import develop
@@ -30,7 +31,7 @@ def triangles(name: str, count: int) -> Surface:
 
 
 def network_of(surface: Surface, positions: FloatArray, fabric: Fabric = SOFT) -> SpringNetwork:
-    return SpringNetwork.build(surface, fabric, positions, device="cpu")
+    return SpringNetwork.build(surface, fabric, positions, device=DEVICE)
 
 
 def developed(surface: Surface, fabric: Fabric) -> tuple[SpringNetwork, FloatArray]:
@@ -100,7 +101,7 @@ def test_the_matrix_holds_worn_threads_along_and_across():
 
 @pytest.mark.parametrize(("name", "fabric"), [("bodice", "satin"), ("bodice", "denim"), ("dome", "cotton")])
 def test_soft_cloth_between_triangles_comes_to_rest(name: str, fabric: str):
-    flat = flatten(triangles(name, 25), fabric=fabric, datum="centre", device="cpu")
+    flat = flatten(triangles(name, 25), fabric=fabric, datum="centre", device=DEVICE)
     assert flat.converged
     assert flat.flipped_faces == 0
     # Ten thousands of the paper's steps would take next to nothing more away.
@@ -171,6 +172,6 @@ def test_they_are_for_springs_of_soft_cloth_between_triangles():
     positions = flat.vertices[:, :2]
     assert whole_steps_pay(network_of(flat, positions))
     assert not whole_steps_pay(network_of(flat, positions, find_fabric("interlock")))
-    assert not whole_steps_pay(SpringNetwork.build(flat, SOFT, positions, device="cpu", model="membrane"))
+    assert not whole_steps_pay(SpringNetwork.build(flat, SOFT, positions, device=DEVICE, model="membrane"))
     quads = make_shape("dome", resolution=5)
     assert not whole_steps_pay(network_of(quads, quads.vertices[:, :2]))

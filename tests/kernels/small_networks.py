@@ -7,6 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
@@ -16,8 +17,6 @@ from warpflat.fabric import Fabric
 from warpflat.network import SpringNetwork
 from warpflat.smoothing import STEADY
 from warpflat.surface import make_surface
-
-DEVICE = "cpu"
 
 CLOTH = Fabric(
     name="cloth",

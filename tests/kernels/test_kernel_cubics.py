@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.kernels.lattice import number_faces
 
@@ -66,8 +67,8 @@ def test_faces_are_numbered_from_side_to_side() -> None:
     twin = np.full(12, -1, dtype=np.int32)
     # The right side of the first is side 2 of the second.
     twin[1], twin[6] = 6, 1
-    place, queue = wp.empty(3, dtype=wp.vec3i, device="cpu"), wp.empty(3, dtype=wp.int32, device="cpu")
-    wp.launch(number_faces, dim=1, inputs=[wp.array(twin, device="cpu")], outputs=[place, queue], device="cpu")
+    place, queue = wp.empty(3, dtype=wp.vec3i, device=DEVICE), wp.empty(3, dtype=wp.int32, device=DEVICE)
+    wp.launch(number_faces, dim=1, inputs=[wp.array(twin, device=DEVICE)], outputs=[place, queue], device=DEVICE)
     # Side 2 of the second lies to the left, side 3 in the first one's sense: turned by one.
     np.testing.assert_array_equal(place.numpy()[:2], [[0, 0, 0], [0, 1, 1]])
     assert place.numpy()[2, 2] == -1

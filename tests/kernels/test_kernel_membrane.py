@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import corner_vertices
 from warpflat.kernels.membrane import compute_membrane_energy, compute_membrane_strain, evaluate_membrane
@@ -19,7 +20,6 @@ from warpflat.surface import Surface, make_surface
 from warpflat.surface.topology import border_edges
 from warpflat.tangent import TangentMatrix
 
-DEVICE = "cpu"
 CLOTH = Fabric(
     name="cloth",
     stiffness_warp=1000.0,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_misses, evaluate_seams
 
@@ -24,13 +25,13 @@ COUNT = len(ENDS)
 
 def seams() -> Seams:
     made = Seams()
-    made.ends = wp.array(ENDS, dtype=wp.vec4i, device="cpu")
-    made.kind = wp.array(KIND, dtype=wp.int32, device="cpu")
-    made.ratio = wp.array(RATIO, dtype=wp.float64, device="cpu")
-    made.target = wp.array(TARGET, dtype=wp.float64, device="cpu")
-    made.lever = wp.array(LEVER.reshape(-1, 2), dtype=wp.vec2d, device="cpu")
-    made.stiffness = wp.array(STIFFNESS, dtype=wp.float64, device="cpu")
-    made.offset = wp.array(OFFSET, dtype=wp.float64, device="cpu")
+    made.ends = wp.array(ENDS, dtype=wp.vec4i, device=DEVICE)
+    made.kind = wp.array(KIND, dtype=wp.int32, device=DEVICE)
+    made.ratio = wp.array(RATIO, dtype=wp.float64, device=DEVICE)
+    made.target = wp.array(TARGET, dtype=wp.float64, device=DEVICE)
+    made.lever = wp.array(LEVER.reshape(-1, 2), dtype=wp.vec2d, device=DEVICE)
+    made.stiffness = wp.array(STIFFNESS, dtype=wp.float64, device=DEVICE)
+    made.offset = wp.array(OFFSET, dtype=wp.float64, device=DEVICE)
     return made
 
 
@@ -49,15 +50,15 @@ def energy(positions: NDArray[np.float64]) -> float:
 
 
 def launch(positions: NDArray[np.float64], velocities: NDArray[np.float64], time_step: float = 0.01):
-    force, viscosity = (wp.zeros(4 * COUNT, dtype=wp.vec2d, device="cpu") for _ in range(2))
-    stiffness = wp.zeros(4 * COUNT, dtype=wp.float64, device="cpu")
-    at, moving = (wp.array(a, dtype=wp.vec2d, device="cpu") for a in (positions, velocities))
+    force, viscosity = (wp.zeros(4 * COUNT, dtype=wp.vec2d, device=DEVICE) for _ in range(2))
+    stiffness = wp.zeros(4 * COUNT, dtype=wp.float64, device=DEVICE)
+    at, moving = (wp.array(a, dtype=wp.vec2d, device=DEVICE) for a in (positions, velocities))
     wp.launch(
         evaluate_seams,
         dim=COUNT,
         inputs=[at, moving, seams(), time_step, 0],
         outputs=[force, viscosity, stiffness],
-        device="cpu",
+        device=DEVICE,
     )
 
     def gathered(slots: NDArray[np.float64]) -> NDArray[np.float64]:
@@ -110,13 +111,13 @@ def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
 
 
 def test_misses_and_edges_of_no_length():
-    found = wp.zeros(COUNT, dtype=wp.float64, device="cpu")
+    found = wp.zeros(COUNT, dtype=wp.float64, device=DEVICE)
     wp.launch(
         compute_seam_misses,
         dim=COUNT,
-        inputs=[wp.array(POSITIONS, dtype=wp.vec2d, device="cpu"), seams(), 0],
+        inputs=[wp.array(POSITIONS, dtype=wp.vec2d, device=DEVICE), seams(), 0],
         outputs=[found],
-        device="cpu",
+        device=DEVICE,
     )
     np.testing.assert_allclose(found.numpy(), misses(POSITIONS))
     force, _, _ = launch(np.zeros_like(POSITIONS), np.zeros_like(POSITIONS))

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import CLOTH
 from test_kernel_surface_cells import SURFACES, norm
@@ -87,7 +88,7 @@ def test_stiffnesses_are_those_of_numpy(name: str, grain_angle: float, shear: fl
 @pytest.mark.parametrize("name", SURFACES)
 def test_springs_are_listed_around_each_vertex_as_a_sort_has_them(name: str):
     surface = SURFACES[name]()
-    network = SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device="cpu")
+    network = SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE)
     s = network.spring_arrays
     here, there = s.ends.T.ravel(), s.ends[:, ::-1].T.ravel()
     order = np.lexsort((there, here))

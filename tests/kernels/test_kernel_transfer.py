@@ -7,6 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import warp as wp
+from devices import DEVICE
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, random_array
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, correct, inject, transfer
@@ -19,9 +20,9 @@ KEPT = np.sort(RNG.choice(FINE, COARSE, replace=False)).astype(np.int32)
 
 def weights(matrix: csr_array) -> Weights:
     made = Weights()
-    made.offset = wp.array(matrix.indptr.astype(np.int32), dtype=wp.int32, device="cpu")
-    made.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device="cpu")
-    made.weight = wp.array(matrix.data, dtype=wp.float64, device="cpu")
+    made.offset = wp.array(matrix.indptr.astype(np.int32), dtype=wp.int32, device=DEVICE)
+    made.column = wp.array(matrix.indices.astype(np.int32), dtype=wp.int32, device=DEVICE)
+    made.weight = wp.array(matrix.data, dtype=wp.float64, device=DEVICE)
     return made
 
 
@@ -29,9 +30,11 @@ def transpose(matrix: csr_array) -> Transpose:
     row, column = matrix.tocoo().coords
     entry = np.lexsort([row, column]).astype(np.int32)
     made = Transpose()
-    made.offset = wp.array(np.searchsorted(column[entry], np.arange(matrix.shape[1] + 1)), dtype=wp.int32, device="cpu")
-    made.row = wp.array(row[entry].astype(np.int32), dtype=wp.int32, device="cpu")
-    made.entry = wp.array(entry, dtype=wp.int32, device="cpu")
+    made.offset = wp.array(
+        np.searchsorted(column[entry], np.arange(matrix.shape[1] + 1)), dtype=wp.int32, device=DEVICE
+    )
+    made.row = wp.array(row[entry].astype(np.int32), dtype=wp.int32, device=DEVICE)
+    made.entry = wp.array(entry, dtype=wp.int32, device=DEVICE)
     return made
 
 
@@ -42,15 +45,15 @@ def vectors(count: int, seed: int) -> NDArray[np.float64]:
 def launched(kernel: wp.Kernel, dim: int, *inputs: object, pieces: int = 1) -> NDArray[np.float64]:
     """What the kernel writes, launched in so many pieces."""
     given = [
-        wp.array(value, dtype=wp.int32 if value.dtype == np.int32 else wp.vec2d, device="cpu")
+        wp.array(value, dtype=wp.int32 if value.dtype == np.int32 else wp.vec2d, device=DEVICE)
         if isinstance(value, np.ndarray)
         else value
         for value in inputs
     ]
-    result = wp.zeros(dim, dtype=wp.vec2d, device="cpu")
+    result = wp.zeros(dim, dtype=wp.vec2d, device=DEVICE)
     bounds = np.linspace(0, dim, pieces + 1).astype(int)
     for first, end in pairwise(bounds):
-        wp.launch(kernel, dim=int(end - first), inputs=[*given, int(first)], outputs=[result], device="cpu")
+        wp.launch(kernel, dim=int(end - first), inputs=[*given, int(first)], outputs=[result], device=DEVICE)
     return np.array(result.numpy())
 
 
