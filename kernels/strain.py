@@ -4,7 +4,7 @@ import warp as wp
 
 from .cells import Cells, cell_corner, cell_weight, count_cells, flat_edges, laid_edges
 
-wp.set_module_options({"enable_backward": False})
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.struct

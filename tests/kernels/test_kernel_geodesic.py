@@ -1,11 +1,10 @@
-"""Shortest ways over triangles, against the best of many places on every side."""
+"""Shortest ways over triangles, against the best of many places on every side; on the CPU, where the search is done."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 import warp as wp
-from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, see_sides
 
@@ -40,7 +39,7 @@ def sides() -> tuple[IntArray, FloatArray]:
     ends, seen = np.zeros((len(slot), 2), dtype=np.int32), np.zeros((len(slot), 3))
     for first, last in ((0, 10), (10, len(slot))):
         wp.launch(
-            see_sides, dim=last - first, inputs=[VERTICES, TRIANGLES, slot, first], outputs=[ends, seen], device=DEVICE
+            see_sides, dim=last - first, inputs=[VERTICES, TRIANGLES, slot, first], outputs=[ends, seen], device="cpu"
         )
     return ends, seen
 
@@ -63,7 +62,7 @@ def ways_from(start: FloatArray, ends_at: list[int], *, reach: int = 100) -> tup
             dim=1,
             inputs=[offset, *sides(), reach, 1e-14],
             outputs=[distance, waiting, crowd, *ways, shortened],
-            device=DEVICE,
+            device="cpu",
         )
     return distance, ways, launches
 
@@ -133,7 +132,7 @@ def test_values_are_carried_along_the_ways():
     def carried(value: FloatArray, grows: float) -> FloatArray:
         for _ in range(20):
             change = np.zeros(value.shape[1])
-            wp.launch(carry_along, dim=1, inputs=[*ways, order, fixed, grows], outputs=[value, change], device=DEVICE)
+            wp.launch(carry_along, dim=1, inputs=[*ways, order, fixed, grows], outputs=[value, change], device="cpu")
             if not change.any():
                 return value
         raise AssertionError("still changing")

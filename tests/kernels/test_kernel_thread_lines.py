@@ -91,7 +91,7 @@ def test_lines_go_where_numpy_says(make, squeezed: float):
     given = ["position", "force", "mass", "springs", "cells", "face_acting", "face_stiffness", "guarded", "lines"]
     inputs = [at.arrays[name] if name in at.arrays else getattr(network, name) for name in given]
     assert network.lines is not None
-    launch_each(solve_lines, len(lines(network)), [*inputs, STEP], moved)
+    launch_each(solve_lines, len(lines(network)), [*inputs, STEP], moved, device=DEVICE)
     for made, wished in zip(moved, ways(network, at), strict=True):
         np.testing.assert_allclose(made.numpy(), wished, rtol=1e-9, atol=1e-12)
 
@@ -103,7 +103,7 @@ def test_no_vertex_goes_beyond_its_reach_or_where_it_may_not():
     freedom = np.where(rng.random((40, 2)) < 0.3, [0.0, 1.0], 1.0)
     position = vec2(here)
     inputs = [vec2(rows), vec2(columns), wp.array(reach, dtype=wp.float64, device=DEVICE), vec2(freedom)]
-    launch_each(go_along_lines, 40, inputs, [position])
+    launch_each(go_along_lines, 40, inputs, [position], device=DEVICE)
     way = (rows + columns) * freedom
     length = np.linalg.norm(way, axis=1)
     assert 5 < np.count_nonzero(length > reach) < 35
@@ -124,6 +124,6 @@ def test_a_line_of_one_vertex_leads_nowhere():
     moved = [vec2(np.full((count, 2), np.nan)) for _ in range(2)]
     given = ["position", "force", "mass", "springs", "cells", "face_acting", "face_stiffness", "guarded", "lines"]
     inputs = [at.arrays[name] if name in at.arrays else getattr(network, name) for name in given]
-    launch_each(solve_lines, 2 * count, [*inputs, STEP], moved)
+    launch_each(solve_lines, 2 * count, [*inputs, STEP], moved, device=DEVICE)
     for made in moved:
         np.testing.assert_array_equal(made.numpy(), 0.0)
