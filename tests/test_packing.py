@@ -18,10 +18,12 @@ VERTICES = np.array([[0.0, 0.0, 0.0], [3.0, 4.0, 0.0], [3.0, 4.0, 12.0]])
 EDGES = np.array([[0, 1], [1, 2], [0, 2]], dtype=np.int32)
 
 
-@pytest.fixture(params=["packed", "Warp's own"])
+@pytest.fixture(params=["packed", "as for a GPU", "Warp's own"])
 def either_way(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> str:
     monkeypatch.setattr(packing, "_forms", {})
-    if request.param != "packed":
+    if request.param == "as for a GPU":
+        monkeypatch.setattr(packing._Form, "_on_host", packing._Form._on_device)
+    if request.param == "Warp's own":
         monkeypatch.setattr(packing, "_RELEASES", ("0.0.",))
     return str(request.param)
 
@@ -31,8 +33,7 @@ def test_arrays_numbers_and_vectors(either_way: str) -> None:
         length = np.zeros(3)
         launch_each(measure_edges, 3, [VERTICES, EDGES], [length])
         np.testing.assert_allclose(length, [5.0, 12.0, 13.0])
-    if either_way == "packed":
-        assert measure_edges in packing._forms
+    assert ((measure_edges, "cpu") in packing._forms) == (either_way != "Warp's own")
     square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
     for warp, cosine in (((0.0, 1.0), 1.0), ((np.sqrt(0.5), np.sqrt(0.5)), -1.0)):
         fourfold = np.zeros((1, 2))

@@ -1,4 +1,4 @@
-"""A kernel's arguments, packed once: on the CPU a launch is a call of a C function with the address of its arguments.
+"""A kernel's arguments, packed once: on the CPU a launch is then a call of a C function with their address.
 
 Warp looks at every argument of every launch, for whatever it might be (.1 to .2 ms for two dozen of them, and 13 us each time that a
 recorded launch runs). The kernels here get Warp's and NumPy's arrays, numbers and structs of one type each, so that what a kernel
@@ -10,6 +10,7 @@ from __future__ import annotations
 import ctypes
 import threading
 from collections.abc import Callable, Sequence
+from copy import copy
 from functools import partial
 from typing import Any
 
@@ -45,14 +46,15 @@ def commands_of(
     """
     if not ranges:
         return []
-    if device.is_cpu and wp.config.version.startswith(_RELEASES):
-        form = _forms.get(kernel)
+    if wp.config.version.startswith(_RELEASES):
+        form = _forms.get((kernel, device.alias))
         if form is None:
             # Of two threads that load a module at once one has its code unloaded by the other.
             with _loading:
-                form = _forms.get(kernel) or _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
+                form = _forms.get((kernel, device.alias))
+                form = form or _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
                 if form.fits:
-                    _forms[kernel] = form
+                    _forms[kernel, device.alias] = form
         packed = form.commands(ranges, [*given, 0, *outputs])
         if packed is not None:
             return packed
@@ -83,58 +85,81 @@ class _Form:
         """From a launch that Warp has recorded, with its argument number `first`."""
         self._bounds, values = type(recorded.params[0]), recorded.params[1:]
         args = recorded.kernel.adj.args
-        self.fits = recorded.block_dim == 1 and len(values) == len(args) and not recorded.kernel.is_generic
-        self._first = args[first].label
-        # Code stays loaded as long as this is held.
-        self._code = recorded.kernel.module.load(recorded.device, 1)
-        self._run = self._code.get_kernel_hooks(recorded.kernel).forward
+        self._device, self._launch = recorded.device, copy(recorded)
+        # The first launch's arrays are not to be held.
+        self._launch.params = self._launch.params_addr = self._launch.fwd_args = None
+        on_host = self._device.is_cpu
+        self.fits = len(values) == len(args) and not recorded.kernel.is_generic
+        self.fits = self.fits and (recorded.block_dim == 1 or not on_host)
+        self._first, self._label = first, args[first].label
+        if on_host:
+            # Code stays loaded as long as this is held.
+            self._code = recorded.kernel.module.load(self._device, 1)
+            self._run = self._code.get_kernel_hooks(recorded.kernel).forward
         self._arguments: type[ctypes.Structure] = type(
             "Arguments",
             (ctypes.Structure,),
             {"_fields_": [(a.label, type(v)) for a, v in zip(args, values, strict=True)]},
         )
-        self._ways = [_way(arg.type, type(value)) for arg, value in zip(args, values, strict=True)]
+        self._ways = [_way(arg.type, type(value), self._device) for arg, value in zip(args, values, strict=True)]
 
     def commands(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command] | None:
         """For each range; None if there are arguments that it does not know."""
         if not self.fits or len(values) != len(self._ways):
             return None
         try:
-            whole = self._arguments(*[way(value) for way, value in zip(self._ways, values, strict=True)])
+            packed = [way(value) for way, value in zip(self._ways, values, strict=True)]
         except _Misfit:
             return None
-        made, packed = list[Command](), whole
+        return self._on_host(ranges, packed) if self._device.is_cpu else self._on_device(ranges, packed)
+
+    def _on_host(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command]:
+        made, packed = list[Command](), (whole := self._arguments(*values))
         for begin, end in ranges:
             if made:
                 packed = self._arguments.from_buffer_copy(whole)
-            setattr(packed, self._first, begin)
+            setattr(packed, self._label, begin)
             made.append(partial(self._run, ctypes.byref(self._bounds((end - begin,))), ctypes.byref(packed)))
         return made
 
+    def _on_device(self, ranges: Sequence[tuple[int, int]], values: list[Any]) -> list[Command]:
+        made = list[Command]()
+        for begin, end in ranges:
+            values[self._first] = type(values[self._first])(begin)
+            launch = copy(self._launch)
+            launch.bounds = self._bounds((end - begin,))
+            launch.params = [launch.bounds, *values]
+            launch.params_addr = (ctypes.c_void_p * len(launch.params))(*map(ctypes.addressof, launch.params))
+            made.append(launch.launch)
+        return made
 
-_forms: dict[wp.Kernel, _Form] = {}
+
+_forms: dict[tuple[wp.Kernel, str], _Form] = {}
 _loading = threading.Lock()
 
 
-def _way(of: Any, packed: type) -> Callable[[Any], Any]:
+def _way(of: Any, packed: type, device: wp.Device) -> Callable[[Any], Any]:
     """How a value for an argument of this type becomes the C value that Warp packed it into."""
     if isinstance(of, wp.array):
         scalar = getattr(of.dtype, "_wp_scalar_type_", of.dtype)
         inner = tuple(getattr(of.dtype, "_shape_", ()))
-        return partial(_array, of.dtype, of.ndim, np.dtype(wp.dtype_to_numpy(scalar)), inner, packed)
+        return partial(_array, of.dtype, of.ndim, np.dtype(wp.dtype_to_numpy(scalar)), inner, packed, device)
     if issubclass(packed, ctypes._SimpleCData):
         return partial(_number, packed)
     return partial(_composite, packed)
 
 
-def _array(dtype: Any, ndim: int, scalar: np.dtype[Any], inner: tuple[int, ...], packed: type, value: Any) -> Any:
+def _array(
+    dtype: Any, ndim: int, scalar: np.dtype[Any], inner: tuple[int, ...], packed: type, device: wp.Device, value: Any
+) -> Any:
     kind = type(value)
     if kind is wp.array:
-        if value.dtype is not dtype or value.ndim != ndim or not value.device.is_cpu:
+        if value.dtype is not dtype or value.ndim != ndim or value.device is not device:
             raise _Misfit
         return value.__ctype__()
     if (
         kind is not np.ndarray
+        or not device.is_cpu
         or value.dtype != scalar
         or value.ndim != ndim + len(inner)
         or value.shape[ndim:] != inner
