@@ -128,6 +128,41 @@ def stop(
 
 
 @wp.kernel
+def stop_braked(
+    piece: wp.array(dtype=wp.int32),
+    power: wp.array(dtype=wp.float64),
+    mass: wp.array(dtype=wp.float64),
+    force: wp.array(dtype=wp.vec2d),
+    stiffness: wp.array(dtype=wp.float64),
+    time_step: wp.float64,
+    first: int,
+    # outputs
+    velocity: wp.array(dtype=wp.vec2d),
+    driving_force: wp.array(dtype=wp.vec2d),
+    first_guess: wp.array(dtype=wp.vec2d),
+):
+    """`stop`, of those pieces whose power (#P) is negative. piece: #V, which a vertex is of."""
+    i = wp.tid() + first
+    if power[piece[i]] < wp.float64(0.0):
+        velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+        driving_force[i] = force[i]
+        first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
+
+
+@wp.kernel
+def count_braked(
+    power: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    count: wp.array(dtype=wp.int32),
+):
+    """How often each piece was stopped: one more, where its power is negative. All #P."""
+    p = wp.tid() + first
+    if power[p] < wp.float64(0.0):
+        count[p] = count[p] + 1
+
+
+@wp.kernel
 def advance(
     mass: wp.array(dtype=wp.float64),
     springs: Springs,

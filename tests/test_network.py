@@ -10,12 +10,14 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.springs import compute_spring_energy
+from warpflat.kernels.sums import subtract
 
 from warpflat.cells import cells_of
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.flattening import flatten
+from warpflat.launching import launch_each
 from warpflat.membrane import MODELS, Model
-from warpflat.network import SpringNetwork
+from warpflat.network import SpringNetwork, _repeated
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.shapes import make_shape
 from warpflat.springs import quad_stiffness, springs_of
@@ -288,8 +290,8 @@ def copied(arrays):
 def test_networks_of_one_surface_share_what_no_fabric_changes(split: int):
     surface = sheet(5, 5, 0.01, 0.012, split=split)
     flat = surface.vertices[:, :2]
-    one = SpringNetwork.build(surface, cloth(), flat, device=DEVICE)
-    other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device=DEVICE)
+    one = SpringNetwork.build(surface, cloth(), flat, device="cpu")
+    other = SpringNetwork.build(surface, cloth(warp=1700.0, shear=90.0), 1.1 * flat, grain_angle=40.0, device="cpu")
     for struct, names in (
         ("springs", ("offset", "neighbor", "rest_length")),
         ("cells", ("face", "first", "laid", "offset", "slot")),
@@ -387,3 +389,12 @@ def test_a_compressed_thread_kinks_beyond_the_onset_and_the_guard_holds_it():
     onset = network.cells.onset.numpy()[0, 1]
     assert curvature(1 / (1 + 0.5 * onset)) > 0
     assert curvature(1 / (1 + 2.0 * onset)) < 0
+
+
+def test_one_number_for_all_rows_stays_one_on_a_device():
+    rows = _repeated(wp.array([[1.0, 2.0]], dtype=wp.vec2d, device=DEVICE), 5)
+    assert rows.shape == (5,)
+    assert rows.numpy().tolist() == [[1.0, 2.0]] * 5
+    got = wp.zeros(5, dtype=wp.vec2d, device=DEVICE)
+    launch_each(subtract, 5, [got, rows], [got], device=DEVICE)
+    assert got.numpy().tolist() == [[-1.0, -2.0]] * 5

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.sums import products, weighted_rows
+from warpflat.ways import Vectors, Ways, ways_of
 
 __all__ = ["CycleMemory", "Mark"]
 
@@ -17,10 +17,8 @@ _DEPTH = 2
 _SOUND = 1e-3
 
 
-Mark = tuple[FloatArray, FloatArray]
-"""#V by 2, a layout [m], and the forces there [N]."""
-Way = NDArray[np.float32]
-"""#V by 2, from one layout to another [m]. Only its direction counts: single precision does."""
+Mark = tuple[Vectors, Vectors]
+"""#V by 2, a layout [m], and the forces there [N], where they are."""
 
 
 class CycleMemory:
@@ -35,9 +33,10 @@ class CycleMemory:
         """Of so many cycles, besides the present one."""
         self._depth = depth
         self._last: Mark | None = None
+        self._algebra: Ways
         # Ways of cycles before, each as one, and then those of the present cycle's parts; of all of them the curvature, the fall of the
         # forces on one of them along another [N m].
-        self._ways: list[Way] = []
+        self._ways: list[Vectors] = []
         self._past = 0
         self._curvature = np.zeros((0, 0))
 
@@ -55,10 +54,10 @@ class CycleMemory:
     def come_to(self, mark: Mark) -> None:
         """A part of the cycle has led here: each is a way of its own. The mark is copied."""
         assert self._last is not None
-        fall = _difference(self._last[1], mark[1])
-        self._ways.append(_difference(mark[0], self._last[0]))
+        fall = self._algebra.difference(self._last[1], mark[1])
+        self._ways.append(self._algebra.difference(mark[0], self._last[0]))
         # How the forces fell on earlier ways along this one is the same as long as they fall in proportion.
-        along = products([way.ravel() for way in self._ways], [fall.ravel()])
+        along = self._algebra.products(self._ways, fall)[:, None]
         self._curvature = np.block([[self._curvature, along[:-1]], [along.T]])
         self._keep(mark)
 
@@ -66,7 +65,7 @@ class CycleMemory:
         """Make the parts of the present cycle one."""
         parts = len(self._ways) - self._past
         for way in self._ways[self._past + 1 :]:
-            self._ways[self._past] += way
+            self._algebra.join(self._ways[self._past], way)
         del self._ways[self._past + 1 :]
         joined = np.zeros((self._past + 1, self._past + parts))
         joined[:-1, : self._past] = np.eye(self._past)
@@ -76,29 +75,22 @@ class CycleMemory:
     def _keep(self, mark: Mark) -> None:
         """In the room of the last one."""
         if self._last is None:
-            self._last = np.array(mark[0]), np.array(mark[1])
-        else:
-            for kept, values in zip(self._last, mark, strict=True):
-                np.copyto(kept, values)
+            self._algebra = ways_of(mark[0])
+        layout, forces = self._last or (None, None)
+        self._last = self._algebra.keep(mark[0], layout), self._algebra.keep(mark[1], forces)
 
-    def lowest(self, room: FloatArray) -> bool:
+    def lowest(self, room: Vectors) -> bool:
         """Put the way from where the cycle has come to where the energy is least there, #V by 2 [m]; whether that can be told."""
         assert self._last is not None
-        moved = [number for number, way in enumerate(self._ways) if way.any()]
-        ways, curvature = [self._ways[number].ravel() for number in moved], self._curvature[np.ix_(moved, moved)]
+        moved = [number for number, way in enumerate(self._ways) if self._algebra.moves(way)]
+        ways, curvature = [self._ways[number] for number in moved], self._curvature[np.ix_(moved, moved)]
         size = np.sqrt(np.abs(np.diag(curvature)))
         if not len(size) or not (size > 0.0).all():
             return False
-        left = self._last[1]
-        gain = products(ways, [left.ravel()])[:, 0]
+        gain = self._algebra.products(ways, self._last[1])
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))
         sound = values > _SOUND
         share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
-        weighted_rows(share, ways, room.reshape(-1))
+        self._algebra.put(share, ways, room)
         self._join()
         return True
-
-
-def _difference(a: FloatArray, b: FloatArray) -> NDArray[np.float32]:
-    """a - b, rounded in the end only."""
-    return np.subtract(a, b, out=np.empty(a.shape, dtype=np.float32))

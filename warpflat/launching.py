@@ -3,7 +3,7 @@
 A launch on the CPU is one serial loop that holds no interpreter lock while it runs, so ranges of it run at once from
 Python threads. A kernel that is launched so takes ``first: int`` as its last input and begins with
 ``i = wp.tid() + first``; it writes to places of its own index only, so that the result is the same, bit for bit, for
-any number of threads. On a CUDA device the same calls are ordinary launches.
+any number of threads. On a CUDA device the same calls are ordinary launches, and a sequence that is run again and again becomes a graph.
 
     step = Sequence([record(gather_forces, dim=n, inputs=[...], outputs=[...]), record(advance, ...)])
     step.launch()                   # both, each over ranges, the second when all of the first is done
@@ -18,7 +18,7 @@ import contextlib
 import os
 import threading
 from collections.abc import Sequence as SequenceOf
-from functools import lru_cache
+from functools import lru_cache, partial
 from typing import Any
 
 import numpy as np
@@ -27,12 +27,14 @@ import warp as wp
 from warpflat.errors import InputError
 from warpflat.packing import Command, commands_of
 
-__all__ = ["Launch", "Sequence", "launch_each", "record", "split_range", "thread_count"]
+__all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range", "thread_count"]
 
 # A range shorter than this is not worth waking a thread for (benchmarks/threads.py measures it).
 _LEAST_RANGE = 2048
 # Ranges begin at multiples of this, so that no two threads write to one cache line.
 _ALIGNMENT = 64
+# Runs after which a sequence on a CUDA device becomes a graph, which takes as long as several of them.
+_GRAPH_AFTER = 2
 
 
 def thread_count() -> int:
@@ -67,12 +69,15 @@ class Launch:
     """A recorded launch; `launch` runs it and returns when it is done (on a CUDA device: when it is under way).
 
     Attributes:
-        commands: one for each range.
+        commands: one for each range. device: where they run.
     """
 
-    def __init__(self, commands: SequenceOf[Command], keep: object = None) -> None:
+    def __init__(
+        self, commands: SequenceOf[Command], keep: object = None, device: str | wp.Device | None = "cpu"
+    ) -> None:
         """Of the commands for the ranges; `keep` holds what they point to."""
         self.commands = tuple(commands)
+        self.device = wp.get_device(device)
         self._keep = keep
 
     def launch(self) -> None:
@@ -83,6 +88,8 @@ class Launch:
 class Sequence:
     """Launches one after the other: the threads stay at it, with a barrier after each launch.
 
+    On a CUDA device they become one graph once they have been run a few times: to start that takes as long as to start one of them.
+
     Attributes:
         launches: in their order.
     """
@@ -91,10 +98,20 @@ class Sequence:
         """Of these launches; those without any range are left out."""
         self.launches = tuple(launches)
         self._phases = [launch.commands for launch in self.launches if launch.commands]
+        self._device = next((launch.device for launch in self.launches if launch.device.is_cuda), None)
+        self._runs, self._graph = 0, None
 
     def launch(self) -> None:
         """Run them."""
+        if self._graph is not None:
+            wp.capture_launch(self._graph)
+            return
         _run(self._phases)
+        self._runs += 1
+        if self._device is not None and self._runs == _GRAPH_AFTER and len(self._phases) > 1:
+            with wp.ScopedCapture(device=self._device, force_module_load=False) as capture:
+                _run(self._phases)
+            self._graph = capture.graph
 
 
 def record(
@@ -124,7 +141,18 @@ def record(
     else:
         ranges = [(0, dim)] if dim > 0 else []
     commands = commands_of(kernel, ranges, inputs, outputs, where)
-    return Launch(commands, keep=(inputs, outputs))
+    return Launch(commands, keep=(inputs, outputs), device=where)
+
+
+def record_copy(source: wp.array, target: wp.array, *, begin: int = 0) -> Launch:
+    """Record that values are copied, as many as the target has, from `begin` on; both are on one device."""
+    copy = partial(wp.copy, target, source, src_offset=begin, count=len(target))
+    return Launch([copy], keep=(source, target), device=target.device)
+
+
+def record_zero(target: wp.array) -> Launch:
+    """Record that an array is filled with zeros."""
+    return Launch([target.zero_], keep=target, device=target.device)
 
 
 def launch_each(

@@ -18,8 +18,9 @@ from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
 from warpflat.heap import give_back_of
 from warpflat.joined import join_networks
+from warpflat.kernels.sums import subtract
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
-from warpflat.launching import Launch, record
+from warpflat.launching import Launch, launch_each, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
 from warpflat.rungs import Rung, rungs_of, stay
@@ -271,7 +272,7 @@ class Levels:
         energy = self._objective(level)
         higher = ~(energy <= before)
         if higher.any():
-            state.spare.assign(state.position.numpy() - state.anchor.numpy())
+            _put_way(state, state.anchor, state.spare)
             energy = np.where(higher, self._go(level, state.anchor, state.spare, before, higher, most=0.5), energy)
         return energy
 
@@ -282,28 +283,24 @@ class Levels:
         state, memories = self._levels[last].state, [CycleMemory() for _ in self._ladders]
         state.evaluate_at_rest()
 
-        def forces() -> FloatArray:
-            force = state.force.numpy()
-            return np.array([np.linalg.norm(force[here]) for here in state.vertices])
-
-        aim, most = share * forces(), max(net.vertex_count for net in state.network.pieces)
+        aim, most = share * state.pieces.force_sizes(), max(net.vertex_count for net in state.network.pieces)
         first = before = now = self._objective(last)
         leaping, lines = self._lattice or not little, self._levels[last].lines
         steps = self._levels[last].steps if lines else _BOTTOM_STEPS
-        _begin(state, memories, _all_forces(state))
+        _begin(state, memories, state.pieces.mark_with_load())
         for number in range(1, 1 + math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
             state.sweep(steps, watch_every=self._watch_every)
             self._count(last, steps)
             now = self._step_along_lines(last) if lines else self._objective(last)
             if leaping and number % _LEAP_EVERY == 0 and np.isfinite(now).all():
                 state.evaluate_at_rest()
-                _come_to(state, memories, _all_forces(state))
+                _come_to(state, memories, state.pieces.mark_with_load())
                 now = self._leap(last, memories, now)
                 state.evaluate_at_rest()
-                _begin(state, memories, _all_forces(state))
+                _begin(state, memories, state.pieces.mark_with_load())
             with np.errstate(invalid="ignore"):  # infinite, with mirrored cells
                 slow = before - now < little * (first - now)
-            if ((forces() <= aim) | slow).all():
+            if ((state.pieces.force_sizes() <= aim) | slow).all():
                 break
             before = now
         return now
@@ -329,7 +326,7 @@ class Levels:
         state.evaluate_at_rest()
         self._count(level, FORCE_WORK)
         if level == 0 and self._memories:
-            _come_to(state, self._memories, _mark(state))
+            _come_to(state, self._memories, state.pieces.mark())
         way.down.launch()
         way.coarse.load.zero_()
         way.coarse.evaluate_at_rest()
@@ -342,11 +339,11 @@ class Levels:
         self.cycle(level + 1)
         self._correct(level, way)
         if level == 0 and self._memories:
-            _come_to(state, self._memories, _mark(state))
+            _come_to(state, self._memories, state.pieces.mark())
         energy = self.smooth(level, each_step, evaluated=True)
         higher = ~(energy <= before)
         if higher.any():
-            way.correction.assign(state.position.numpy() - way.base.numpy())
+            _put_way(state, way.base, way.correction)
             energy = np.where(higher, self._go(level, way.base, way.correction, before, higher, most=0.5), energy)
         return energy
 
@@ -402,7 +399,7 @@ class Levels:
     def remember(self, memories: Sequence[CycleMemory]) -> None:
         """A cycle on the finest level begins here, to be remembered; `memories` are of each piece."""
         self._memories = memories
-        _begin(self._levels[0].state, memories, _mark(self._levels[0].state))
+        _begin(self._levels[0].state, memories, self._levels[0].state.pieces.mark())
 
     def leap(self, energy: FloatArray) -> None:
         """Go on from where a cycle on the finest level has led, to where this one and those before say that the energy is least, as far as
@@ -410,7 +407,7 @@ class Levels:
         state = self._levels[0].state
         self._count(0, FORCE_WORK)
         state.evaluate_at_rest()
-        _come_to(state, self._memories, _mark(state))
+        _come_to(state, self._memories, state.pieces.mark())
         self._leap(0, self._memories, energy)
 
     def _leap(self, level: int, memories: Sequence[CycleMemory], energy: FloatArray) -> FloatArray:
@@ -512,21 +509,13 @@ def _come_to(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> 
 
 def _put_lowest(state: Relaxation, memories: Sequence[CycleMemory]) -> BoolArray:
     """Put the ways to where the energy is least where there is room; #P, whether that could be told."""
-    room = state.spare.numpy()
-    told = np.array([memory.lowest(room[own]) for memory, own in zip(memories, state.vertices, strict=True)])
-    if not state.network.device.is_cpu:
-        state.spare.assign(room)
-    return told
+    room = state.pieces.room()
+    return np.array([memory.lowest(room[own]) for memory, own in zip(memories, state.vertices, strict=True)])
 
 
-def _mark(state: Relaxation) -> Mark:
-    """Where it is, and the forces of the cloth there, as they have just been evaluated; perhaps of the buffers themselves."""
-    return state.position.numpy(), state.cloth_force()
-
-
-def _all_forces(state: Relaxation) -> Mark:
-    """The same with the load."""
-    return state.position.numpy(), state.force.numpy()
+def _put_way(state: Relaxation, base: wp.array, way: wp.array) -> None:
+    """How it has come from a layout to where it is."""
+    launch_each(subtract, len(way), [state.position, base], [way], device=state.network.device)
 
 
 def _watch_every(network: SpringNetwork) -> int:

@@ -96,7 +96,7 @@ class _Cycles:
         paces = [self.paces[piece] for piece in pieces]
         return _Cycles(state=state, levels=self.levels.keep(state, pieces), paces=paces, renewals=self.renewals)
 
-    def go(self, enough: float | None, each_step: Callable[[], None]) -> None:
+    def go(self, enough: float | None, each_step: Callable[[], None] | None) -> None:
         """One cycle, and a look."""
         state, paces = self.state, self.paces
         if self.levels.stale and self.renewals < _RENEWALS:
@@ -194,7 +194,7 @@ def relax_multilevel(
         if left is not None:
             cycles.state.give(whole)
             cycles = left
-        cycles.go(enough, lambda: tell(each_step))
+        cycles.go(enough, None if each_step is None else lambda: tell(each_step))
         tell(watch)
     cycles.state.give(whole)
     return whole.outcome(first, start, begun=begun)

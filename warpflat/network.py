@@ -335,6 +335,16 @@ class SpringNetwork:
 
 
 def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:
-    """The values on the device; on the CPU these very ones, one number for all rows included."""
-    there = values if device.is_cpu else np.ascontiguousarray(values)
-    return wp.array(there, dtype=dtype, device=device, copy=False)
+    """The values on the device; on the CPU these very ones. One number for all rows stays one."""
+    if device.is_cpu:
+        return wp.array(values, dtype=dtype, device=device, copy=False)
+    if len(values) and values.strides[0] == 0:
+        return _repeated(wp.array(np.ascontiguousarray(values[:1]), dtype=dtype, device=device), len(values))
+    return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
+
+
+def _repeated(row: wp.array, count: int) -> wp.array:
+    """An array of one as one of so many."""
+    rows = wp.array(ptr=row.ptr, dtype=row.dtype, shape=(count,), strides=(0,), device=row.device)
+    rows._ref = row  # as slices hold what they are of
+    return rows

@@ -15,7 +15,6 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import InitVar, dataclass, replace
 from functools import cached_property
-from itertools import pairwise
 from typing import Literal
 
 import numpy as np
@@ -23,16 +22,19 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, expect, is_number, nearest
+from warpflat.far_pieces import FarPieces
+from warpflat.far_steps import FarSteps
 from warpflat.joined import join_networks
 from warpflat.kernels.transfer import correct
 from warpflat.launching import launch_each
 from warpflat.looks import Energies, Look, Outcome
+from warpflat.near_pieces import NearPieces
 from warpflat.network import SpringNetwork
 from warpflat.smoothing import STEADY, STILL, pace_of
 from warpflat.step_buffers import StepBuffers
-from warpflat.sums import begins, dot
+from warpflat.sums import dot
 from warpflat.tangent import TangentMatrix
-from warpflat.upright import Upright, hold_upright, take_out_turning
+from warpflat.upright import Upright
 
 __all__ = [
     "SOLVERS",
@@ -152,19 +154,36 @@ class Relaxation:
         self.force, self.load = buffers.force, buffers.load
         self.anchor, self.spare = buffers.anchor, buffers.first_guess
         pieces = self.network.pieces
-        self._vertex_begin = begins([net.vertex_count for net in pieces])
-        self._face_begin = begins([net.face_count for net in pieces])
-        self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
+        self.pieces, self._far_steps = self._pieces_of()
+        self.vertices = self.pieces.vertices
         self.numbers: Sequence[int] = range(len(pieces))
         self._spring_count = np.array([net.spring_count for net in pieces])
         self.matrix = TangentMatrix(self.network) if self.network.model == "membrane" else None
         self.steps = 0
         self.work_units = 0.0
-        self.restarts = 0
+        self._restarts = 0
         self.last: Look
         self.looked = False
         # Whether the guard acted anywhere when all cells were last looked at before a step.
         self._acts = False
+
+    def _pieces_of(self) -> tuple[NearPieces | FarPieces, FarSteps | None]:
+        """What looks at the pieces where the arrays are, and the steps where these are not the host's."""
+        if self.network.device.is_cpu:
+            return NearPieces(self.network, self._buffers), None
+        pieces = FarPieces(self.network, self._buffers)
+        return pieces, FarSteps(self._buffers, pieces, damped=self.options.kinetic_damping)
+
+    @property
+    def restarts(self) -> int:
+        """How often the velocities of a piece were set to zero."""
+        self._restarts += self.pieces.stopped()
+        return self._restarts
+
+    @restarts.setter
+    def restarts(self, count: int) -> None:
+        self.pieces.stopped()
+        self._restarts = count
 
     # --- what is measured against
 
@@ -208,11 +227,15 @@ class Relaxation:
                 evaluated, and no vertex leaves the reach that it had: three times as fast, and as good where steps are to smooth.
             evaluated: of the state as it is, all cells have been looked at already.
         """
+        if self._far_steps is not None and each_step is None:
+            self._far_steps.sweep(steps, watch_every, evaluated=evaluated)
+            self.steps += steps
+            return
         self._buffers.go_at(STEADY)
         for number in range(steps):
             self._evaluate(number, watch_every, evaluated=evaluated)
             if self.options.kinetic_damping:
-                self._damp()
+                self._restarts += self.pieces.damp()
             self._advance(each_step)
 
     def smooth(
@@ -224,6 +247,10 @@ class Relaxation:
         evaluated: bool = False,
     ) -> None:
         """Some steps from rest that take what is rough (`warpflat.smoothing`). Arguments as of `sweep`."""
+        if self._far_steps is not None and each_step is None:
+            self._far_steps.smooth(steps, watch_every, evaluated=evaluated)
+            self.steps += steps
+            return
         for number in range(steps):
             self._buffers.go_at(pace_of(number))
             self._evaluate(number, watch_every, evaluated=evaluated)
@@ -237,15 +264,7 @@ class Relaxation:
             return
         if number or not evaluated:
             buffers.evaluate.launch()
-        self._acts = watch_every > 1 and bool(buffers.on_host(buffers.guarded).any())
-
-    def _damp(self) -> None:
-        """Velocities of pieces whose forces begin to brake the motion become zero."""
-        buffers = self._buffers
-        power = _sums(buffers.on_host(buffers.power), self._vertex_begin)
-        for piece in np.flatnonzero(power < 0.0) if power.min() < 0.0 else ():
-            buffers.stop[piece].launch()
-            self.restarts += 1
+        self._acts = watch_every > 1 and self.pieces.guard_acts()
 
     def _advance(self, each_step: Callable[[], None] | None) -> None:
         self._buffers.advance.launch()
@@ -255,6 +274,9 @@ class Relaxation:
 
     def evaluate_at_rest(self) -> None:
         """The forces of the present layout; velocities become zero."""
+        if self._far_steps is not None:
+            self._far_steps.evaluate_at_rest()
+            return
         self.velocity.zero_()
         self._buffers.go_at(STILL)
         self._buffers.evaluate.launch()
@@ -267,8 +289,7 @@ class Relaxation:
 
     def mirrored_pieces(self) -> BoolArray:
         """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
-        clearance = self._buffers.on_host(self._buffers.face_clearance)
-        return np.logical_or.reduceat(clearance <= 0.0, self._face_begin[:-1])
+        return self.pieces.mirrored()
 
     def move(self, base: wp.array, way: wp.array, share: float, pieces: BoolArray) -> None:
         """Let these pieces (#P) go from `base` (#V vec2d [m]) by a share of `way`, as far as each vertex is free to."""
@@ -282,15 +303,12 @@ class Relaxation:
 
     def work_of_load(self) -> FloatArray:
         """#P, sum of load times place [J]."""
-        load, position = (self._buffers.on_host(array) for array in (self.load, self.position))
-        return np.array([np.einsum("ij,ij->", load[here], position[here]) for here in self.vertices])
+        return self.pieces.work_of_load()
 
     def potentials(self) -> FloatArray:
         """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
-        buffers = self._buffers
-        buffers.measure.launch()
-        springs = _sums(buffers.on_host(buffers.vertex_energy), self._vertex_begin)
-        return np.stack([springs, _sums(buffers.on_host(buffers.face_energy), self._face_begin)], axis=1)
+        self._buffers.measure.launch()
+        return np.stack(self.pieces.measured(), axis=1)
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
@@ -300,7 +318,7 @@ class Relaxation:
         """#P by 3, the same of each piece."""
         spring, cells = self.potentials().T
         self._buffers.measure_motion.launch()
-        kinetic = _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
+        kinetic = self.pieces.of_vertices()
         if self.network.model == "springs":
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
@@ -348,7 +366,7 @@ class Relaxation:
 
     def may_leave(self, pieces: BoolArray) -> bool:
         """Whether these pieces (#P) are so large a part that it pays to go on without them."""
-        sizes = np.diff(self._vertex_begin)
+        sizes = np.array([here.stop - here.start for here in self.vertices])
         return bool(sizes[pieces].sum() >= _LEAVE * sizes.sum())
 
     def keep(self, pieces: Sequence[int]) -> Relaxation:
@@ -398,14 +416,7 @@ class Relaxation:
         """
         if not self.upright:
             return
-        arrays = self.position, self.velocity, self.load
-        # On the CPU the buffers themselves.
-        position, velocity, load = held = [array.numpy() for array in arrays]
-        weight = self.network.spring_stiffness.numpy()
-        hold_upright(self.upright, position, velocity, load, self.force.numpy(), weight)
-        if not self.network.device.is_cpu:
-            for array, values in zip(arrays, held, strict=True):
-                array.assign(values)
+        self.pieces.hold_upright(self.upright)
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -414,7 +425,7 @@ class Relaxation:
 
     def cloth_force(self) -> FloatArray:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
-        return np.asarray(self.force.numpy() - self.load.numpy())
+        return self.pieces.cloth_force()
 
     def residual(self) -> float:
         """The worst of `residuals`."""
@@ -427,13 +438,9 @@ class Relaxation:
         force of a spring strained by 1e-9, so that a layout without strain counts as at rest.
         """
         self._buffers.measure_pull.launch()
-        mean = _sums(self._buffers.vertex_pull.numpy(), self._vertex_begin) / self._spring_count
+        mean = self.pieces.of_vertices() / self._spring_count
         floor = 1e-9 * self._mean_stiffness_force
-        weight = self.network.spring_stiffness.numpy()
-        force = self.cloth_force()
-        take_out_turning(self.upright, self.position.numpy(), force, weight)
-        largest = np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1])
-        return np.sqrt(largest) / np.maximum(mean, floor)
+        return self.pieces.strongest(self.upright) / np.maximum(mean, floor)
 
     def outcome(self, steps: int, work_units: float, *, begun: float) -> Outcome:
         """How it has ended, by the last look; it began with so many steps and so much work behind it, when the clock
@@ -460,12 +467,6 @@ class Relaxation:
         return np.array(self.position.numpy(), dtype=np.float64, copy=True)
 
 
-def _sums(values: FloatArray, begin: NDArray[np.int32]) -> FloatArray:
-    """The sum of each range of the values; `begin` has its begins and the last end."""
-    # Of a whole array NumPy adds in pairs, which loses less.
-    return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])
-
-
 Watch = Callable[[Relaxation, Energies, float], None]
 
 
@@ -483,9 +484,9 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
     look = state.begin()
 
     def stepped() -> None:
+        assert each_step is not None
         state.work_units += 1.0
-        if each_step is not None:
-            each_step(state, look.total, float(look.residual.max()))
+        each_step(state, look.total, float(look.residual.max()))
 
     while not look.at_rest.all() and state.steps < options.max_steps:
         if state.may_leave(look.at_rest):
@@ -493,7 +494,11 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
             state = state.keep(np.flatnonzero(~look.at_rest).tolist())
             look = state.last
         chunk = min(options.check_every, options.max_steps - state.steps)
-        state.sweep(chunk, stepped)
+        if each_step is None:
+            state.sweep(chunk)
+            state.work_units += chunk
+        else:
+            state.sweep(chunk, stepped)
         state.hold_upright()
         look = state.look(chunk)
         if state.matrix is not None and state.steps % _FOLLOW_EVERY < chunk:

@@ -178,7 +178,7 @@ def relax_whole(
             left, share = _go(state, whole, ~done)
             state.work_units += work
             steps = _STEPS if share > _LITTLE_WAY else min(2 * steps, _MOST_STEPS)
-        _smooth(state, min(steps, math.ceil(room)), lambda: tell(each_step))
+        _smooth(state, min(steps, math.ceil(room)), None if each_step is None else lambda: tell(each_step))
         state.hold_upright()
         state.evaluate_at_rest()
         look = state.look(1.0)
@@ -190,7 +190,7 @@ def relax_whole(
     return state.outcome(first, start, begun=begun)
 
 
-def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None]) -> None:
+def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None] | None) -> None:
     state.velocity.zero_()
     state.sweep(steps, each_step)
     state.work_units += steps
