@@ -290,7 +290,7 @@ class Relaxation:
         buffers = self._buffers
         buffers.measure.launch()
         springs = _sums(buffers.on_host(buffers.vertex_energy), self._vertex_begin)
-        return np.stack([springs, _sums(buffers.on_host(buffers.face_energy), self._face_begin)], axis=1)
+        return np.array([springs, _sums(buffers.on_host(buffers.face_energy), self._face_begin)]).T
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""
