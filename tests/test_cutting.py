@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import warpflat
 from warpflat.candidates import find_candidates, find_peaks
+from warpflat.cells import cells_of, creases_of
 from warpflat.cutting import CutPlan, cut, draw_line, line_part, move_dart, refine_along, separate
 from warpflat.edits import relax_cut
 from warpflat.errors import InputError
@@ -221,6 +222,18 @@ def test_what_a_cut_knows_of_its_faces_is_not_worked_out_again(
     again = cut(bodice, CutPlan(name="again", paths=bust_cut.cuts[0].paths), relax=RelaxOptions(max_steps=1))
     assert np.array_equal(again.faces, bust_cut.faces)
     assert sum(faces is again.faces for faces in made) == 1
+
+
+def test_a_cut_has_the_creases_and_cells_that_its_own_surface_tells(bodice: Flattening, bust_cut: Flattening):
+    surface = bust_cut.network.surface
+    afresh = replace(surface)
+    assert cells_of(surface).laid is cells_of(bodice.surface).laid
+    assert np.array_equal(creases_of(surface), creases_of(afresh))
+    for name, values in vars(cells_of(afresh)).items():
+        if name != "around":
+            assert np.array_equal(getattr(cells_of(surface), name), values), name
+    for name, values in vars(cells_of(afresh).around).items():
+        assert np.array_equal(getattr(cells_of(surface).around, name), values), name
 
 
 def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):

@@ -3,7 +3,7 @@ body."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,12 +11,12 @@ from numpy.typing import NDArray
 from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
-from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only, tell
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.unfold import corners_around, lay_cells, quad_creases
 
-__all__ = ["ByVertex", "CellArrays", "cells_of", "corners_of", "creases_of", "first_of_faces"]
+__all__ = ["ByVertex", "CellArrays", "cells_of", "corners_of", "creases_of", "first_of_faces", "inherit_cells"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -117,6 +117,12 @@ def cells_of(surface: Surface) -> CellArrays:
     faces, first = surface.faces, first_of_faces(surface, 4, 1)
     laid = lay_cells(surface.vertices, faces, creases_of(surface), first)
     return read_only(CellArrays(faces=faces, first=first, laid=laid, around=corners_of(surface)))
+
+
+def inherit_cells(surface: Surface, whole: Surface) -> None:
+    """Let a surface that a cut has made of another have its creases and cells: no face has moved, or has another place in their order."""
+    cells = replace(cells_of(whole), faces=surface.faces, around=corners_of(surface))
+    tell(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
 
 
 @once_per_faces

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.cells import inherit_cells
 from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
 from warpflat.errors import InputError, expect, expect_callback
@@ -203,6 +204,7 @@ def relax_cut(
         options: of the relaxation.
         callback: called with a `Progress` before the first step and after every step.
     """
+    inherit_cells(surface, result.surface)
     run = _later_run(result, surface, result.fabric, stage, options, callback)
     return replace(_gone_on(result, run, positions), cuts=tuple(cuts))
 
@@ -222,10 +224,11 @@ def _later_run(
     if surface is not result.surface:
         # A cut may part the datum: then the first part of it stays upright.
         part = components_of(surface)
-        part_of = np.full(len(surface.vertices), -1)
-        used = surface.faces >= 0
-        part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
-        datum = datum[part_of[datum] == part_of[datum[0]]]
+        if part.any():
+            part_of = np.full(len(surface.vertices), -1)
+            used = surface.faces >= 0
+            part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
+            datum = datum[part_of[datum] == part_of[datum[0]]]
     device, model = result.network.device, result.network.model
     return Run(
         surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear

@@ -308,7 +308,7 @@ class Relaxation:
     def potentials(self) -> FloatArray:
         """#P by 2, energies of the springs and of the cells of the present layout [J], the cells' guard or membrane."""
         self._buffers.measure.launch()
-        return np.stack(self.pieces.measured(), axis=1)
+        return np.array(self.pieces.measured()).T
 
     def energies(self) -> Energies:
         """Energies of the present state [J]."""

@@ -234,7 +234,7 @@ def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
     prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
     prolongation.eliminate_zeros()
     # Without the room for what was zero.
-    return csr_array(prolongation.copy())
+    return prolongation.copy()
 
 
 def _second(count: int) -> IntArray:
@@ -332,4 +332,4 @@ def _between_corners(
     prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
     prolongation.eliminate_zeros()
     # Without the room for what was zero.
-    return csr_array(prolongation.copy())
+    return prolongation.copy()

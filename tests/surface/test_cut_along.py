@@ -7,7 +7,7 @@ import pytest
 from cut_meshes import cone, cylinder, grid
 
 from warpflat.errors import InputError
-from warpflat.surface.cut import cut_along, cut_along_many, glue
+from warpflat.surface.cut import cut_along, cut_along_many, faces_at, glue
 from warpflat.surface.topology import border_edges, border_loops, euler_characteristic
 
 FIVE = grid(5, 5)
@@ -187,3 +187,11 @@ def test_inconsistent_winding_is_noticed():
     faces[1] = faces[1][::-1]
     with pytest.raises(InputError, match="wound inconsistently"):
         cut_along(faces, [2, 7, 12], vertex_count=25)
+
+
+def test_faces_at_vertices_have_one_of_them_and_a_triangle_has_no_last_vertex():
+    mixed = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
+    assert faces_at(mixed, np.array([4], dtype=np.int32)).tolist() == [1]
+    assert faces_at(mixed, np.array([2, 9], dtype=np.int32)).tolist() == [0, 1]
+    assert faces_at(mixed, np.array([3, 0], dtype=np.int32)).tolist() == [0]
+    assert faces_at(mixed, np.array([9], dtype=np.int32)).tolist() == []

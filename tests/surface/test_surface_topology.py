@@ -23,7 +23,7 @@ from warpflat.surface import (
     unfold_quad_diagonals,
 )
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges_of, order_by, places_of, stable_order, twins_of
+from warpflat.surface.topology import half_edges_of, join_labels, order_by, places_of, stable_order, twins_of
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 
@@ -260,6 +260,20 @@ def test_order_by_is_that_of_a_stable_sort_and_says_where_each_number_begins():
     none, offset = order_by(keys[:0], 3)
     assert len(none) == 0
     assert offset.tolist() == [0, 0, 0, 0]
+
+
+@pytest.mark.parametrize(("nodes", "pairs"), [(0, 0), (1, 0), (1, 2), (40, 25), (200, 190), (200, 600)])
+def test_nodes_that_are_joined_have_one_label_and_first_nodes_come_first(nodes, pairs):
+    a, b = np.random.default_rng(4).integers(0, max(nodes, 1), (2, pairs), dtype=np.int32)
+    reached = np.eye(nodes, dtype=bool)
+    reached[a, b] = reached[b, a] = True
+    for _ in range(nodes.bit_length()):
+        reached = (reached.astype(int) @ reached) > 0
+    first = reached.argmax(axis=1) if nodes else np.zeros(0, dtype=int)
+    labels = join_labels(nodes, a, b)
+    assert labels.dtype == np.int32
+    assert np.array_equal(labels, np.unique(first, return_inverse=True)[1])
+    assert np.array_equal(join_labels(nodes, b.astype(np.int64), a.astype(np.int64)), labels)
 
 
 def test_half_edges_of_a_surface_are_made_once_and_not_to_be_changed():

@@ -21,7 +21,7 @@ from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import HalfEdges, components_of, half_edges, join_labels
 
-__all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "glue"]
+__all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "faces_at", "glue"]
 
 CutKind = Literal["dart", "slit", "split", "hole", "opening", "network"]
 
@@ -132,7 +132,7 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
     if not chains:
         raise InputError("no path to cut along: give at least one")
     on_path = np.unique(np.concatenate(chains))
-    near = np.flatnonzero(np.isin(faces, on_path).any(axis=1))
+    near = faces_at(faces, on_path)
     he = half_edges(faces[near])
     stride = np.int64(vertex_count)
     forward = he.tail.astype(np.int64) * stride + he.head
@@ -167,7 +167,7 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
     after = int(labels.max(initial=-1)) + 1
     # Sewn up again along the cut, what it parted is one.
     beside = (labels[near[he.face[np.concatenate(half)]]] for half in zip(*sides, strict=True))
-    before = int(join_labels(after, *beside).max(initial=-1)) + 1
+    before = int(join_labels(after, *beside).max(initial=-1)) + 1 if after > 1 else after
     return Cut(
         faces=new_faces,
         vertex_origin=origin,
@@ -179,6 +179,16 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
         components_before=before,
         of_faces=cut_mesh.of_faces,
     )
+
+
+def faces_at(faces: NDArray[np.int32], vertices: NDArray[np.int32]) -> NDArray[np.int64]:
+    """The faces (of #F by 4) that have one of these vertices, rising."""
+    # With room for the -1 of triangles at its end.
+    there = np.zeros(max(int(faces.max(initial=0)), int(vertices.max(initial=0))) + 2, dtype=bool)
+    there[vertices] = True
+    # Column by column: along four values NumPy's `any` takes several times as long.
+    first, second, third, fourth = there[faces].T
+    return np.flatnonzero(first | second | third | fourth)
 
 
 def _mesh_of(faces: NDArray[np.int32]) -> Surface:
@@ -282,17 +292,12 @@ def _double(
     Returns:
         #H, the new vertex at each corner; #W, vertex_origin; the number of fans at each path vertex.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     by_edge = np.argsort(he.edge, kind="stable")
     same = (he.edge[by_edge[1:]] == he.edge[by_edge[:-1]]) & ~marked[he.edge[by_edge[1:]]]
     a, b = by_edge[:-1][same], by_edge[1:][same]
     # Wound consistently, one face's half-edge starts where the other's ends.
     rows, columns = np.concatenate([a, he.next[a]]), np.concatenate([he.next[b], b])
-    corners = len(he.tail)
-    graph = coo_matrix((np.ones(len(rows), dtype=np.int8), (rows, columns)), shape=(corners, corners))
-    fan = connected_components(graph, directed=False)[1]
+    fan = join_labels(len(he.tail), rows, columns)
 
     vertex = he.tail.copy()
     keep: dict[int, int] = {}

@@ -120,8 +120,11 @@ def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice |
     lattice = lattice_of(whole)
     if lattice is None:
         return None
-    slot = np.argmax(whole.faces == lattice.corner[:, :1], axis=1)
-    corner = np.take_along_axis(surface.faces, (slot[:, None] + np.arange(4)) % 4, axis=1)
+    corner = surface.faces
+    # Of a grid that is numbered row by row they are in this order already.
+    if lattice.corner is not whole.faces:
+        slot = np.argmax(whole.faces == lattice.corner[:, :1], axis=1)
+        corner = np.take_along_axis(corner, (slot[:, None] + np.arange(4)) % 4, axis=1)
     row, column = lattice.row[origin], lattice.column[origin]
     return read_only(replace(lattice, row=row, column=column, corner=corner, bends=_bends(surface)))
 

@@ -11,7 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "known_of_faces", "once_per_faces", "once_per_surface", "read_only"]
+__all__ = ["Surface", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
 
 Result = TypeVar("Result")
 
@@ -55,6 +55,7 @@ class Surface:
 def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
     """A function of a surface, worked out once for each and kept as long as that lives; surfaces do not change."""
     known: WeakKeyDictionary[Surface, Result] = WeakKeyDictionary()
+    _known_of_surfaces[_name(measure)] = known
 
     @wraps(measure)
     def remembered(surface: Surface) -> Result:
@@ -63,6 +64,15 @@ def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface]
         return known[surface]
 
     return remembered
+
+
+_known_of_surfaces: dict[str, WeakKeyDictionary[Surface, Any]] = {}
+
+
+def tell(surface: Surface, results: Mapping[Callable[[Surface], Any], Any]) -> None:
+    """What functions `once_per_surface` would find out of a surface."""
+    for measure, result in results.items():
+        _known_of_surfaces[_name(measure)][surface] = result
 
 
 def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:

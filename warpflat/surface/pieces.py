@@ -10,9 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.cut import Cut
+from warpflat.surface.cut import Cut, faces_at
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges
+from warpflat.surface.topology import corner_triangles, half_edges, sides_of
 
 __all__ = ["Piece", "apply_cut", "carry_lines", "split_pieces"]
 
@@ -68,24 +68,15 @@ def carry_lines(
         cut: made from `faces`.
     """
     doubled = np.unique(np.concatenate([seam.path for seam in cut.seams]))
-    # With room for the -1 of triangles at its end.
-    cut_at = np.zeros(int(faces.max(initial=0)) + 2, dtype=bool)
-    cut_at[doubled] = True
-    near = cut_at[faces].any(axis=1)
+    near = faces_at(faces, doubled)
     # Slots of the faces are the same before and after the cut, so the half-edges correspond one to one.
-    old, new = half_edges(faces[near]), half_edges(cut.faces[near])
-    ends = dict(
-        zip(
-            zip(old.tail.tolist(), old.head.tolist(), strict=True),
-            zip(new.tail.tolist(), new.head.tolist(), strict=True),
-            strict=True,
-        )
-    )
+    old, new = (zip(*(end.tolist() for end in sides_of(of[near])), strict=True) for of in (faces, cut.faces))
+    ends = dict(zip(old, new, strict=True))
     touched = set(doubled.tolist())
     carried: dict[str, NDArray[np.int32]] = {}
     taken = set(lines)
     for name, line in lines.items():
-        if len(line) > 1 and not cut_at[line].any():
+        if len(line) > 1 and touched.isdisjoint(line.tolist()):
             carried[name] = np.asarray(line, dtype=np.int32)
             continue
         streams: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}

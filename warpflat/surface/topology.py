@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.kernels.labels import label_joined
 from warpflat.kernels.surface_cells import unfold_diagonals
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
@@ -41,6 +42,7 @@ __all__ = [
     "order_by",
     "orient",
     "places_of",
+    "sides_of",
     "stable_order",
     "triangulate",
     "twins_of",
@@ -77,12 +79,12 @@ class HalfEdges:
     @cached_property
     def tail(self) -> NDArray[np.int32]:
         """#H."""
-        return _fixed(_sides_of(self.faces)[0])
+        return _fixed(sides_of(self.faces)[0])
 
     @cached_property
     def head(self) -> NDArray[np.int32]:
         """#H."""
-        return _fixed(_sides_of(self.faces)[1])
+        return _fixed(sides_of(self.faces)[1])
 
     @cached_property
     def face(self) -> NDArray[np.int32]:
@@ -125,7 +127,7 @@ def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
 def half_edges(faces: ArrayLike) -> HalfEdges:
     """The sides of all faces with their unique edges: what the other functions here are built on."""
     quads = _four_columns(faces)
-    tail, head = _sides_of(quads)
+    tail, head = sides_of(quads)
     low, high = np.minimum(tail, head), np.maximum(tail, head)
     digits = int(high.max(initial=0)).bit_length()
     joined = low.astype(np.int64)
@@ -170,13 +172,15 @@ def _side_counts(quads: NDArray[np.int32]) -> NDArray[np.int32]:
     return 3 + (quads[:, 3] >= 0).astype(np.int32)
 
 
-def _sides_of(quads: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def sides_of(quads: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """#H each, tail and head of every side."""
     is_quad = quads[:, 3] >= 0
     for sides, only in ((4, is_quad.all()), (3, not is_quad.any())):
         if only:
             corner = quads[:, :sides]
-            return corner.ravel(), np.take(quads, np.roll(np.arange(sides), -1), axis=1).ravel()
+            after = np.empty_like(corner, order="C")
+            after[:, :-1], after[:, -1] = corner[:, 1:], corner[:, 0]
+            return corner.ravel(), after.ravel()
     there = quads >= 0
     after = quads[:, [1, 2, 3, 0]]
     after[~is_quad, 2] = quads[~is_quad, 0]
@@ -268,12 +272,10 @@ def _paired(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 
 def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
-    """Connected components of `size` nodes joined by the pairs a-b."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    graph = coo_matrix((np.ones(len(a), dtype=np.int8), (a, b)), shape=(size, size))
-    return connected_components(graph, directed=False)[1].astype(np.int32)
+    """Connected components of `size` nodes joined by the pairs a-b, numbered from 0 by each component's first node."""
+    label = np.empty(size, dtype=np.int32)
+    launch_each(label_joined, 1, [end.astype(np.int32, copy=False) for end in (a, b)], [label])
+    return label
 
 
 def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
@@ -297,18 +299,17 @@ def components_of(surface: Surface) -> NDArray[np.int32]:
 def _components(he: HalfEdges, size: int, barrier: NDArray[np.int32] | None) -> NDArray[np.int32]:
     if size == 0:
         return np.empty(0, dtype=np.int32)
-    a, b = _paired(he)
+    # Each face joined to the last one at each of its edges.
+    last = np.empty(len(he.edges), dtype=np.int32)
+    last[he.edge] = he.face
+    a, b = he.face, last[he.edge]
     if barrier is not None and len(barrier):
         stride = np.int64(max(he.edges.max(), barrier.max())) + 1
         blocked = barrier.min(axis=1).astype(np.int64) * stride + barrier.max(axis=1)
         open_edge = ~np.isin(he.edges[:, 0].astype(np.int64) * stride + he.edges[:, 1], blocked)
-        passable = open_edge[he.edge[a]]
+        passable = open_edge[he.edge]
         a, b = a[passable], b[passable]
-    labels = join_labels(size, he.face[a], he.face[b])
-    if labels[0] == 0 and (labels[1:] <= np.maximum.accumulate(labels)[:-1] + 1).all():
-        return labels
-    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
-    return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
+    return join_labels(size, a, b)
 
 
 def corner_fans(faces: ArrayLike) -> NDArray[np.int32]:
