@@ -57,8 +57,11 @@ class CycleMemory:
         fall = self._algebra.difference(self._last[1], mark[1])
         self._ways.append(self._algebra.difference(mark[0], self._last[0]))
         # How the forces fell on earlier ways along this one is the same as long as they fall in proportion.
-        along = self._algebra.products(self._ways, fall)[:, None]
-        self._curvature = np.block([[self._curvature, along[:-1]], [along.T]])
+        along, count = self._algebra.products(self._ways, fall), len(self._ways)
+        curvature = np.empty((count, count))
+        curvature[:-1, :-1] = self._curvature
+        curvature[-1], curvature[:, -1] = along, along
+        self._curvature = curvature
         self._keep(mark)
 
     def _join(self) -> None:
