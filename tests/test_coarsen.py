@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
@@ -14,6 +15,7 @@ from scipy.spatial import Delaunay
 
 from warpflat.coarsen import (
     Coarser,
+    _prolongation,
     coarser,
     coarser_surfaces,
     inherit_levels,
@@ -362,6 +364,26 @@ def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch):
     np.testing.assert_array_equal(one.surface.faces, three.surface.faces)
     np.testing.assert_array_equal(one.face_of, three.face_of)
     assert (one.prolongation != three.prolongation).nnz == 0
+
+
+@pytest.mark.parametrize("entries", [1, 8])
+def test_what_is_gone_is_in_the_end_made_of_what_is_kept(entries: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warpflat.coarsen._ENTRIES", entries)
+    random = np.random.default_rng(3)
+    gone = random.permutation(np.repeat(np.arange(4, dtype=np.int32), 10))
+    expected = np.zeros((40, 10))
+    expected[gone == 0] = np.eye(10)
+    parent, weight = np.zeros((40, 3), dtype=np.int32), np.zeros((40, 3))
+    for number in (3, 2, 1):
+        staying = np.flatnonzero((gone == 0) | (gone > number))
+        for vertex in np.flatnonzero(gone == number):
+            parent[vertex], weight[vertex] = random.choice(staying, 3, replace=False), random.dirichlet(np.ones(3))
+            expected[vertex] = weight[vertex] @ expected[parent[vertex]]
+    given = [
+        wp.array(values, dtype=dtype, device="cpu")
+        for values, dtype in ((gone, int), (parent, wp.vec3i), (weight, wp.vec3d))
+    ]
+    np.testing.assert_allclose(_prolongation(*given, passes=3).toarray(), expected, atol=1e-15)
 
 
 def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
