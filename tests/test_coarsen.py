@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from warpflat.cells import cells_of
 from warpflat.coarsen import (
     Coarser,
     _prolongation,
@@ -24,6 +25,7 @@ from warpflat.coarsen import (
     spread_surface,
 )
 from warpflat.shapes import make_shape
+from warpflat.springs import unweighed_springs
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
@@ -32,6 +34,7 @@ from warpflat.surface.topology import (
     border_loops,
     components,
     euler_characteristic,
+    half_edges_of,
     non_manifold_edges,
     non_manifold_vertices,
 )
@@ -418,6 +421,18 @@ def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
         np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
     with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70)):
         _ = 1 / 0
+
+
+def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkeypatch: pytest.MonkeyPatch):
+    piece = sheet(80, 70, triangles=True)
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    with levels_meanwhile(piece):
+        pass
+    for made_once in ("cells.lay_cells", "springs.measure_edges"):
+        monkeypatch.setattr(f"warpflat.{made_once}", None)
+    for step in coarser_surfaces(piece):
+        assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
+        assert unweighed_springs(step.surface).edge_count == len(half_edges_of(step.surface).edges)
 
 
 @pytest.mark.parametrize("kind", ["triangles", "grid", "crack"])

@@ -25,8 +25,10 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry
+from warpflat.cells import cells_of
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
+from warpflat.springs import unweighed_springs
 from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
@@ -178,14 +180,23 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
 
 @contextmanager
 def levels_meanwhile(surface: Surface) -> Iterator[None]:
-    """Make `coarser_surfaces` of a large surface on another core while the body runs, and be done with both at its end."""
+    """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
+    be done with all at its end."""
     if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
-        made = other.submit(coarser_surfaces, surface)
+        made = other.submit(_prepare_levels, surface)
         yield
         made.result()
+
+
+def _prepare_levels(surface: Surface) -> None:
+    for step in coarser_surfaces(surface):
+        if step.smooth_carry is None:
+            cells_of(step.surface)
+            unweighed_springs(step.surface)
+            _ = step.transfer.transpose
 
 
 def _part(
