@@ -187,44 +187,27 @@ def stays_mesh(v: int, j: int, ring: Ring):
     return True
 
 
-@wp.kernel
-def find_targets(
-    ring: Ring,
-    gone: wp.array(dtype=wp.int32),
-    least: wp.float64,
-    first: int,
-    # outputs
-    target: wp.array(dtype=wp.int32),
-    left: wp.array(dtype=wp.float64),
-    blocked: wp.array(dtype=wp.int32),
-):
-    """target: #V, where in its ring is the neighbour into which each vertex vanishes with the best triangles left; -1 where it has
-    to stay. left: #V, the worst one's quality, which is above `least`. blocked: #V, 0. Those that are gone are left alone.
+@wp.func
+def find_target(v: int, ring: Ring, least: wp.float64):
+    """Where in its ring is the neighbour into which a vertex vanishes with the best triangles left, and the quality of the worst of these,
+    which is above `least`; -1 where it has to stay.
 
     A vertex of the border vanishes along the border, where that is nearly straight. So corners stay, and the two sides of a crack,
     whose vertices are different ones at the same place, stay apart. No two vertices are joined that are joined already.
     """
-    v = wp.tid() + first
-    if gone[v] != 0:
-        return
-    target[v] = -1
-    blocked[v] = 0
     d = ring.degree[v]
-    if d == 0:
-        return
     step = int(1)
-    if at(ring, v, d - 1) < 0:
+    if d > 0 and at(ring, v, d - 1) < 0:
         # The first and the last but one are those along the border; a lone triangle's corner stays.
-        if d == 3:
-            return
         step = d - 2
         back = wp.normalize(ring.vertices[v] - ring.vertices[at(ring, v, d - 2)])
         on = wp.normalize(ring.vertices[at(ring, v, 0)] - ring.vertices[v])
-        if wp.dot(back, on) < LEAST_STRAIGHT:
-            return
+        if d == 3 or wp.dot(back, on) < LEAST_STRAIGHT:
+            d = 0
     normal = normal_at(v, ring)
     # The best one, and where it will not do the next best, until none is left.
     bar = wp.float64(1.5)
+    best = wp.float64(least)
     best_j = int(0)
     while best_j >= 0:
         best = wp.float64(least)
@@ -235,10 +218,9 @@ def find_targets(
                 best = worst
                 best_j = j
         bar = best
-        if best_j >= 0 and stays_mesh(v, best_j, ring) and stays_upright(v, best_j, ring):
-            target[v] = best_j
-            left[v] = best
-            return
+        if best_j < 0 or (stays_mesh(v, best_j, ring) and stays_upright(v, best_j, ring)):
+            break
+    return best_j, best
 
 
 # --- collapses
@@ -266,41 +248,70 @@ def shift(ring: Ring, v: int, begin: int, by: int):
     ring.degree[v] = ring.degree[v] + by
 
 
+@wp.func
+def vanish(v: int, j: int, ring: Ring):
+    """Let a vertex vanish into its j-th neighbour; its own ring stays what it was."""
+    d = ring.degree[v]
+    u = at(ring, v, j)
+    here = find(u, v, ring)
+    shift(ring, u, here + 1, d - 4)
+    for i in range(j + 1, j + d):
+        a = at(ring, v, i)
+        inner = i > j + 1 and i < j + d - 1
+        if inner:
+            ring.neighbor[here + i - j - 2] = a
+        if a >= 0:
+            e = find(a, v, ring)
+            if inner:
+                ring.neighbor[e] = u
+            else:
+                shift(ring, a, e + 1, -1)
+
+
 @wp.kernel
 def collapse(
     ring: Ring,
-    target: wp.array(dtype=wp.int32),
-    left: wp.array(dtype=wp.float64),
+    least: wp.float64,
     good: wp.float64,
-    number: int,
+    enough: int,
+    most: int,
     # outputs
-    blocked: wp.array(dtype=wp.int32),
+    passes: wp.array(dtype=wp.int32),
+    remain: wp.array(dtype=wp.int32),
+    target: wp.array(dtype=wp.int32),
+    beside: wp.array(dtype=wp.int32),
     gone: wp.array(dtype=wp.int32),
 ):
-    """For one thread: vertices vanish one by one, never two neighbours, those first that leave triangles of good quality.
-    gone: #V, the number of the pass in which each did, 0 before."""
-    for turn in range(2):
-        for v in range(gone.shape[0]):
-            j = target[v]
-            if gone[v] == 0 and j >= 0 and blocked[v] == 0 and (turn == 1 or left[v] > good) and stays_mesh(v, j, ring):
-                d = ring.degree[v]
-                u = at(ring, v, j)
-                here = find(u, v, ring)
-                shift(ring, u, here + 1, d - 4)
-                for i in range(j + 1, j + d):
-                    a = at(ring, v, i)
-                    inner = i > j + 1 and i < j + d - 1
-                    if inner:
-                        ring.neighbor[here + i - j - 2] = a
-                    if a >= 0:
-                        e = find(a, v, ring)
-                        if inner:
-                            ring.neighbor[e] = u
-                        else:
-                            shift(ring, a, e + 1, -1)
-                        blocked[a] = 1
-                blocked[u] = 1
-                gone[v] = number
+    """For one thread: vertices vanish one by one in passes, in each of them never two neighbours, those first that leave triangles of
+    `good` quality, then those that leave any above the `least`. It ends with a pass after which no more than `enough` remain, or that took
+    few away, or after as many as there may be at `most`.
+
+    passes: 1, how many there have been. remain: 1, how many vertices are left. target: #V, where in its ring is the neighbour into which
+    each vertex vanishes, as `find_target` says. beside: #V, the last pass in which a neighbour of each vanished, 0 before. gone: #V, the
+    pass in which it did itself, 0 before.
+    """
+    lost = int(remain[0])
+    while remain[0] > enough and 50 * lost >= remain[0] and passes[0] < most:
+        number = passes[0] + 1
+        before = int(remain[0])
+        for turn in range(2):
+            for v in range(gone.shape[0]):
+                # What is around a vertex is as it was at the beginning of the pass, until a neighbour vanishes.
+                if gone[v] == 0 and beside[v] != number:
+                    goes = turn == 1
+                    if turn == 0:
+                        j, left = find_target(v, ring, least)
+                        target[v] = j
+                        goes = left > good
+                    if goes and target[v] >= 0 and stays_mesh(v, target[v], ring):
+                        vanish(v, target[v], ring)
+                        gone[v] = number
+                        remain[0] = remain[0] - 1
+                        for e in range(ring.offset[v], ring.offset[v] + ring.degree[v]):
+                            if ring.neighbor[e] >= 0:
+                                beside[ring.neighbor[e]] = number
+        passes[0] = number
+        lost = before - remain[0]
 
 
 @wp.kernel
@@ -344,3 +355,54 @@ def place(
                     )
                     parent[v] = wp.vec3i(u, a, b)
                     weight[v] = w / (w[0] + w[1] + w[2])
+
+
+@wp.kernel
+def compose_rows(
+    gone: wp.array(dtype=wp.int32),
+    parent: wp.array(dtype=wp.vec3i),
+    weight: wp.array(dtype=wp.vec3d),
+    passes: int,
+    # outputs
+    row: wp.array(dtype=wp.int32),
+    offset: wp.array(dtype=wp.int32),
+    column: wp.array(dtype=wp.int32),
+    value: wp.array(dtype=wp.float64),
+):
+    """For one thread: how much of what is kept is in each vertex, in the end. Those that went last come first, since parents stay longer.
+
+    gone, parent, weight: #V, as `collapse` and `place` have them; passes: how many there were. row: #V, the row of each vertex, those that
+    are kept first, in their order. offset: #V+1, where rows begin; the last stays 0 if there was not room for all. column, value: vertices
+    kept, by their numbers, and their weights.
+    """
+    rows = int(0)
+    end = int(0)
+    for back in range(passes + 1):
+        number = wp.where(back == 0, 0, passes + 1 - back)
+        for v in range(gone.shape[0]):
+            if gone[v] == number:
+                if number == 0:
+                    column[end] = rows
+                    value[end] = wp.float64(1.0)
+                    end += 1
+                else:
+                    begin = int(end)
+                    for k in range(3):
+                        if weight[v][k] != wp.float64(0.0):
+                            of = row[parent[v][k]]
+                            for e in range(offset[of], offset[of + 1]):
+                                to = int(begin)
+                                while to < end and column[to] != column[e]:
+                                    to += 1
+                                if to == end:
+                                    if end == column.shape[0]:
+                                        return
+                                    column[end] = column[e]
+                                    value[end] = wp.float64(0.0)
+                                    end += 1
+                                value[to] = value[to] + weight[v][k] * value[e]
+                row[v] = rows
+                rows += 1
+                if rows < gone.shape[0]:
+                    offset[rows] = end
+    offset[gone.shape[0]] = end

@@ -66,6 +66,18 @@ def length_over(seen: wp.vec3d, da: wp.float64, db: wp.float64):
 
 
 @wp.func
+def may_lead(seen: wp.vec3d, i: int, here: wp.float64, other: wp.float64, near: wp.float64):
+    """Whether a way from the i-th end of the side that a corner sees, over the side between the corner, which is `here` far, and the other
+    end, may be shorter than `near`: it is no shorter than the distance that it leads to and the height."""
+    along = seen[1]
+    if i == 0:
+        along = seen[0] - seen[1]
+    room = near - wp.min(here, other)
+    area = seen[0] * seen[2]
+    return room > wp.float64(0.0) and room * room * (along * along + seen[2] * seen[2]) >= area * area
+
+
+@wp.func
 def place_on_side(seen: wp.vec3d, da: wp.float64, db: wp.float64):
     """Where that way passes the side, as a share of it from a, and the leg to there."""
     s = slope_along(seen[0], da, db)
@@ -94,7 +106,8 @@ def find_ways(
     leg: wp.array(dtype=wp.float64),
     shortened: wp.array(dtype=wp.int32),
 ):
-    """The best way out of each waiting vertex given the distances; one whose way is now shorter lets its neighbours wait.
+    """The best way out of each waiting vertex given the distances; one whose way is now shorter lets those of its neighbours wait whose
+    ways may so become shorter, too.
 
     Vertices are numbered about as far as they are. One that lies at most `reach` numbers back looks again at once, any other in
     the next launch.
@@ -139,7 +152,7 @@ def find_ways(
                 for r in range(offset[v], offset[v + 1]):
                     for i in range(2):
                         near = ends[r][i]
-                        if waiting[near] == 0 and wp.min(best, distance[ends[r][1 - i]]) < distance[near]:
+                        if waiting[near] == 0 and may_lead(seen[r], i, best, distance[ends[r][1 - i]], distance[near]):
                             waiting[near] = 1
                             crowd[near / CROWD] = crowd[near / CROWD] + 1
                             if near >= v - reach:

@@ -7,13 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import warp as wp
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
+from warpflat.cells import cells_of
 from warpflat.coarsen import (
     Coarser,
+    _prolongation,
     coarser,
     coarser_surfaces,
     inherit_levels,
@@ -22,6 +25,7 @@ from warpflat.coarsen import (
     spread_surface,
 )
 from warpflat.shapes import make_shape
+from warpflat.springs import unweighed_springs
 from warpflat.strain import signed_cell_areas
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
@@ -30,6 +34,7 @@ from warpflat.surface.topology import (
     border_loops,
     components,
     euler_characteristic,
+    half_edges_of,
     non_manifold_edges,
     non_manifold_vertices,
 )
@@ -364,6 +369,26 @@ def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch):
     assert (one.prolongation != three.prolongation).nnz == 0
 
 
+@pytest.mark.parametrize("entries", [1, 8])
+def test_what_is_gone_is_in_the_end_made_of_what_is_kept(entries: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warpflat.coarsen._ENTRIES", entries)
+    random = np.random.default_rng(3)
+    gone = random.permutation(np.repeat(np.arange(4, dtype=np.int32), 10))
+    expected = np.zeros((40, 10))
+    expected[gone == 0] = np.eye(10)
+    parent, weight = np.zeros((40, 3), dtype=np.int32), np.zeros((40, 3))
+    for number in (3, 2, 1):
+        staying = np.flatnonzero((gone == 0) | (gone > number))
+        for vertex in np.flatnonzero(gone == number):
+            parent[vertex], weight[vertex] = random.choice(staying, 3, replace=False), random.dirichlet(np.ones(3))
+            expected[vertex] = weight[vertex] @ expected[parent[vertex]]
+    given = [
+        wp.array(values, dtype=dtype, device="cpu")
+        for values, dtype in ((gone, int), (parent, wp.vec3i), (weight, wp.vec3d))
+    ]
+    np.testing.assert_allclose(_prolongation(*given, passes=3).toarray(), expected, atol=1e-15)
+
+
 def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
     left = sheet(9, 9, triangles=True)
     count = len(left.vertices)
@@ -396,6 +421,18 @@ def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
         np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
     with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70)):
         _ = 1 / 0
+
+
+def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkeypatch: pytest.MonkeyPatch):
+    piece = sheet(80, 70, triangles=True)
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    with levels_meanwhile(piece):
+        pass
+    for made_once in ("cells.lay_cells", "springs.measure_edges"):
+        monkeypatch.setattr(f"warpflat.{made_once}", None)
+    for step in coarser_surfaces(piece):
+        assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
+        assert unweighed_springs(step.surface).edge_count == len(half_edges_of(step.surface).edges)
 
 
 @pytest.mark.parametrize("kind", ["triangles", "grid", "crack"])

@@ -11,23 +11,14 @@ from numpy.typing import NDArray
 from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
-from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only, tell
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
 from warpflat.surface.topology import corner_triangles, half_edges_of
-from warpflat.surface.unfold import corners_around, lay_cells, quad_creases
+from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
 
-__all__ = ["ByVertex", "CellArrays", "cells_of", "corners_of", "creases_of", "first_of_faces", "inherit_cells"]
+__all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
-
-
-@dataclass(frozen=True, kw_only=True)
-class ByVertex:
-    """Lists of what is around each vertex: `offset` #V+1, where the entries of each vertex begin, and what is there."""
-
-    offset: IntArray
-    entry: IntArray
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -123,17 +114,6 @@ def inherit_cells(surface: Surface, whole: Surface) -> None:
     """Let a surface that a cut has made of another have its creases and cells: no face has moved, or has another place in their order."""
     cells = replace(cells_of(whole), faces=surface.faces, around=corners_of(surface))
     tell(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
-
-
-@once_per_faces
-def corners_of(surface: Surface) -> ByVertex:
-    """The faces' corners around each vertex, 4 times the face plus the corner."""
-    numbered = row_by_row(surface)
-    if numbered is not None:
-        offset, entry = numbered.corners_around()
-    else:
-        offset, entry = corners_around(surface.faces, len(surface.vertices))
-    return read_only(ByVertex(offset=offset, entry=entry))
 
 
 def first_of_faces(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:

@@ -6,8 +6,8 @@ that collapse, an independent set of them at a time, until about a quarter is le
 the best triangles, on the border only along the border. So corners, holes and cracks stay what they are: two sides of a crack have
 different vertices, and nothing joins them.
 
-In a pass all vertices look for the neighbour that is best, on all cores; then one goes after the other, while the rings of neighbours
-that stay are kept up to date. The triangles are made at the end, of those that have three different corners left.
+In a pass one vertex goes after the other, while the rings of neighbours that stay are kept up to date; only those beside which none has
+gone yet look for the neighbour that is best. The triangles are made at the end, of those that have three different corners left.
 """
 
 from __future__ import annotations
@@ -16,18 +16,19 @@ from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from itertools import pairwise
 from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
-from scipy.sparse import csr_array, eye, vstack
+from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry
-from warpflat.kernels.coarsen import Ring, collapse, find_targets, order_rings, place, sort_corners
+from warpflat.cells import cells_of
+from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
+from warpflat.springs import unweighed_springs
 from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
@@ -52,8 +53,10 @@ BoolArray = NDArray[np.bool_]
 # piece.
 _COARSEST = 250
 _COARSEST_GRID = 100
-# Passes of collapses to one level, and the least share of vertices that a level must lose to be worth having.
+# Passes of collapses to one level, the share of vertices from which on there are no more, and the least share that a level must lose to be
+# worth having.
 _PASSES = 10
+_ENOUGH = 0.27
 _LEAST_GAIN = 0.3
 # A pass takes first the vertices that leave triangles of this quality (1: equilateral), then the others down to the least; where
 # that does not make them fewer, worse ones.
@@ -63,6 +66,8 @@ _LEAST_QUALITIES = (0.3, 0.15)
 _WORTH_A_THREAD = 5_000
 # Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
 _ROOM = 16
+# Entries for which a row of the prolongation has room at first; it has four or so.
+_ENTRIES = 8
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -175,14 +180,23 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
 
 @contextmanager
 def levels_meanwhile(surface: Surface) -> Iterator[None]:
-    """Make `coarser_surfaces` of a large surface on another core while the body runs, and be done with both at its end."""
+    """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
+    be done with all at its end."""
     if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
-        made = other.submit(coarser_surfaces, surface)
+        made = other.submit(_prepare_levels, surface)
         yield
         made.result()
+
+
+def _prepare_levels(surface: Surface) -> None:
+    for step in coarser_surfaces(surface):
+        if step.smooth_carry is None:
+            cells_of(step.surface)
+            unweighed_springs(step.surface)
+            _ = step.transfer.transpose
 
 
 def _part(
@@ -210,23 +224,17 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     ring = _ring_of(surface.vertices, layout, triangles)
     if ring.degree.numpy().min() < 0:
         return None
-    target, blocked, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
-    left = wp.zeros(count, dtype=wp.float64, device="cpu")
-    remain, number = count, 0
+    target, beside, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
+    passes, remain = np.zeros(1, dtype=np.int32), np.full(1, count, dtype=np.int32)
     for least in _LEAST_QUALITIES:
-        look = record(
-            find_targets, dim=count, inputs=[ring, gone, least], outputs=[target, left, blocked], device="cpu"
+        wp.launch(
+            collapse,
+            dim=1,
+            inputs=[ring, least, _GOOD, int(_ENOUGH * count), _PASSES],
+            outputs=[passes, remain, target, beside, gone],
+            device="cpu",
         )
-        lost = remain
-        while remain > 0.27 * count and lost >= 0.02 * remain and number < _PASSES:
-            number += 1
-            look.launch()
-            wp.launch(
-                collapse, dim=1, inputs=[ring, target, left, _GOOD, number], outputs=[blocked, gone], device="cpu"
-            )
-            lost = remain - (count - int(np.count_nonzero(gone.numpy())))
-            remain -= lost
-    if remain > (1.0 - _LEAST_GAIN) * count:
+    if remain[0] > (1.0 - _LEAST_GAIN) * count:
         return None
     parent = wp.empty(count, dtype=wp.vec3i, device="cpu")
     weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
@@ -235,7 +243,7 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
     corners = _ends(gone.numpy(), parent.numpy()[:, 0])[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
-    prolongation = _prolongation(gone.numpy(), parent.numpy(), weight.numpy())
+    prolongation = _prolongation(gone, parent, weight, int(passes[0]))
     return Coarser(
         surface=_part(surface, surface.vertices[kept], np.column_stack([corners, np.full(len(corners), -1)])),
         kept=kept,
@@ -252,22 +260,17 @@ def _ends(gone: IntArray, into: IntArray) -> IntArray:
     return (np.cumsum(gone == 0, dtype=np.int32) - 1)[end]
 
 
-def _prolongation(gone: IntArray, parent: IntArray, weight: FloatArray) -> csr_array:
-    """#V by #C: the row of a vertex that is gone is the sum of its parents' rows by its weights; those that went last come first,
-    since parents stay longer."""
-    last = int(gone.max())
-    order = np.argsort(np.where(gone == 0, 0, last + 1 - gone).astype(np.int8), kind="stable").astype(np.int32)
-    rank = np.empty_like(order)
-    rank[order] = np.arange(len(order), dtype=np.int32)
-    ends = np.cumsum(np.bincount(gone, minlength=last + 1)[[0, *range(last, 0, -1)]])
-    rows = csr_array(eye(ends[0], format="csr"))
-    for begin, end in pairwise(ends.tolist()):
-        which = order[begin:end]
-        offset = np.arange(0, 3 * len(which) + 1, 3, dtype=np.int32)
-        step = csr_array((weight[which].ravel(), rank[parent[which]].ravel(), offset), shape=(len(which), begin))
-        step.eliminate_zeros()
-        rows = vstack([rows, step @ rows], format="csr")
-    return csr_array(rows[rank])
+def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:
+    """#V by #C: the row of a vertex that is gone is the sum of its parents' rows by its weights."""
+    count, room = len(gone), _ENTRIES * len(gone)
+    row, offset = np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
+    while offset[-1] == 0:
+        column, value = np.empty(room, dtype=np.int32), np.empty(room)
+        given, made = [gone, parent, weight, passes], [row, offset, column, value]
+        wp.launch(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
+        room *= 2
+    kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
+    return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
 
 
 def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArray) -> Ring:

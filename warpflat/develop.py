@@ -331,14 +331,15 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
     # Around an inner vertex, once is one corner through which a ray to the right passes.
     in_question = np.zeros(len(positions), dtype=bool)
     in_question[he.edges[he.count == 1]] = True
-    y = positions[:, 1][corner]
-    ahead, behind = np.roll(y, -1, axis=1) - y, np.roll(y, 1, axis=1) - y
-    whole = np.column_stack([weight == 1.0, np.ones(len(y), dtype=bool), weight == 1.0])
-    passed = corner[whole & (ahead < 0) & (behind >= 0)]
-    in_question |= np.bincount(passed, minlength=len(positions)) > 1
+    y, triangle = np.take(positions[:, 1], corner.T), weight == 1.0
+    passed = np.zeros(len(positions), dtype=np.int64)
+    for k in range(3):
+        passes = (y[k - 2] < y[k]) & (y[k - 1] >= y[k])
+        passed += np.bincount(corner[passes if k == 1 else passes & triangle, k], minlength=len(passed))
+    in_question |= passed > 1
     turn = np.zeros(len(positions))
     for k in range(3):
-        rows = np.flatnonzero(in_question[corner[:, k]] & whole[:, k])
+        rows = np.flatnonzero(in_question[corner[:, k]] if k == 1 else in_question[corner[:, k]] & triangle)
         p = positions[np.roll(corner[rows], -k, axis=1)]
         u, v = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
         angle = np.arctan2(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0], np.einsum("ij,ij->i", u, v))

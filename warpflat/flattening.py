@@ -361,8 +361,8 @@ def start(
     give_back_of(surface)
     with levels_meanwhile(surface) if settings.options.solver == "multilevel" else nullcontext():
         development = run.let_go(develop(surface, line))
-    give_back_of(surface)
-    network = run.network_at(development.positions)
+        give_back_of(surface)
+        network = run.network_at(development.positions)
     give_back_of(surface)
     return Started(
         run=run,

@@ -7,11 +7,12 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.cells import ByVertex, CellArrays
+from warpflat.cells import CellArrays
 from warpflat.network import SpringNetwork
 from warpflat.springs import SpringArrays, SpringsAround
 from warpflat.sums import begins
 from warpflat.surface.mesh import Surface
+from warpflat.surface.unfold import ByVertex
 
 __all__ = ["join_networks", "join_surfaces"]
 

@@ -38,6 +38,7 @@ __all__ = [
     "shortened",
     "springs_of",
     "springs_of_sides",
+    "unweighed_springs",
     "with_stiffness",
 ]
 
@@ -184,7 +185,7 @@ def springs_of(
         wider: #F by 2, how many times as long as on the body a quad's first edges and its others are meant to be: its stiffnesses are those
             of such a quad. Rest lengths are the body's all the same.
     """
-    own, faces, is_quad = _unweighed(surface), surface.faces, surface.is_quad
+    own, faces, is_quad = unweighed_springs(surface), surface.faces, surface.is_quad
     warp, _ = grain_axes(grain_angle)
     first = first_of_faces(surface, 4, 3)
     sides = half_edges_of(surface).edge
@@ -292,7 +293,8 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 
 
 @once_per_surface
-def _unweighed(surface: Surface) -> _Unweighed:
+def unweighed_springs(surface: Surface) -> _Unweighed:
+    """What no fabric changes of a surface's springs, worked out once."""
     vertices, edges, around = surface.vertices, half_edges_of(surface).edges, _springs_around(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
     rest_length = np.empty(around.count)

@@ -22,9 +22,9 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
-from warpflat.cells import corners_of
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, read_only
+from warpflat.surface.unfold import corners_of
 
 __all__ = ["Spread", "Thinned", "Transfer", "spread_of", "thinned_of"]
 

@@ -7,18 +7,30 @@ normal does not turn; across it does.
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.kernels.surface_cells import average_normals, find_bends, find_creases
 from warpflat.kernels.surface_cells import lay_cells as lay_each
 from warpflat.launching import launch_each
+from warpflat.surface.mesh import Surface, once_per_faces, read_only
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import HalfEdges, order_by, places_of
 
-__all__ = ["corners_around", "lay_cells", "quad_creases"]
+__all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
+
+
+@dataclass(frozen=True, kw_only=True)
+class ByVertex:
+    """Lists of what is around each vertex: `offset` #V+1, where the entries of each vertex begin, and what is there."""
+
+    offset: IntArray
+    entry: IntArray
 
 
 def quad_creases(
@@ -69,6 +81,17 @@ def corners_around(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     # The fourth corners of triangles are those of one vertex more, come after all others, and are left out.
     corner, offset = order_by(np.where(faces >= 0, faces, np.int32(count)).ravel(), count + 1)
     return offset[:-1], corner[: offset[count]]
+
+
+@once_per_faces
+def corners_of(surface: Surface) -> ByVertex:
+    """The faces' corners around each vertex, 4 times the face plus the corner."""
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        offset, entry = numbered.corners_around()
+    else:
+        offset, entry = corners_around(surface.faces, len(surface.vertices))
+    return read_only(ByVertex(offset=offset, entry=entry))
 
 
 def lay_cells(vertices: FloatArray, faces: IntArray, crease: NDArray[np.int8], cell: IntArray) -> FloatArray:

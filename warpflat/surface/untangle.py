@@ -9,6 +9,7 @@ from warpflat.kernels.strain import measure_flat_cells
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.unfold import corners_of
 from warpflat.surface.vectors import cross, norm, points_at
 
 __all__ = ["signed_cell_areas", "untangle"]
@@ -48,24 +49,24 @@ def untangle(
     corner, _, _ = corner_triangles(surface.faces)
     flat = np.array(positions, dtype=np.float64)
 
-    def crushed(rows: NDArray[np.integer]) -> NDArray[np.integer]:
-        p = points_at(surface.vertices, corner[rows].T)
+    def crushed(corner: NDArray[np.int32]) -> NDArray[np.int32]:
+        p = points_at(surface.vertices, corner.T)
         body = 0.5 * norm(cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
-        return rows[signed_cell_areas(corner[rows], flat) <= least_area * body]
+        return corner[signed_cell_areas(corner, flat) <= least_area * body]
 
-    mirrored = crushed(np.arange(len(corner)) if suspects is None else suspects)
+    mirrored = crushed(corner if suspects is None else corner[suspects])
     if len(mirrored) == 0:
         return flat, 0
-    turned = np.unique(corner[mirrored])
-    patch = _Patch(surface, corner, turned, _RINGS)
+    turned = np.unique(mirrored)
+    patch = _Patch(surface, turned, _RINGS)
     fewest, since = len(mirrored), 0
     for _ in range(most_sweeps):
         if not patch.inside[turned].all():
-            patch = _Patch(surface, corner, np.flatnonzero(patch.near), _RINGS)
+            patch = _Patch(surface, np.flatnonzero(patch.near), _RINGS)
         moving = np.union1d(turned, patch.pulled[turned].indices)
         flat[moving] = 0.5 * (flat[moving] + patch.pull[moving] @ flat / patch.total[moving])
-        mirrored = crushed(patch.triangle[np.unique(patch.around[moving].indices)])
-        turned = np.unique(corner[mirrored])
+        mirrored = crushed(patch.corner[np.unique(patch.around[moving].indices)])
+        turned = np.unique(mirrored)
         fewest, since = (len(mirrored), 0) if len(mirrored) < fewest else (fewest, since + 1)
         if len(mirrored) == 0 or since > _PATIENCE:
             break
@@ -79,22 +80,25 @@ class _Patch:
         near: #V, whether a vertex is one of these. inside: #V, whether its neighbours are, too.
         pull: #V by #V, the weights of the neighbours that each of these moves between; of others none. pulled: its transpose. total: #V by
             1, its rows' sums.
-        triangle: #N, the corner triangles at these vertices. around: #V by #N, which of them lie around each vertex.
+        corner: #N by 3, the corner triangles at these vertices. around: #V by #N, which of them lie around each vertex.
     """
 
-    def __init__(self, surface: Surface, corner: NDArray[np.int32], vertices: NDArray[np.integer], rings: int) -> None:
+    def __init__(self, surface: Surface, vertices: NDArray[np.integer], rings: int) -> None:
         from scipy.sparse import csc_array, csr_array
 
         count, he = len(surface.vertices), half_edges_of(surface)
         self.near = np.zeros(count, dtype=bool)
+        faces = _faces_at(surface, vertices)
         self.near[vertices] = True
         for _ in range(rings):
             self.inside = self.near.copy()
-            self.near[corner[self.near[corner].any(axis=1)]] = True
+            corners = surface.faces[faces]
+            self.near[corners[corners >= 0]] = True
+            faces = _faces_at(surface, np.flatnonzero(self.near))
         on_rim = he.count == 1
         border = np.zeros(count, dtype=bool)
         border[he.edges[on_rim]] = True
-        here = self.near[he.edges].any(axis=1)
+        here = self.near[he.edges[:, 0]] | self.near[he.edges[:, 1]]
         edges, on_rim = he.edges[here], on_rim[here]
         start, end = np.concatenate([edges, edges[:, ::-1]]).T
         ends = points_at(surface.vertices, edges.T)
@@ -102,12 +106,19 @@ class _Patch:
         keep = self.near[start] & (~border[start] | np.tile(on_rim, 2))
         self.pull = csr_array((weight[keep], (start[keep], end[keep])), shape=(count, count))
         self.pulled, self.total = self.pull.T.tocsr(), self.pull.sum(axis=1)[:, None]
-        self.triangle = np.flatnonzero(self.near[corner].any(axis=1))
-        of_triangles = corner[self.triangle]
-        offset = np.arange(0, of_triangles.size + 1, 3)
+        self.corner, _, _ = corner_triangles(surface.faces[faces])
+        offset = np.arange(0, self.corner.size + 1, 3)
         self.around = csc_array(
-            (np.ones(of_triangles.size, dtype=np.int8), of_triangles.ravel(), offset), shape=(count, len(self.triangle))
+            (np.ones(self.corner.size, dtype=np.int8), self.corner.ravel(), offset), shape=(count, len(self.corner))
         ).tocsr()
+
+
+def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> NDArray[np.int32]:
+    """The faces that have some of these vertices, in their order."""
+    around = corners_of(surface)
+    begin, counts = around.offset[vertices], np.diff(around.offset)[vertices]
+    first = np.cumsum(counts) - counts
+    return np.unique(around.entry[np.repeat(begin - first, counts) + np.arange(counts.sum())] // 4)
 
 
 def signed_cell_areas(corner: NDArray[np.int32], positions: NDArray[np.float64]) -> NDArray[np.float64]:
