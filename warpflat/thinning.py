@@ -57,7 +57,10 @@ class Transfer:
     @cached_property
     def prolongation(self) -> csr_array:
         """#V by #C, rows add up to 1."""
-        return self._weigh()
+        prolongation = self._weigh()
+        # With what it was made of.
+        del self._weigh
+        return prolongation
 
     @cached_property
     def transpose(self) -> csr_array:

@@ -68,7 +68,7 @@ def lattice_of(surface: Surface) -> Lattice | None:
     often = np.bincount(at) if at.max() < _DENSE * len(at) else np.unique(at, return_counts=True)[1]
     if often.max() > 1:
         return None
-    corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4]
+    corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4] if turn.any() else faces
     row, column = (np.empty(count, dtype=np.int32) for _ in range(2))
     for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
         row[corner[:, k]], column[corner[:, k]] = face_row + up, face_column + right
