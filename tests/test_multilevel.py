@@ -10,7 +10,7 @@ import pytest
 from devices import DEVICE
 from scipy.spatial import Delaunay
 
-from warpflat import flatten_all, network
+from warpflat import flatten_all, heap, network
 from warpflat.cutting import CutPlan, cut
 from warpflat.fabric import Fabric
 from warpflat.flattening import Flattening, flatten
@@ -21,6 +21,7 @@ from warpflat.multilevel import relax_multilevel
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions, relax
 from warpflat.shapes import make_shape
+from warpflat.springs import springs_of
 from warpflat.surface import Surface, make_surface
 from warpflat.surface.cut import cut_along
 from warpflat.upright import Upright
@@ -387,3 +388,23 @@ def test_steps_go_along_lines_that_carry_the_threads_only():
         assert (network.line_arrays is not None) == expected
         made = Levels(Relaxation(network, LEVELS, start=flat), mend=True)
         assert [level.lines for level in made._levels] == [expected] * len(made.sizes)
+
+
+@pytest.mark.parametrize("kind", ["grid", "crack", "triangles"])
+def test_what_large_pieces_let_go_of_is_made_again_as_it_was(kind: str, monkeypatch: pytest.MonkeyPatch):
+    def piece() -> Surface:
+        return make_shape("dome", resolution=16) if kind == "grid" else cracked(16, triangles=kind == "triangles")
+
+    kept = flatten(piece(), device=DEVICE)
+    monkeypatch.setattr(heap, "_MUCH_IS_FREED", 100)
+    surface = piece()
+    flat = flatten(surface, device=DEVICE)
+    np.testing.assert_array_equal(flat.positions, kept.positions)
+    assert any("half_edges_of" in name for name in kept.surface.of_faces)
+    assert not any("half_edges_of" in name for name in surface.of_faces)
+    springs, theirs = flat.network.spring_arrays, kept.network.spring_arrays
+    np.testing.assert_array_equal(springs.around.entry, theirs.around.entry)
+    np.testing.assert_array_equal(springs.ends, theirs.ends)
+    again = springs_of(surface, flat.fabric, flat.positions)
+    np.testing.assert_array_equal(again.stiffness, springs_of(kept.surface, kept.fabric, kept.positions).stiffness)
+    assert flat.measures["length_error"] == kept.measures["length_error"]

@@ -139,30 +139,31 @@ class LatticeCarry:
             np.isin(line, lines) for line, lines in zip((lattice.row, lattice.column), keep, strict=True)
         )
 
-    @cached_property
-    def _cubics(self) -> tuple[tuple[IntArray, FloatArray], tuple[IntArray, FloatArray]]:
-        """Of the way along rows and of that along columns: #V by 4, the vertices that count and their weights."""
-        on_row, on_column = self._on_row, self._on_column
-        below_left, below_right, above_right, above_left = self._lattice.corner.T
-        # What lies between the rows that are kept is left alone on the first way.
-        along_row = _neighbors(len(on_row), (below_left, below_right), (above_left, above_right))
-        along_column = _neighbors(len(on_row), (below_left, above_left), (below_right, above_right))
-        return self._weigh(along_row, on_column | ~on_row), self._weigh(along_column, on_row)
-
-    def _weigh(self, neighbors: tuple[IntArray, IntArray], kept: BoolArray) -> tuple[IntArray, FloatArray]:
-        column, weight = np.empty((len(kept), 4), dtype=np.int32), np.empty((len(kept), 4))
-        launch_each(weigh_cubics, len(kept), [self._vertices, *neighbors, kept.astype(np.int32)], [column, weight])
-        return column, weight
-
     def __call__(self, layout: FloatArray) -> FloatArray:
         """#V by 2, the finer layout of a coarser one (#C by 2) [m]."""
+        on_row, on_column = self._on_row, self._on_column
         values = np.zeros((len(self._vertices), 2))
-        values[self._on_row & self._on_column] = layout
-        for column, weight in self._cubics:
-            carried = np.empty_like(values)
-            launch_each(carry_along, len(values), [column, weight, values], [carried])
-            values = carried
-        return values
+        values[on_row & on_column] = layout
+        below_left, below_right, above_right, above_left = self._lattice.corner.T
+        # What lies between the rows that are kept is left alone on the first way.
+        along_row = self._carry(values, (below_left, below_right), (above_left, above_right), on_column | ~on_row)
+        return self._carry(along_row, (below_left, above_left), (below_right, above_right), on_row)
+
+    def _carry(
+        self,
+        values: FloatArray,
+        edges: tuple[IntArray, IntArray],
+        others: tuple[IntArray, IntArray],
+        kept: BoolArray,
+    ) -> FloatArray:
+        """The values (#V by 2) between those kept (#V), along rows or columns; the edges as `_neighbors` has them. Weights take half as
+        much memory as all springs, and are seldom needed twice: they are not remembered."""
+        count = len(values)
+        column, weight, carried = np.empty((count, 4), dtype=np.int32), np.empty((count, 4)), np.empty_like(values)
+        given = [self._vertices, *_neighbors(count, edges, others), kept.astype(np.int32)]
+        launch_each(weigh_cubics, count, given, [column, weight])
+        launch_each(carry_along, count, [column, weight, values], [carried])
+        return carried
 
 
 def _neighbors(

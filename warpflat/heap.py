@@ -9,15 +9,20 @@ from functools import cache
 
 from warpflat.surface.mesh import Surface
 
-__all__ = ["give_back", "give_back_of"]
+__all__ = ["give_back", "give_back_of", "is_large"]
 
 # On the way to the relaxation of more triangles so much is freed that giving it back is worth a twentieth of the time.
 _MUCH_IS_FREED = 50_000
 
 
+def is_large(surface: Surface) -> bool:
+    """Whether what is worked out on the way to a piece's relaxation is worth to be let go of."""
+    return len(surface.vertices) > _MUCH_IS_FREED
+
+
 def give_back_of(surface: Surface) -> None:
     """Give back what a part of the way to its relaxation has freed, where that is much: of many triangles."""
-    if len(surface.vertices) > _MUCH_IS_FREED and not surface.is_quad.all():
+    if is_large(surface) and not surface.is_quad.all():
         give_back()
 
 

@@ -78,15 +78,19 @@ def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> Spring
     edge = begins([s.edge_count for s in springs])
     diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
-    numbers = [a.entry for a in around]
-    entry = [
-        own + np.where(own < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
-        for k, (s, own) in enumerate(zip(springs, numbers, strict=True))
-    ]
+
+    def numbers() -> IntArray:
+        own = [a.entry for a in around]
+        entries = [
+            of + np.where(of < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+            for k, (s, of) in enumerate(zip(springs, own, strict=True))
+        ]
+        return np.concatenate(entries)
+
     return SpringArrays(
         around=SpringsAround(
             offset=_join_offsets([a.offset for a in around]),
-            numbering=np.concatenate(entry),
+            numbering=numbers,
             neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
         ),
         listed_length=np.concatenate([s.listed_length for s in springs]),

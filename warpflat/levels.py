@@ -16,14 +16,13 @@ from scipy.sparse import block_diag, csr_array
 
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
-from warpflat.heap import give_back_of
 from warpflat.joined import join_networks
 from warpflat.kernels.sums import subtract
 from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.launching import Launch, launch_each, record
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
-from warpflat.rungs import Rung, rungs_of, stay
+from warpflat.rungs import Rung, let_go, rungs_of, stay
 from warpflat.sums import begins
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
@@ -156,7 +155,8 @@ class Levels:
         ladders = [
             rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
         ]
-        give_back_of(finest.network.surface)
+        for rungs, net in zip(ladders, pieces, strict=True):
+            let_go(net, rungs)
         depth = max(len(rungs) for rungs in ladders)
         for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
             lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])

@@ -12,15 +12,18 @@ from scipy.sparse import csr_array, eye
 
 from warpflat.cells import cells_of
 from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, spread_surface
+from warpflat.heap import give_back, is_large
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.launching import launch_each
 from warpflat.network import SpringNetwork
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.mesh import Surface
+from warpflat.surface.mesh import Surface, forget
+from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.topology import half_edges_of
 from warpflat.surface.untangle import untangle
 from warpflat.thinning import Transfer
 
-__all__ = ["Rung", "far_below", "rungs_of", "stay"]
+__all__ = ["Rung", "far_below", "let_go", "rungs_of", "stay"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -92,6 +95,21 @@ def rungs_of(
         rungs.append(rung)
         network, layout = rung.network, rung.layout
     return rungs
+
+
+def let_go(network: SpringNetwork, rungs: Sequence[Rung]) -> None:
+    """Forget what the making of a large piece's networks asks for and a relaxation does not, up to a tenth of what that takes: sides of
+    faces, and numbers of springs between quads. Triangles may be measured again, and keep these."""
+    if is_large(network.surface):
+        for made in (network, *(rung.network for rung in rungs)):
+            forget(made.surface, half_edges_of)
+            if made.surface.is_quad.all():
+                made.spring_arrays.around.forget_numbers()
+        if row_by_row(network.surface) is None:
+            # What else is made on the way, so that what that frees goes back, too.
+            for rung in rungs:
+                rung.step.transfer.make()
+            give_back()
 
 
 def _is_lowest(network: SpringNetwork) -> bool:

@@ -5,8 +5,9 @@ Each quad has four structural edges and two diagonals; a triangle has its edges 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 import warp as wp
@@ -29,7 +30,7 @@ from warpflat.kernels.stiffness import (
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
-from warpflat.surface.topology import half_edges_of, order_by, rows_of, unfold_quad_diagonals
+from warpflat.surface.topology import half_edges, half_edges_of, order_by, rows_of, unfold_quad_diagonals
 
 __all__ = [
     "SpringArrays",
@@ -65,24 +66,34 @@ class SpringsAround:
     Attributes:
         offset: #V+1, where the entries of each vertex begin.
         neighbor: 2 #S, for each entry the vertex at the far end, by which they are sorted.
-        numbering: their numbers, or of a grid whose numbers tell them, that: they are asked for when a network is made, and seldom later.
+        numbering: what makes their numbers, or of a grid whose numbers tell them, that: they are asked for when a network is made, and
+            seldom later.
     """
 
     offset: IntArray
     neighbor: IntArray
-    numbering: IntArray | RowByRow
+    numbering: Callable[[], IntArray] | RowByRow
 
     @property
     def entry(self) -> IntArray:
         """2 #S, the springs' numbers, mesh edges first."""
-        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowByRow) else self.numbering
+        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowByRow) else self._kept
+
+    @cached_property
+    def _kept(self) -> IntArray:
+        assert not isinstance(self.numbering, RowByRow)
+        return self.numbering()
+
+    def forget_numbers(self) -> None:
+        """Make them again when they are next asked for."""
+        vars(self).pop("_kept", None)
 
     def listed(self, values: FloatArray) -> FloatArray:
         """2 #S, the springs' values (#S) at both of their ends."""
         if isinstance(self.numbering, RowByRow):
             return self.numbering.listed(self.offset, values)
         listed = np.empty(len(self.neighbor))
-        given = [self.numbering, np.ascontiguousarray(values, dtype=np.float64)]
+        given = [self._kept, np.ascontiguousarray(values, dtype=np.float64)]
         launch_each(pick_values, len(listed), given, [listed])
         return listed
 
@@ -310,12 +321,26 @@ def _springs_around(surface: Surface) -> SpringsAround:
     if numbered is not None:
         offset, neighbor = numbered.neighbors_around()
         return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))
-    corner = rows_of(surface.faces, surface.is_quad)
-    ends = np.concatenate([half_edges_of(surface).edges, corner[:, 0::2], corner[:, 1::2]])
-    end, offset = order_by(ends[:, ::-1].T.ravel(), len(surface.vertices))
+    faces, count = surface.faces, len(surface.vertices)
+    offset, neighbor, spring = _sorted_springs(half_edges_of(surface).edges, faces, count)
+    around = SpringsAround(offset=offset, neighbor=neighbor, numbering=partial(_numbers, faces, count))
+    vars(around)["_kept"] = spring
+    return read_only(around)
+
+
+def _numbers(faces: IntArray, count: int) -> IntArray:
+    return _sorted_springs(half_edges(faces).edges, faces, count)[2]
+
+
+def _sorted_springs(edges: IntArray, faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray]:
+    """Edges, then diagonals, around so many vertices: #V+1, where each vertex's begin; 2 #S each, the vertices at the far ends, and the
+    springs' numbers."""
+    corner = rows_of(faces, faces[:, 3] >= 0)
+    ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
+    end, offset = order_by(ends[:, ::-1].T.ravel(), count)
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
-    launch_each(list_springs, len(surface.vertices), [offset, end, ends, len(ends)], [neighbor, spring])
-    return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=spring))
+    launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
+    return offset, neighbor, spring
 
 
 def shortened(

@@ -42,7 +42,7 @@ class StepBuffers:
         pace: 1 vec3d, how steps go on from one another, as `kernels.implicit` has it.
         face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
         vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, what each spring to a later one pulls with [N].
-            Those of vertices are where `power` is: each is read as soon as it is written.
+            Those of vertices are where `power` is, those of faces where `face_stiffness` is: each is read as soon as it is written.
         evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
             none. advance: the places after them. along_lines: the places after a step along the lines of a lattice, once forces have been
             evaluated; its ways take the place of `first_guess` and `driving_force`. stop: of each piece, the velocities. measure,
@@ -76,7 +76,7 @@ class StepBuffers:
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
         self.pace = wp.array(np.array([STEADY]), dtype=wp.vec3d, device=device)
         self.vertex_energy = self.vertex_pull = self.power
-        self.face_energy = wp.zeros(f, dtype=wp.float64, device=device)
+        self.face_energy = self.face_stiffness[:f]
         self._views: dict[int, NDArray[Any]] = {}
 
     def on_host(self, array: wp.array) -> NDArray[Any]:

@@ -54,10 +54,17 @@ class Transfer:
         """Of a function that makes the prolongation."""
         self._weigh = weigh
 
+    def make(self) -> None:
+        """Make them now."""
+        _ = self.transpose
+
     @cached_property
     def prolongation(self) -> csr_array:
         """#V by #C, rows add up to 1."""
-        return self._weigh()
+        prolongation = self._weigh()
+        # With what it was made of.
+        del self._weigh
+        return prolongation
 
     @cached_property
     def transpose(self) -> csr_array:
@@ -289,14 +296,11 @@ def _every_other(lattice: Lattice) -> Thinned | None:
         np.searchsorted(lines, line[kept]).astype(np.int32)
         for lines, line in zip(keep, (lattice.row, lattice.column), strict=True)
     )
-    face_row, face_column = (at.astype(np.int32) for at in np.divmod(blocks, width))
-    coarse = Lattice(
-        row=row, column=column, face_row=face_row, face_column=face_column, corner=faces, bends=lattice.bends[kept]
-    )
+    coarse = Lattice(row=row, column=column, corner=faces, bends=lattice.bends[kept])
     return Thinned(
         kept=kept,
         faces=faces,
-        face_of=at_corner[0],
+        face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
         carry=lambda vertices: LatticeCarry(vertices, lattice, keep),
         of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),

@@ -28,17 +28,24 @@ class Lattice:
 
     Attributes:
         row, column: #V, from 0; the two sides of a crack lie at the same.
-        face_row, face_column: #F, of the corner below and to the left.
         corner: #F by 4, vertices: below left, below right, above right, above left.
         bends: #V, where the border turns: at corners and at the tips of cracks.
     """
 
     row: IntArray
     column: IntArray
-    face_row: IntArray
-    face_column: IntArray
     corner: IntArray
     bends: BoolArray
+
+    @property
+    def face_row(self) -> IntArray:
+        """#F, of the corner below and to the left."""
+        return self.row[self.corner[:, 0]]
+
+    @property
+    def face_column(self) -> IntArray:
+        """#F, likewise."""
+        return self.column[self.corner[:, 0]]
 
 
 @once_per_faces
@@ -68,23 +75,14 @@ def lattice_of(surface: Surface) -> Lattice | None:
     often = np.bincount(at) if at.max() < _DENSE * len(at) else np.unique(at, return_counts=True)[1]
     if often.max() > 1:
         return None
-    corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4]
+    corner = faces[np.arange(len(faces))[:, None], (np.arange(4) - turn[:, None]) % 4] if turn.any() else faces
     row, column = (np.empty(count, dtype=np.int32) for _ in range(2))
     for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
         row[corner[:, k]], column[corner[:, k]] = face_row + up, face_column + right
     for k, (up, right) in enumerate(((0, 0), (0, 1), (1, 1), (1, 0))):
         if (row[corner[:, k]] != face_row + up).any() or (column[corner[:, k]] != face_column + right).any():
             return None
-    return read_only(
-        Lattice(
-            row=row,
-            column=column,
-            face_row=face_row,
-            face_column=face_column,
-            corner=corner,
-            bends=_bends(surface),
-        )
-    )
+    return read_only(Lattice(row=row, column=column, corner=corner, bends=_bends(surface)))
 
 
 def _of_numbers(faces: IntArray, numbered: RowByRow) -> Lattice:
@@ -96,17 +94,7 @@ def _of_numbers(faces: IntArray, numbered: RowByRow) -> Lattice:
     row -= row.min()
     column -= column.min()
     ends = [np.isin(line, (0, line.max())) for line in (row, column)]
-    first = faces[:, 0]
-    return read_only(
-        Lattice(
-            row=row,
-            column=column,
-            face_row=row[first],
-            face_column=column[first],
-            corner=faces,
-            bends=ends[0] & ends[1],
-        )
-    )
+    return read_only(Lattice(row=row, column=column, corner=faces, bends=ends[0] & ends[1]))
 
 
 def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice | None:

@@ -11,9 +11,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["Surface", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
+__all__ = ["Surface", "forget", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
 
 Result = TypeVar("Result")
+
+_UNKNOWN: Any = object()
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -86,12 +88,18 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
         if known.get("faces") is not surface.faces:
             known = known_of_faces(surface.faces)
             object.__setattr__(surface, "of_faces", known)
-        if name not in known:
-            known[name] = measure(surface)
-        result: Result = known[name]
+        # Asked for once: another thread may forget it.
+        result: Result = known.get(name, _UNKNOWN)
+        if result is _UNKNOWN:
+            result = known[name] = measure(surface)
         return result
 
     return remembered
+
+
+def forget(surface: Surface, measure: Callable[[Surface], Any]) -> None:
+    """Let go of what a function `once_per_faces` has worked out of a surface; it is worked out again when it is next asked for."""
+    surface.of_faces.pop(_name(measure), None)
 
 
 def known_of_faces(
