@@ -40,7 +40,7 @@ BoolArray = NDArray[np.bool_]
 _BOTTOM_STEPS = 8
 _LEAP_EVERY = 2
 _AT_REST = 0.05
-_AT_REST_FIRST = 1e-3
+_AT_REST_FIRST = 5e-3
 _MOST_BOTTOM_STEPS = 24.0
 _LITTLE_GAIN = 0.07
 # Steps before and after: few on the finest level, where one takes as long as all below it together, unless it was carried up to along
