@@ -72,6 +72,21 @@ def test_what_is_looked_at(sizes: list[int], held: list[int]):
         np.testing.assert_allclose(got, wished, rtol=1e-10, atol=1e-13)
 
 
+def test_pieces_of_one_network_are_held_each():
+    """As those of a garment, which are sewn together."""
+    one, other = state_of([9, 17, 11], [0, 2], "cpu"), state_of([9, 17, 11], [0, 2])
+    for state in (one, other):
+        state.network.parts = ()
+    near, far = NearPieces(one.network, one._buffers), FarPieces(other.network, other._buffers)
+    assert near.vertices == far.vertices == [slice(0, one.network.vertex_count)]
+    np.testing.assert_allclose(far.strongest(other.upright), near.strongest(one.upright), rtol=1e-10)
+    near.hold_upright(one.upright)
+    far.hold_upright(other.upright)
+    for name in ("position", "velocity", "load"):
+        wished, got = (getattr(state, name).numpy() for state in (one, other))
+        np.testing.assert_allclose(got, wished, rtol=1e-10, atol=1e-13)
+
+
 def test_a_mirrored_cell_is_seen():
     state = state_of([9, 11], [])
     layout = state.positions()

@@ -43,9 +43,9 @@ class FarPieces:
         self.vertices = [slice(*ends) for ends in pairwise(begin.tolist())]
         self._of_vertices = FarSums(counts, self._device)
         self._of_faces = FarSums([net.face_count for net in network.pieces], self._device)
-        self._begin, self._piece = begin, np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         self._stopped = wp.zeros(len(counts), dtype=wp.int32, device=self._device)
-        self._piece_of = wp.array(self._piece, dtype=wp.int32, device=self._device)
+        piece = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+        self._piece_of = wp.array(piece, dtype=wp.int32, device=self._device)
         self._held: _Held | None = None
         self._damping: LaunchSequence | None = None
 
@@ -96,7 +96,7 @@ class FarPieces:
 
     def strongest(self, upright: Sequence[Upright]) -> FloatArray:
         held = self._hold(upright)
-        held.measure(self._of_vertices)
+        held.measure()
         if held.strongest is None:
             held.strongest = self._of_vertices.least_after(partial(self._record_strongest, held))
         return np.sqrt(-self._of_vertices.of(held.strongest))
@@ -108,7 +108,7 @@ class FarPieces:
 
     def hold_upright(self, upright: Sequence[Upright]) -> None:
         held = self._hold(upright)
-        held.measure(self._of_vertices, ends=True)
+        held.measure(ends=True)
         held.go.launch()
 
     def cloth_force(self) -> FloatArray:
@@ -131,41 +131,42 @@ class FarPieces:
 
     def _hold(self, upright: Sequence[Upright]) -> _Held:
         if self._held is None or self._held.upright is not upright:
-            numbers = [int(np.searchsorted(self._begin, each.lower, side="right")) - 1 for each in upright]
-            self._held = _Held(self._network, self._buffers, upright, numbers, self._piece)
+            self._held = _Held(self._network, self._buffers, upright)
         return self._held
 
 
 class _Held:
-    """Pieces that are held upright.
+    """Pieces that are held upright: those that are sewn together, say, are one network, and each is held.
 
     Attributes:
-        upright: which. piece: #V, the piece that a vertex is of, -1 where that is not among them. turn: how each piece (#P) turns.
+        upright: which. piece: #V, which of them a vertex is of, -1 where of none. turn: how each of them turns.
         go: turns them so. strongest: looks for the largest force.
     """
 
     strongest: LaunchSequence | None = None
 
-    def __init__(
-        self,
-        network: SpringNetwork,
-        buffers: StepBuffers,
-        upright: Sequence[Upright],
-        numbers: Sequence[int],
-        piece: NDArray[np.int32],
-    ) -> None:
-        device, count = network.device, len(network.pieces)
-        self.upright, self._numbers, self._network, self._buffers = upright, list(numbers), network, buffers
-        self.piece = wp.array(np.where(np.isin(piece, self._numbers), piece, -1), dtype=wp.int32, device=device)
+    def __init__(self, network: SpringNetwork, buffers: StepBuffers, upright: Sequence[Upright]) -> None:
+        device, every = network.device, np.arange(network.vertex_count, dtype=np.int32)
+        self.upright, self._network, self._buffers = upright, network, buffers
+        own = [every[each.vertices] for each in upright]
+        self._sizes = np.array([len(vertices) for vertices in own])[:, None]
+        piece = np.full(len(every), -1, dtype=np.int32)
+        for number, vertices in enumerate(own):
+            piece[vertices] = number
+        # Blocks of each, and of what lies between.
+        first = np.flatnonzero(np.diff(piece, prepend=-2))
+        self._part = np.searchsorted(first, [vertices[0] for vertices in own])
+        self._sums = FarSums(np.diff(first, append=len(every)).tolist(), device)
+        self.piece = wp.array(piece, dtype=wp.int32, device=device)
         self.turn = Turn()
         for name in ("centre", "by", "middle"):
-            setattr(self.turn, name, wp.zeros(count, dtype=wp.vec2d, device=device))
+            setattr(self.turn, name, wp.zeros(len(own), dtype=wp.vec2d, device=device))
         for name in ("spin", "torque"):
-            setattr(self.turn, name, wp.zeros(count, dtype=wp.float64, device=device))
+            setattr(self.turn, name, wp.zeros(len(own), dtype=wp.float64, device=device))
         chords = np.array([[each.lower, each.upper] for each in upright], dtype=np.int32).ravel()
         self._chord = wp.array(chords, dtype=wp.int32, device=device)
         self._ends = wp.empty(len(chords), dtype=wp.vec2d, device=device)
-        self._moments: wp.array | None = None
+        self._moments = wp.empty(MOMENTS * (len(self._sums.blocks) - 1), dtype=wp.float64, device=device)
         self.go = record(
             turn_pieces,
             dim=network.vertex_count,
@@ -174,23 +175,20 @@ class _Held:
             device=device,
         )
 
-    def measure(self, over: FarSums, *, ends: bool = False) -> None:
+    def measure(self, *, ends: bool = False) -> None:
         """Find out how the pieces turn; with their ends, how they are to be turned."""
-        if not self._numbers:
+        if not self.upright:
             return
         net, buffers, device = self._network, self._buffers, self._network.device
-        blocks = len(over.blocks) - 1
-        if self._moments is None:
-            self._moments = wp.empty(MOMENTS * blocks, dtype=wp.float64, device=device)
-        given = [buffers.position, buffers.velocity, buffers.force, buffers.load, net.spring_stiffness, over.blocks]
-        launch_each(sum_moments, blocks, given, [self._moments], device=device)
-        sums = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), over.first_block[:-1])[self._numbers]
+        blocks = self._sums.blocks
+        given = [buffers.position, buffers.velocity, buffers.force, buffers.load, net.spring_stiffness, blocks]
+        launch_each(sum_moments, len(blocks) - 1, given, [self._moments], device=device)
+        of_parts = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), self._sums.first_block[:-1])
         weight, moment, second, place, force, torque, motion, swing = np.split(
-            sums, np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
+            of_parts[self._part], np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
         )
         middle = moment / weight
         inertia = np.maximum(second - weight * (middle**2).sum(axis=1, keepdims=True), 1e-300)
-        count = len(net.pieces)
         found = {
             "middle": middle,
             "torque": (torque - _cross(middle, force)) / inertia,
@@ -204,12 +202,9 @@ class _Held:
             with np.errstate(invalid="ignore", divide="ignore"):
                 # i |c| / c: from the chord to straight up.
                 by = np.where(length > 0.0, np.stack([chord[:, 1], chord[:, 0]], axis=1) / length, [1.0, 0.0])
-            sizes = np.array([net.pieces[number].vertex_count for number in self._numbers])[:, None]
-            found |= {"by": by, "centre": place / sizes}
+            found |= {"by": by, "centre": place / self._sizes}
         for name, values in found.items():
-            of_all = np.zeros((count, values.shape[1]))
-            of_all[self._numbers] = values
-            getattr(self.turn, name).assign(of_all if values.shape[1] == 2 else of_all[:, 0])
+            getattr(self.turn, name).assign(values if values.shape[1] == 2 else values[:, 0])
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
