@@ -108,6 +108,23 @@ def gather_forces(
     stiffness[i] = k
 
 
+@wp.func
+def let_rest(
+    i: int,
+    mass: wp.array(dtype=wp.float64),
+    force: wp.array(dtype=wp.vec2d),
+    stiffness: wp.array(dtype=wp.float64),
+    time_step: wp.float64,
+    velocity: wp.array(dtype=wp.vec2d),
+    driving_force: wp.array(dtype=wp.vec2d),
+    first_guess: wp.array(dtype=wp.vec2d),
+):
+    """The velocity becomes zero, and what `gather_forces` gave becomes what it gives there."""
+    velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    driving_force[i] = force[i]
+    first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
+
+
 @wp.kernel
 def stop(
     mass: wp.array(dtype=wp.float64),
@@ -122,9 +139,7 @@ def stop(
 ):
     """Velocities become zero, and what `gather_forces` gave becomes what it gives there. Arguments as there, all #V."""
     i = wp.tid() + first
-    velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    driving_force[i] = force[i]
-    first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
+    let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
 
 @wp.kernel
@@ -144,9 +159,7 @@ def stop_braked(
     """`stop`, of those pieces whose power (#P) is negative. piece: #V, which a vertex is of."""
     i = wp.tid() + first
     if power[piece[i]] < wp.float64(0.0):
-        velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-        driving_force[i] = force[i]
-        first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
+        let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
 
 @wp.kernel
