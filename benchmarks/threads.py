@@ -1,5 +1,5 @@
-"""Approximate implicit steps on one, two, ... threads: microseconds a step, and nanoseconds per vertex, and bytes
-that it must move a second; the least of many.
+"""Approximate implicit steps on one, two, ... threads: microseconds a step, nanoseconds a vertex, and gigabytes a second of what
+has to be moved; the least of many.
 
     python benchmarks/threads.py [--sizes 256 1024 4096 10000 40000 160000] [--threads 1 2] [--devices cuda:0] [--shape bodice]
         [--triangles]

@@ -64,12 +64,6 @@ class FarSums:
         """#P, sums of the scalar products of vec2d; likewise."""
         return self._of(("dot", id(a), id(b)), lambda: self._launches(dot_blocks, [a, b], sum_blocks))
 
-    def dots_once(self, a: wp.array, b: wp.array) -> FloatArray:
-        """The same of arrays that are of this moment."""
-        for each in self._launches(dot_blocks, [a, b], sum_blocks):
-            each.launch()
-        return self._fetched()
-
     def least_after(self, first: Callable[[wp.array], Launch]) -> LaunchSequence:
         """What puts the least of each range where `result` is, of values for each block, which a launch puts where it is told to."""
         return LaunchSequence([first(self._rooms[0]), *self._rest(least_of_blocks)])

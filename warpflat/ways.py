@@ -9,7 +9,6 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.far_sums import FarSums
 from warpflat.kernels.sums import add_share, subtract
 from warpflat.launching import launch_each
 from warpflat.sums import products, weighted_rows
@@ -74,7 +73,7 @@ class FarWays:
 
     def __init__(self, count: int, device: wp.Device) -> None:
         """Of so many vertices."""
-        self._device, self._count, self._sums = device, count, FarSums([count], device)
+        self._device, self._count = device, count
 
     def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
         room = wp.empty(self._count, dtype=wp.vec2d, device=self._device) if room is None else room
@@ -90,10 +89,10 @@ class FarWays:
         launch_each(add_share, self._count, [1.0, other], [way], device=self._device)
 
     def moves(self, way: Vectors) -> bool:
-        return bool(self._sums.dots_once(way, way)[0] > 0.0)
+        return bool(wp.utils.array_inner(way, way) > 0.0)
 
     def products(self, ways: Sequence[Vectors], by: Vectors) -> FloatArray:
-        return np.array([self._sums.dots_once(way, by)[0] for way in ways])
+        return np.array([wp.utils.array_inner(way, by) for way in ways])
 
     def put(self, share: FloatArray, ways: Sequence[Vectors], room: Vectors) -> None:
         room.zero_()

@@ -56,4 +56,3 @@ def test_sums_of_ranges_of_any_length(counts: list[int]):
         np.testing.assert_allclose(sums.sums(far), np.add.reduceat(values, begin), rtol=1e-11)
         np.testing.assert_array_equal(sums.least(far), np.minimum.reduceat(values, begin))
         np.testing.assert_allclose(sums.dots(one, other), dots, rtol=1e-11)
-        np.testing.assert_allclose(sums.dots_once(one, other), dots, rtol=1e-11)

@@ -15,7 +15,6 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.kernels.labels import label_joined
 from warpflat.kernels.surface_cells import unfold_diagonals
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
@@ -273,9 +272,16 @@ def _paired(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
 
 def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
     """Connected components of `size` nodes joined by the pairs a-b, numbered from 0 by each component's first node."""
-    label = np.empty(size, dtype=np.int32)
-    launch_each(label_joined, 1, [end.astype(np.int32, copy=False) for end in (a, b)], [label])
-    return label
+    from scipy.sparse import coo_array
+    from scipy.sparse.csgraph import connected_components
+
+    graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(size, size))
+    labels: NDArray[np.int32] = connected_components(graph, directed=False)[1].astype(np.int32, copy=False)
+    if size == 0 or (labels[0] == 0 and (labels[1:] <= np.maximum.accumulate(labels)[:-1] + 1).all()):
+        return labels
+    # SciPy numbers them so, but does not promise to.
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
 
 
 def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
