@@ -8,6 +8,8 @@ Kernels run face by face, over the one or four cells of each, and what cells do 
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 # Height over longest side below which a cell is treated as slender.
@@ -175,15 +177,15 @@ def look_at_face(
     onset: wp.vec2d,
 ):
     """The same of all cells of a face, the least and any; `begin`: the first of them."""
-    p0 = position[face[0]]
-    p1 = position[face[1]]
-    p2 = position[face[2]]
+    p0 = position[natural(face[0])]
+    p1 = position[natural(face[1])]
+    p2 = position[natural(face[2])]
     height2 = wp.float64(0.0)
     near = int(0)
     if face[3] < 0:
         height2, near = look_at(p0, p1, p2, laid[begin], warp, weft, onset)
     else:
-        p3 = position[face[3]]
+        p3 = position[natural(face[3])]
         h0, near0 = look_at(p3, p0, p1, laid[begin], warp, weft, onset)
         h1, near1 = look_at(p0, p1, p2, laid[begin + 1], warp, weft, onset)
         h2, near2 = look_at(p1, p2, p3, laid[begin + 2], warp, weft, onset)
@@ -262,14 +264,14 @@ def evaluate_guard(
     corners [N]; a triangle's fourth is not used.
     stiffness k: 4 #F, bound on the energy's second derivative by the corner's place [N/m].
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     if watch == 0 and acting[f] == 0:
         return
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
-    begin = cells.first[f]
+    begin = natural(cells.first[f])
     height2, acts = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
     wave = cells.wave[f]
@@ -289,11 +291,13 @@ def evaluate_guard(
             stiffness[slot + corner_slot] = wp.float64(0.0)
             if viscous:
                 viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-        for k in range(count_cells(face)):
+        k = int(0)
+        end = count_cells(face)
+        while k < end:
             at = cell_places(face, k)
-            i0 = face[at[0]]
-            i1 = face[at[1]]
-            i2 = face[at[2]]
+            i0 = natural(face[at[0]])
+            i1 = natural(face[at[1]])
+            i2 = natural(face[at[2]])
             laid = cells.laid[begin + k]
             q0 = position[i0]
             q1 = position[i1]
@@ -354,6 +358,7 @@ def evaluate_guard(
                     viscosity[slot + at[0]] += (time_step * k0) * (v_cell - v0)
                     viscosity[slot + at[1]] += (time_step * k1) * (v_cell - v1)
                     viscosity[slot + at[2]] += (time_step * k2) * (v_cell - v2)
+            k += 1
         if is_held:
             amplitude = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
             moving = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
@@ -439,21 +444,21 @@ def compute_guard_energy(
 ):
     """Energy of the thread guard per face, of what long quads lack in shear, and of waves. position: #V [m]. energy: #F [J], infinite
     where a cell is collapsed or mirrored."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     s = sheared(cells.shear[f], warp, weft, cells.slack[f])
     t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
-    begin = cells.first[f]
-    p0 = position[face[0]]
-    p1 = position[face[1]]
-    p2 = position[face[2]]
+    begin = natural(cells.first[f])
+    p0 = position[natural(face[0])]
+    p1 = position[natural(face[1])]
+    p2 = position[natural(face[2])]
     if face[3] < 0:
         energy[f] = guard_energy(p0, p1, p2, cells.laid[begin], warp, weft, onset, s, t, guard)
     else:
-        p3 = position[face[3]]
+        p3 = position[natural(face[3])]
         energy[f] = wp.float64(0.5) * (
             guard_energy(p3, p0, p1, cells.laid[begin], warp, weft, onset, s, t, guard)
             + guard_energy(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset, s, t, guard)
@@ -484,16 +489,16 @@ def find_least_shares(
 ):
     """Signed area in the plane over that on the body, the least of the cells of each face. position: #V [m]. face, cell, laid: as
     `Cells` has them. share: #F, 0 or less where a cell is collapsed or mirrored."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     corners = face[f]
-    begin = cell[f]
-    p0 = position[corners[0]]
-    p1 = position[corners[1]]
-    p2 = position[corners[2]]
+    begin = natural(cell[f])
+    p0 = position[natural(corners[0])]
+    p1 = position[natural(corners[1])]
+    p2 = position[natural(corners[2])]
     if corners[3] < 0:
         share[f] = area_share(p0, p1, p2, laid[begin])
     else:
-        p3 = position[corners[3]]
+        p3 = position[natural(corners[3])]
         share[f] = wp.min(
             wp.min(area_share(p3, p0, p1, laid[begin]), area_share(p0, p1, p2, laid[begin + 1])),
             wp.min(area_share(p1, p2, p3, laid[begin + 2]), area_share(p2, p3, p0, laid[begin + 3])),

@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 # Quality is 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a turned one. This times a
@@ -60,7 +62,7 @@ def order_rings(
 ):
     """offset, degree, neighbor: as in `Ring`; of `sort_corners`' triangles at each vertex, which begin at `first_side` and whose number is
     in `degree` before. A degree of -1 where they are more than one fan."""
-    v = wp.tid() + first
+    v = natural(wp.tid() + first)
     begin = first_side[v]
     end = begin + degree[v]
     ring = offset[v]
@@ -69,25 +71,33 @@ def order_rings(
     # Along the border the first neighbour is one to which no triangle leads.
     start = side[begin][0]
     closed = int(1)
-    for e in range(begin, end):
+    e = natural(begin)
+    while e < end:
         led_to = int(0)
-        for f in range(begin, end):
+        f = natural(begin)
+        while f < end:
             if side[f][1] == side[e][0]:
                 led_to = 1
+            f += 1
         if led_to == 0:
             start = side[e][0]
             closed = 0
+        e += 1
     here = start
-    for i in range(begin, end):
+    i = natural(begin)
+    while i < end:
         neighbor[ring + i - begin] = here
         after = int(-1)
-        for e in range(begin, end):
+        e = natural(begin)
+        while e < end:
             if side[e][0] == here:
                 after = side[e][1]
+            e += 1
         if after < 0 or (after == start and i + 1 < end):
             degree[v] = -1
             return
         here = after
+        i += 1
     if closed == 0:
         neighbor[ring + degree[v]] = here
         neighbor[ring + degree[v] + 1] = -1
@@ -114,7 +124,8 @@ def normal_at(v: int, ring: Ring):
     end = ring.offset[v] + ring.degree[v]
     a = ring.neighbor[end - 1]
     pa = ring.vertices[wp.max(a, 0)] - here
-    for e in range(ring.offset[v], end):
+    e = natural(ring.offset[v])
+    while e < end:
         b = ring.neighbor[e]
         if b >= 0:
             pb = ring.vertices[b] - here
@@ -122,6 +133,7 @@ def normal_at(v: int, ring: Ring):
                 n += wp.cross(pa, pb)
             pa = pb
         a = b
+        e += 1
     return wp.normalize(n)
 
 
@@ -133,7 +145,9 @@ def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
     a = at(ring, v, j + 1)
     ua = ring.vertices[wp.max(a, 0)] - u
     aa = wp.dot(ua, ua)
-    for i in range(j + 2, j + ring.degree[v]):
+    i = natural(j + 2)
+    end = j + ring.degree[v]
+    while i < end:
         b = at(ring, v, i)
         if b >= 0:
             ub = ring.vertices[b] - u
@@ -146,6 +160,7 @@ def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
             ua = ub
             aa = bb
         a = b
+        i += 1
     return worst
 
 
@@ -179,11 +194,15 @@ def stays_mesh(v: int, j: int, ring: Ring):
     end = begin + ring.degree[u]
     if end + d - 4 > ring.offset[u + 1]:
         return False
-    for i in range(j + 2, j + d - 1):
+    i = natural(j + 2)
+    while i < j + d - 1:
         a = at(ring, v, i)
-        for e in range(begin, end):
+        e = natural(begin)
+        while e < end:
             if ring.neighbor[e] == a:
                 return False
+            e += 1
+        i += 1
     return True
 
 
@@ -212,11 +231,13 @@ def find_target(v: int, ring: Ring, least: wp.float64):
     while best_j >= 0:
         best = wp.float64(least)
         best_j = int(-1)
-        for j in range(0, d, step):
+        j = int(0)
+        while j < d:
             worst = worst_after(v, j, normal, ring)
             if worst > best and worst < bar:
                 best = worst
                 best_j = j
+            j += step
         bar = best
         if best_j < 0 or (stays_mesh(v, best_j, ring) and stays_upright(v, best_j, ring)):
             break
@@ -325,7 +346,7 @@ def place(
     weight: wp.array(dtype=wp.vec3d),
 ):
     """Where a vanished vertex lay in the triangles that were left: three vertices and its barycentric weights, none negative."""
-    v = wp.tid() + first
+    v = natural(wp.tid() + first)
     if gone[v] == 0:
         return
     j = target[v]
@@ -335,7 +356,9 @@ def place(
     pu = ring.vertices[u] - here
     best = -wp.float64(wp.inf)
     b = at(ring, v, j + 1)
-    for i in range(j + 2, j + ring.degree[v]):
+    i = natural(j + 2)
+    end = j + ring.degree[v]
+    while i < end:
         a = b
         b = at(ring, v, i)
         if a >= 0 and b >= 0:
@@ -355,6 +378,7 @@ def place(
                     )
                     parent[v] = wp.vec3i(u, a, b)
                     weight[v] = w / (w[0] + w[1] + w[2])
+        i += 1
 
 
 @wp.kernel
@@ -390,7 +414,9 @@ def compose_rows(
                     for k in range(3):
                         if weight[v][k] != wp.float64(0.0):
                             of = row[parent[v][k]]
-                            for e in range(offset[of], offset[of + 1]):
+                            e = natural(offset[of])
+                            e_end = offset[of + 1]
+                            while e < e_end:
                                 to = int(begin)
                                 while to < end and column[to] != column[e]:
                                     to += 1
@@ -401,6 +427,7 @@ def compose_rows(
                                     value[end] = wp.float64(0.0)
                                     end += 1
                                 value[to] = value[to] + weight[v][k] * value[e]
+                                e += 1
                 row[v] = rows
                 rows += 1
                 if rows < gone.shape[0]:

@@ -8,6 +8,7 @@ its change; with three times 1 it is the paper's step.
 import warp as wp
 
 from .cells import Cells
+from .indices import natural
 from .springs import Springs, spring_forces_on
 
 wp.set_module_options({"enable_backward": False})
@@ -71,7 +72,7 @@ def gather_forces(
     the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all faces are evaluated again [m],
     guarded: 1 where a face around it acts. All #V.
     """
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     viscosity = pace[0][0]
     total, driving = spring_forces_on(i, position, velocity, springs, time_step, viscosity != wp.float64(0.0))
     total += load[i]
@@ -79,26 +80,35 @@ def gather_forces(
     if watch != 0:
         height = wp.float64(wp.inf)
         acting = int(0)
-        for e in range(cells.offset[i], cells.offset[i + 1]):
-            face = cells.slot[e] / 4
+        e = natural(cells.offset[i])
+        end = cells.offset[i + 1]
+        while e < end:
+            face = natural(cells.slot[e]) / 4
             height = wp.min(height, face_clearance[face])
             acting = wp.max(acting, face_acting[face])
+            e += 1
         anchor[i] = position[i]
         reach[i] = STEP_SHARE * height
         guarded[i] = acting
     if guarded[i] != 0:
-        for e in range(cells.offset[i], cells.offset[i + 1]):
-            slot = cells.slot[e]
+        e = natural(cells.offset[i])
+        end = cells.offset[i + 1]
+        while e < end:
+            slot = natural(cells.slot[e])
             if face_acting[slot / 4] != 0:
                 total += face_force[slot]
                 k += face_stiffness[slot]
                 if viscosity != wp.float64(0.0):
                     driving += face_viscosity[slot]
-    for b in range(bonds.offset[i], bonds.offset[i + 1]):
-        bond = bonds.slot[b]
+            e += 1
+    b = natural(bonds.offset[i])
+    end = bonds.offset[i + 1]
+    while b < end:
+        bond = natural(bonds.slot[b])
         total += bond_force[bond]
         driving += bond_viscosity[bond]
         k += bond_stiffness[bond]
+        b += 1
     total = wp.cw_mul(total, bonds.freedom[i])
     driving = wp.cw_mul(driving, bonds.freedom[i]) * viscosity + total
     force[i] = total
@@ -138,7 +148,7 @@ def stop(
     first_guess: wp.array(dtype=wp.vec2d),
 ):
     """Velocities become zero, and what `gather_forces` gave becomes what it gives there. Arguments as there, all #V."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
 
@@ -157,7 +167,7 @@ def stop_braked(
     first_guess: wp.array(dtype=wp.vec2d),
 ):
     """`stop`, of those pieces whose power (#P) is negative. piece: #V, which a vertex is of."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     if power[piece[i]] < wp.float64(0.0):
         let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
@@ -170,7 +180,7 @@ def count_braked(
     count: wp.array(dtype=wp.int32),
 ):
     """How often each piece was stopped: one more, where its power is negative. All #P."""
-    p = wp.tid() + first
+    p = natural(wp.tid() + first)
     if power[p] < wp.float64(0.0):
         count[p] = count[p] + 1
 
@@ -196,10 +206,13 @@ def advance(
 
     A vertex that would come further from its anchor than its reach is stopped there. Arguments as in `gather_forces`, all #V.
     """
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        coupling += springs.stiffness[s] * first_guess[springs.neighbor[s]]
+    s = natural(springs.offset[i])
+    end = springs.offset[i + 1]
+    while s < end:
+        coupling += springs.stiffness[s] * first_guess[natural(springs.neighbor[s])]
+        s += 1
     h2 = time_step * time_step
     dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] * pace[0][1] + dv * pace[0][2]
@@ -221,5 +234,5 @@ def compute_kinetic_energy(
     energy: wp.array(dtype=wp.float64),
 ):
     """1/2 m v^2. mass [kg], velocity [m/s], energy [J]: #V."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     energy[i] = wp.float64(0.5) * mass[i] * wp.dot(velocity[i], velocity[i])

@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -64,7 +66,7 @@ def list_corners(
 
     slot_of: 4, a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin.
     """
-    v = wp.tid() + first
+    v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
     at = offset[v]
@@ -119,7 +121,7 @@ def list_neighbors(
     neighbor: wp.array(dtype=wp.int32),
 ):
     """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin."""
-    v = wp.tid() + first
+    v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
     at = offset[v]
@@ -142,7 +144,7 @@ def list_values(
     listed: wp.array(dtype=wp.float64),
 ):
     """The values (#S) of the springs to these vertices, by the numbers of `spring_to`, which are listed nowhere."""
-    v = wp.tid() + first
+    v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
     at = offset[v]

@@ -24,6 +24,7 @@ from .cells import (
     laid_edges,
     longest_square,
 )
+from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
 
@@ -203,7 +204,7 @@ def evaluate_membrane(
     clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the
     faces' corners [N]. stiffness: 4 #F [N/m].
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     if watch == 0 and acting[f] == 0:
         return
     face = cells.face[f]
@@ -306,7 +307,7 @@ def bound_membrane(
 
     position: #V [m]. weight: 3 #C, along the sides 0-1, 1-2, 2-0 [N/m]; a mirrored cell's is left as it was.
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = cells.face[f]
     begin = cells.first[f]
     warp = cloth.warp * cells.slack[f][0]
@@ -344,7 +345,7 @@ def compute_membrane_energy(
     energy: wp.array(dtype=wp.float64),
 ):
     """(Flat area) psi per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = cells.face[f]
     begin = cells.first[f]
     warp = cloth.warp * cells.slack[f][0]
@@ -384,7 +385,7 @@ def compute_membrane_strain(
     Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
     energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = cells.face[f]
     for k in range(count_cells(face)):
         c = cells.first[f] + k

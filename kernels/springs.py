@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -26,10 +28,8 @@ class Springs:
 @wp.func
 def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
     """Force on the near end of a spring, d the vector to its far end: -grad of 1/2 k (l - L)^2. Zero at zero length."""
-    length = wp.length(d)
-    if length > wp.float64(0.0):
-        return stiffness * (wp.float64(1.0) - rest_length / length) * d
-    return wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+    length = wp.sqrt(wp.max(wp.dot(d, d), wp.float64(1.0e-300)))
+    return stiffness * (wp.float64(1.0) - rest_length / length) * d
 
 
 @wp.func
@@ -46,14 +46,20 @@ def spring_forces_on(
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if springs.pull != wp.float64(0.0):
+        begin = natural(springs.offset[i])
+        end = springs.offset[i + 1]
         here = position[i]
-        moving = velocity[i]
-        for s in range(springs.offset[i], springs.offset[i + 1]):
-            there = springs.neighbor[s]
-            stiffness = springs.stiffness[s]
-            force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
-            if viscous:
-                viscosity += stiffness * (velocity[there] - moving)
+        s = begin
+        while s < end:
+            there = natural(springs.neighbor[s])
+            force += spring_force(position[there] - here, springs.rest_length[s], springs.stiffness[s])
+            s += 1
+        if viscous:
+            moving = velocity[i]
+            s = begin
+            while s < end:
+                viscosity += springs.stiffness[s] * (velocity[natural(springs.neighbor[s])] - moving)
+                s += 1
     return force, time_step * viscosity
 
 
@@ -69,14 +75,17 @@ def compute_spring_energy(
 
     position: #V [m]. energy: #V [J].
     """
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     here = position[i]
     total = wp.float64(0.0)
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        there = springs.neighbor[s]
+    s = natural(springs.offset[i])
+    end = springs.offset[i + 1]
+    while s < end:
+        there = natural(springs.neighbor[s])
         if there > i:
             stretch = wp.length(position[there] - here) - springs.rest_length[s]
             total += wp.float64(0.5) * springs.stiffness[s] * stretch * stretch
+        s += 1
     energy[i] = springs.pull * total
 
 
@@ -92,11 +101,14 @@ def compute_spring_pull(
 
     position: #V [m]. pull: #V [N].
     """
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     here = position[i]
     total = wp.float64(0.0)
-    for s in range(springs.offset[i], springs.offset[i + 1]):
-        there = springs.neighbor[s]
+    s = natural(springs.offset[i])
+    end = springs.offset[i + 1]
+    while s < end:
+        there = natural(springs.neighbor[s])
         if there > i:
             total += springs.stiffness[s] * wp.abs(wp.length(position[there] - here) - springs.rest_length[s])
+        s += 1
     pull[i] = total

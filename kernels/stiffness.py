@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
@@ -20,8 +22,8 @@ def measure_edges(
     length: wp.array(dtype=wp.float64),
 ):
     """Distance [m] of the two ends of each edge."""
-    e = wp.tid() + first
-    length[e] = wp.length(vertices[ends[e][0]] - vertices[ends[e][1]])
+    e = natural(wp.tid() + first)
+    length[e] = wp.length(vertices[natural(ends[e][0])] - vertices[natural(ends[e][1])])
 
 
 @wp.kernel
@@ -41,9 +43,11 @@ def list_springs(
     edges, sorted by their lower vertex, are in order already. neighbor, spring: 2 #S, in the same order but for that within a
     vertex.
     """
-    i = wp.tid() + first
-    begin = offset[i]
-    for e in range(begin, offset[i + 1]):
+    i = natural(wp.tid() + first)
+    begin = natural(offset[i])
+    e = begin
+    e_end = offset[i + 1]
+    while e < e_end:
         s = end[e]
         there = int(0)
         if s < spring_count:
@@ -58,6 +62,7 @@ def list_springs(
             at -= 1
         neighbor[at] = there
         spring[at] = s
+        e += 1
 
 
 @wp.kernel
@@ -69,8 +74,8 @@ def pick_values(
     listed: wp.array(dtype=wp.float64),
 ):
     """The value of the spring that each entry of a list names."""
-    e = wp.tid() + first
-    listed[e] = value[entry[e]]
+    e = natural(wp.tid() + first)
+    listed[e] = value[natural(entry[e])]
 
 
 @wp.kernel
@@ -85,14 +90,17 @@ def find_sides(
 ):
     """The springs along each cell's edges 0-1, 1-2, 2-0, -1 where there is none. offset, neighbor, spring: as `list_springs` has
     them."""
-    c = wp.tid() + first
+    c = natural(wp.tid() + first)
     found = wp.vec3i(-1, -1, -1)
     for k in range(3):
         i = corner[c][k]
         j = corner[c][(k + 1) % 3]
-        for e in range(offset[i], offset[i + 1]):
+        e = natural(offset[i])
+        end = offset[i + 1]
+        while e < end:
             if neighbor[e] == j:
                 found[k] = spring[e]
+            e += 1
     side[c] = found
 
 
@@ -106,13 +114,16 @@ def sum_stiffness(
     around: wp.array(dtype=wp.float64),
 ):
     """#V, the sum of the k_ij [N/m] that are listed around each vertex, and a share of the stiffest."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     total = wp.float64(0.0)
     stiffest = wp.float64(0.0)
-    for e in range(offset[i], offset[i + 1]):
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
         k = stiffness[e]
         total += k
         stiffest = wp.max(stiffest, k)
+        e += 1
     around[i] = total + pair_share * stiffest
 
 
@@ -132,7 +143,7 @@ def find_directions(
     fourfold: wp.array(dtype=wp.vec2d),
 ):
     """(cos 4a, sin 4a) of the angle a from the warp to each quad's first edges."""
-    q = wp.tid() + first
+    q = natural(wp.tid() + first)
     d = first_direction(position, quads[q])
     along = wp.dot(d, warp)
     across = warp[0] * d[1] - warp[1] * d[0]
@@ -196,7 +207,7 @@ def weigh_quads(
     stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as `cells.Cells.shear` has it. hold: #Q, what a wave from vertex to
     vertex along rows and columns alike, in which no diagonal is strained, has to be held by besides [N/m] (`weigh_waves`).
     """
-    q = wp.tid() + first
+    q = natural(wp.tid() + first)
     quad = quads[q]
     d = first_direction(position, quad)
     ka = lattice.along
@@ -247,7 +258,7 @@ def weigh_waves(
     The weights are +1, -1, +1, -1, less what a quad with its shape on the body has of the like, so that this shape and all that uniform
     strains make of it store nothing (Flanagan and Belytschko 1981), times the root of `hold`, #Q [N/m]. wave: #Q.
     """
-    q = wp.tid() + first
+    q = natural(wp.tid() + first)
     quad = quads[q]
     wave[q] = wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if hold[q] > wp.float64(0.0):
@@ -290,7 +301,7 @@ def weigh_triangles(
     compliance: 1/K = (c4 [0] + s4 [1] + s2 c2 [2]) / (c2 + s2)^2 of a side that goes c along and s across the warp [m/N].
     side: #T, the first of each triangle's half-edges. stiffness: #H.
     """
-    t = wp.tid() + first
+    t = natural(wp.tid() + first)
     triangle = triangles[t]
     p0 = vertices[triangle[0]]
     area = wp.float64(0.5) * wp.length(wp.cross(vertices[triangle[1]] - p0, vertices[triangle[2]] - p0))
@@ -327,14 +338,17 @@ def measure_hold(
 ):
     """Shear stiffness [N/m] of the springs around each vertex against warp and weft: sum of 1/2 k L^2 cos^2 sin^2 over the
     vertex's area [m2]. rest_length, stiffness: 2 #S, as they are listed around the vertices."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     held = wp.float64(0.0)
-    for e in range(offset[i], offset[i + 1]):
-        d = position[neighbor[e]] - position[i]
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
+        d = position[natural(neighbor[e])] - position[i]
         along = wp.dot(d, warp)
         across = d[0] * warp[1] - d[1] * warp[0]
         share = along * across / wp.max(along * along + across * across, TINY)
         held += wp.float64(0.5) * stiffness[e] * rest_length[e] * rest_length[e] * share * share
+        e += 1
     hold[i] = held / area[i]
 
 
@@ -359,14 +373,17 @@ def sum_strain_fields(
     products: wp.array(dtype=wp.mat33d),
 ):
     """Sums over the springs around each vertex of k L^2 w, w their `strain_field` in a layout [J], and of k L^2 w w^T."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     total = wp.vec3d()
     squares = wp.mat33d()
-    for e in range(offset[i], offset[i + 1]):
-        field = strain_field(position[neighbor[e]] - position[i])
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
+        field = strain_field(position[natural(neighbor[e])] - position[i])
         share = stiffness[e] * rest_length[e] * rest_length[e] * field
         total += share
         squares += wp.outer(share, field)
+        e += 1
     stored[i] = total
     products[i] = squares
 
@@ -384,7 +401,10 @@ def weigh_by_direction(
     stiffness: wp.array(dtype=wp.float64),
 ):
     """Multiply k_ij, listed around the vertices, by `factor` times the `strain_field` in a layout, within bounds."""
-    i = wp.tid() + first
-    for e in range(offset[i], offset[i + 1]):
-        field = strain_field(position[neighbor[e]] - position[i])
+    i = natural(wp.tid() + first)
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
+        field = strain_field(position[natural(neighbor[e])] - position[i])
         stiffness[e] = stiffness[e] * wp.clamp(wp.dot(factor, field), least, most)
+        e += 1

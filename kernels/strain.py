@@ -3,6 +3,7 @@
 import warp as wp
 
 from .cells import Cells, cell_corner, cell_weight, count_cells, flat_edges, laid_edges
+from .indices import natural
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -31,7 +32,7 @@ def measure_flat_cells(
     area: wp.array(dtype=wp.float64),
 ):
     """position: #V [m]. corner: #C. area: #C, signed [m2]; 0 or less where a cell is mirrored or collapsed."""
-    c = wp.tid() + first
+    c = natural(wp.tid() + first)
     area[c] = wp.float64(0.5) * wp.determinant(flat_edges(position, corner[c]))
 
 
@@ -84,7 +85,7 @@ def compute_worn_strain(
     Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
     energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     for k in range(count_cells(cells.face[f])):
         c = cells.first[f] + k
         flat, e = worn_strain(position, cells, membrane, f, k)
@@ -105,7 +106,7 @@ def compute_strain_energy(
     energy: wp.array(dtype=wp.float64),
 ):
     """The energy of `compute_worn_strain` alone, per face. position: #V [m]. energy: #F [J]."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     total = wp.float64(0.0)
     for k in range(count_cells(cells.face[f])):
         flat, e = worn_strain(position, cells, membrane, f, k)
@@ -131,7 +132,7 @@ def average_over_faces(
 
     offset: #F+1, where each face's cells begin. strain, stress, energy, area: #C. The same with face_: #F.
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     total = wp.float64(0.0)
     stored = wp.float64(0.0)
     for c in range(offset[f], offset[f + 1]):

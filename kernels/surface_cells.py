@@ -5,6 +5,8 @@ Rounded as NumPy rounds, without fused products: two quads that are mirror image
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 # Diagonals that pass each other within this share of their length belong to a flat quad, creased or not.
@@ -29,16 +31,16 @@ def find_bends(
 ):
     """normal: #F, of twice the face's area, of a quad at right angles to both diagonals [m2]. bent: #F, 1 for a convex quad
     whose corners lie in no plane, else 0."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = faces[f]
-    p0 = vertices[face[0]]
-    p1 = vertices[face[1]]
-    p2 = vertices[face[2]]
+    p0 = vertices[natural(face[0])]
+    p1 = vertices[natural(face[1])]
+    p2 = vertices[natural(face[2])]
     bent[f] = wp.int8(0)
     if face[3] < 0:
         normal[f] = wp.cross(p1 - p0, p2 - p0)
     else:
-        p3 = vertices[face[3]]
+        p3 = vertices[natural(face[3])]
         n = wp.cross(p2 - p0, p3 - p1)
         normal[f] = n
         longer = wp.max(wp.length(p2 - p0), wp.length(p3 - p1))
@@ -65,10 +67,13 @@ def average_normals(
 
     offset: #V+1, into `corner`: 4 times the face plus the column.
     """
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     there = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
-    for e in range(offset[i], offset[i + 1]):
-        there += normal[corner[e] / 4]
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
+        there += normal[natural(corner[e]) / 4]
+        e += 1
     mean[i] = there / wp.max(wp.length(there), TINY)
 
 
@@ -89,12 +94,12 @@ def find_creases(
     crease: wp.array(dtype=wp.int8),
 ):
     """Along which diagonal a bent quad is creased: 0 for corners 0-2, 1 for 1-3, else -1. normal: #V, of length 1."""
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     crease[f] = wp.int8(-1)
     if bent[f] != wp.int8(0):
         face = faces[f]
-        d02 = vertices[face[2]] - vertices[face[0]]
-        d13 = vertices[face[3]] - vertices[face[1]]
+        d02 = vertices[natural(face[2])] - vertices[natural(face[0])]
+        d13 = vertices[natural(face[3])] - vertices[natural(face[1])]
         l02 = wp.length(d02)
         l13 = wp.length(d13)
         m02 = turn_along(normal[face[0]], normal[face[2]], d02, l02)
@@ -141,12 +146,12 @@ def unfold_diagonals(
     length: wp.array(dtype=wp.vec2d),
 ):
     """Lengths [m] of the diagonals 0-2 and 1-3 of quads on the surface; that along a crease is straight. All #Q."""
-    q = wp.tid() + first
+    q = natural(wp.tid() + first)
     quad = quads[q]
-    p0 = vertices[quad[0]]
-    p1 = vertices[quad[1]]
-    p2 = vertices[quad[2]]
-    p3 = vertices[quad[3]]
+    p0 = vertices[natural(quad[0])]
+    p1 = vertices[natural(quad[1])]
+    p2 = vertices[natural(quad[2])]
+    p3 = vertices[natural(quad[3])]
     normal = wp.cross(p2 - p0, p3 - p1)
     l02 = wp.length(p2 - p0)
     l13 = wp.length(p3 - p1)
@@ -190,16 +195,16 @@ def lay_cells(
 
     crease: #F, as `find_creases` has it. cell: #F, the first of each face. laid: #C, as `cells.Cells` has them [m].
     """
-    f = wp.tid() + first
+    f = natural(wp.tid() + first)
     face = faces[f]
-    c = cell[f]
-    p0 = vertices[face[0]]
-    p1 = vertices[face[1]]
-    p2 = vertices[face[2]]
+    c = natural(cell[f])
+    p0 = vertices[natural(face[0])]
+    p1 = vertices[natural(face[1])]
+    p2 = vertices[natural(face[2])]
     if face[3] < 0:
         laid[c] = lay_cell(p0, p1, p2)
     else:
-        p3 = vertices[face[3]]
+        p3 = vertices[natural(face[3])]
         if crease[f] == wp.int8(0):
             hinge = p2 - p0
             length = wp.length(hinge)
@@ -241,9 +246,11 @@ def add_areas(
 ):
     """A third of the weighted areas of the cells around each vertex [m2]. cell: #F, the first of each face. laid: #C, as `lay_cells`
     has them. offset: #V+1, into `slot`: 4 times the face plus the corner."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     twice = wp.float64(0.0)
-    for e in range(offset[i], offset[i + 1]):
+    e = natural(offset[i])
+    end = offset[i + 1]
+    while e < end:
         f = slot[e] / 4
         if faces[f][3] < 0:
             laid_flat = laid[cell[f]]
@@ -255,4 +262,5 @@ def add_areas(
                 if k != beyond:
                     laid_flat = laid[cell[f] + k]
                     twice += wp.float64(0.5) * laid_flat[0] * laid_flat[2]
+        e += 1
     total[i] = twice / wp.float64(6.0)

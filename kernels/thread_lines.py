@@ -9,6 +9,7 @@ diagonals.
 import warp as wp
 
 from .cells import Cells
+from .indices import natural
 from .springs import Springs
 
 wp.set_module_options({"enable_backward": False})
@@ -70,14 +71,15 @@ def solve_lines(
 
     position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at these positions.
     """
-    line = wp.tid() + first
+    line = natural(wp.tid() + first)
     way = wp.where(line < lines.rows, along_rows, along_columns)
     begin = lines.offset[line]
     end = lines.offset[line + 1]
     k_before = wp.float64(0.0)
     passed = wp.float64(0.0)
     pushed = wp.float64(0.0)
-    for e in range(begin, end):
+    e = natural(begin)
+    while e < end:
         i = lines.vertex[e]
         before = int(-1)
         after = int(-1)
@@ -88,17 +90,23 @@ def solve_lines(
         along = line_direction(position, lines, e, begin, end)
         k_after = wp.float64(0.0)
         held = mass[i] / (time_step * time_step)
-        for s in range(springs.offset[i], springs.offset[i + 1]):
+        s = natural(springs.offset[i])
+        s_end = springs.offset[i + 1]
+        while s < s_end:
             j = springs.neighbor[s]
             if j == after:
                 k_after = springs.stiffness[s]
             elif j != before:
                 held += held_across(position[j] - position[i], springs.rest_length[s], springs.stiffness[s], along)
+            s += 1
         if guarded[i] != 0:
-            for c in range(cells.offset[i], cells.offset[i + 1]):
+            c = natural(cells.offset[i])
+            c_end = cells.offset[i + 1]
+            while c < c_end:
                 slot = cells.slot[c]
                 if face_acting[slot / 4] != 0:
                     held += GUARD_LEFT * face_stiffness[slot]
+                c += 1
             if after >= 0 and guarded[wp.max(after, 0)] != 0:
                 k_after = wp.float64(2.0) * k_after
         # Elimination from the first vertex on: here = pushed + passed * there.
@@ -107,6 +115,7 @@ def solve_lines(
         passed = k_after / rest
         way[i] = wp.vec2d(pushed, passed)
         k_before = k_after
+        e += 1
     gone = wp.float64(0.0)
     for back in range(end - begin):
         e = end - 1 - back
@@ -126,7 +135,7 @@ def go_along_lines(
     position: wp.array(dtype=wp.vec2d),
 ):
     """Both ways one after the other, where a vertex is free to go, and no further than its reach [m]. All #V."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     way = wp.cw_mul(along_rows[i] + along_columns[i], freedom[i])
     length = wp.length(way)
     if length > reach[i]:

@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 
@@ -28,8 +30,11 @@ class Transpose:
 def weighted_sum(i: int, weights: Weights, values: wp.array(dtype=wp.vec2d)):
     """Row i of the matrix times `values`."""
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for e in range(weights.offset[i], weights.offset[i + 1]):
-        total += weights.weight[e] * values[weights.column[e]]
+    e = natural(weights.offset[i])
+    end = weights.offset[i + 1]
+    while e < end:
+        total += weights.weight[e] * values[natural(weights.column[e])]
+        e += 1
     return total
 
 
@@ -42,7 +47,7 @@ def transfer(
     result: wp.array(dtype=wp.vec2d),
 ):
     """result_i = sum_j w_ij values_j: a layout or a correction for the finer level."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     result[i] = weighted_sum(i, weights, values)
 
 
@@ -56,8 +61,8 @@ def coarse_difference(
     difference: wp.array(dtype=wp.vec2d),
 ):
     """How far the coarse level has come from the places of its vertices on the finer one. kept: #coarse, fine vertices [m]."""
-    i = wp.tid() + first
-    difference[i] = coarse[i] - fine[kept[i]]
+    i = natural(wp.tid() + first)
+    difference[i] = coarse[i] - fine[natural(kept[i])]
 
 
 @wp.kernel
@@ -72,10 +77,13 @@ def coarse_load(
 ):
     """The load with which the coarse level has, where the finer one stands, the finer one's residual forces [N]:
     load = P^T residual - force, force that of the coarse level without load (full approximation scheme)."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for e in range(transpose.offset[i], transpose.offset[i + 1]):
-        total += prolongation.weight[transpose.entry[e]] * residual[transpose.row[e]]
+    e = natural(transpose.offset[i])
+    end = transpose.offset[i + 1]
+    while e < end:
+        total += prolongation.weight[natural(transpose.entry[e])] * residual[natural(transpose.row[e])]
+        e += 1
     load[i] = total - force[i]
 
 
@@ -90,7 +98,7 @@ def correct(
     position: wp.array(dtype=wp.vec2d),
 ):
     """position = base + share of the correction, where a vertex is free to go [m]."""
-    i = wp.tid() + first
+    i = natural(wp.tid() + first)
     position[i] = base[i] + share * wp.cw_mul(correction[i], freedom[i])
 
 
@@ -103,5 +111,5 @@ def inject(
     coarse: wp.array(dtype=wp.vec2d),
 ):
     """The places of the coarse level's vertices on the finer one. kept: #coarse, fine vertices [m]."""
-    i = wp.tid() + first
-    coarse[i] = fine[kept[i]]
+    i = natural(wp.tid() + first)
+    coarse[i] = fine[natural(kept[i])]
