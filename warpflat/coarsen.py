@@ -32,6 +32,7 @@ from warpflat.springs import unweighed_springs
 from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import triangulate
 from warpflat.thinning import Transfer, spread_of, thinned_of
 
@@ -181,8 +182,12 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
 @contextmanager
 def levels_meanwhile(surface: Surface) -> Iterator[None]:
     """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
-    be done with all at its end."""
-    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
+    be done with all at its end. Those of a grid, which starts from one spread over it, are not needed so soon, nor take long."""
+    if (
+        thread_count() == 1
+        or len(surface.vertices) < _WORTH_A_THREAD
+        or row_by_row(surface) is not None
+    ):
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
