@@ -183,11 +183,7 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
 def levels_meanwhile(surface: Surface) -> Iterator[None]:
     """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
     be done with all at its end. Those of a grid, which starts from one spread over it, are not needed so soon, nor take long."""
-    if (
-        thread_count() == 1
-        or len(surface.vertices) < _WORTH_A_THREAD
-        or row_by_row(surface) is not None
-    ):
+    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_by_row(surface) is not None:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:

@@ -27,6 +27,9 @@ class CycleMemory:
 
     A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
     share with each cycle.
+
+    Attributes:
+        past: how many cycles before the present one are remembered.
     """
 
     def __init__(self, depth: int = _DEPTH) -> None:
@@ -37,18 +40,18 @@ class CycleMemory:
         # Ways of cycles before, each as one, and then those of the present cycle's parts; of all of them the curvature, the fall of the
         # forces on one of them along another [N m].
         self._ways: list[Vectors] = []
-        self._past = 0
+        self.past = 0
         self._curvature = np.zeros((0, 0))
 
     def begin(self, mark: Mark) -> None:
         """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told. The mark
         is copied."""
-        if len(self._ways) > self._past:
+        if len(self._ways) > self.past:
             self.come_to(mark)
             self._join()
             del self._ways[: -self._depth]
-            self._past = len(self._ways)
-            self._curvature = self._curvature[-self._past :, -self._past :]
+            self.past = len(self._ways)
+            self._curvature = self._curvature[-self.past :, -self.past :]
         self._keep(mark)
 
     def come_to(self, mark: Mark) -> None:
@@ -66,13 +69,13 @@ class CycleMemory:
 
     def _join(self) -> None:
         """Make the parts of the present cycle one."""
-        parts = len(self._ways) - self._past
-        for way in self._ways[self._past + 1 :]:
-            self._algebra.join(self._ways[self._past], way)
-        del self._ways[self._past + 1 :]
-        joined = np.zeros((self._past + 1, self._past + parts))
-        joined[:-1, : self._past] = np.eye(self._past)
-        joined[-1, self._past :] = 1.0
+        parts = len(self._ways) - self.past
+        for way in self._ways[self.past + 1 :]:
+            self._algebra.join(self._ways[self.past], way)
+        del self._ways[self.past + 1 :]
+        joined = np.zeros((self.past + 1, self.past + parts))
+        joined[:-1, : self.past] = np.eye(self.past)
+        joined[-1, self.past :] = 1.0
         self._curvature = joined @ self._curvature @ joined.T
 
     def _keep(self, mark: Mark) -> None:

@@ -403,7 +403,9 @@ class Levels:
 
     def leap(self, energy: FloatArray) -> None:
         """Go on from where a cycle on the finest level has led, to where this one and those before say that the energy is least, as far as
-        it is lower there. energy: #P, at its end [J]."""
+        it is lower there; between triangles not on from the first, most of whose way was rough. energy: #P, at its end [J]."""
+        if not self._lattice and not any(memory.past for memory in self._memories):
+            return
         state = self._levels[0].state
         self._count(0, FORCE_WORK)
         state.evaluate_at_rest()

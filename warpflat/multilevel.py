@@ -149,7 +149,7 @@ def relax_multilevel(
         enough: it is over, at rest or not, after a cycle that takes no more than this share of the energy away; if given.
         watch: called after every cycle with the state, its energies and the residual; of several pieces, with the state of those that
             are still cycled together (its `numbers` say which).
-        each_step: called after every step on the finest level, with the energies and the residual of the last look.
+        each_step: called after every step on the finest level and every cycle, with the energies and the residual of the last look.
     """
     options: RelaxOptions = state.options
     begun = time.perf_counter()
@@ -196,5 +196,6 @@ def relax_multilevel(
             cycles = left
         cycles.go(enough, None if each_step is None else lambda: tell(each_step))
         tell(watch)
+        tell(each_step)
     cycles.state.give(whole)
     return whole.outcome(first, start, begun=begun)

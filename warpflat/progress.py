@@ -48,7 +48,7 @@ class Stage:
 
 
 class Progress:
-    """Where a run stands; what a callback gets after every step.
+    """Where a run stands; what a callback gets after every step, and after every cycle of levels.
 
     Attributes:
         stage: "develop", before the first step, then "relax"; "cut:NAME" and "close:NAME" where darts open and close, "fabric:NAME" and
