@@ -74,6 +74,31 @@ def test_results_are_those_of_one_thread_bit_for_bit(triangles: bool, monkeypatc
             np.testing.assert_array_equal(values, expected[name], err_msg=f"{name}, {threads} threads")
 
 
+@wp.kernel
+def count_once(first: int, times: wp.array(dtype=wp.int32)):
+    i = wp.tid() + first
+    times[i] = times[i] + 1
+
+
+@pytest.mark.parametrize(("size", "turns"), [(100_003, 4), (100_003, 1), (5_000, 4), (2_000, 4), (700, 4)])
+@pytest.mark.parametrize("threads", [1, 2, 3])
+def test_threads_take_turns(size: int, turns: int, threads: int) -> None:
+    times = wp.zeros(size, dtype=wp.int32, device="cpu")
+    launch = record(
+        count_once, dim=size, inputs=[], outputs=[times], device="cpu", threads=threads, least=512, turns=turns
+    )
+    assert len(launch.commands) == min(threads, size // 512)
+    launch.launch()
+    assert (times.numpy() == 1).all()
+    if size == 100_003 and threads > 1:
+        times.zero_()
+        launch.commands[0]()
+        # As many for each, and spread over all.
+        begun = np.flatnonzero(np.diff(times.numpy(), prepend=0) == 1)
+        assert len(begun) == turns
+        assert np.ptp(begun) > 0.5 * size or turns == 1
+
+
 def test_recorded_launches_are_those_of_warp() -> None:
     surface = bodice(resolution=8)
     start = develop(surface, surface.lines["centre"]).positions

@@ -123,6 +123,7 @@ def record(
     device: str | wp.Device | None = None,
     threads: int | None = None,
     least: int | None = None,
+    turns: int = 1,
 ) -> Launch:
     """Record a launch of a kernel whose last input is ``first: int``. All values are fixed; arrays may change in place.
 
@@ -134,14 +135,30 @@ def record(
         device: Warp device.
         threads: of the CPU that share it; `thread_count()` if not given.
         least: shortest range worth a thread of its own.
+        turns: ranges that each thread takes, every so many-th, where some may take much longer than others.
     """
     where = wp.get_device(device)
+    threads = thread_count() if threads is None else threads
     if where.is_cpu:
-        ranges = split_range(dim, thread_count() if threads is None else threads, least=least)
+        ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
     else:
         ranges = [(0, dim)] if dim > 0 else []
     commands = commands_of(kernel, ranges, inputs, outputs, where)
+    if len(commands) > threads:
+        commands = [partial(_run_all, commands[i::threads]) for i in range(threads)]
     return Launch(commands, keep=(inputs, outputs), device=where)
+
+
+def _fair_turns(dim: int, threads: int, most: int, least: int | None) -> int:
+    """How many ranges each of the threads can take, as many as the others."""
+    if threads == 1:
+        return 1
+    return max(1, min(most, dim // (threads * max(_LEAST_RANGE if least is None else least, 1))))
+
+
+def _run_all(commands: SequenceOf[Command]) -> None:
+    for command in commands:
+        command()
 
 
 def record_copy(source: wp.array, target: wp.array, *, begin: int = 0) -> Launch:

@@ -30,6 +30,9 @@ FloatArray = NDArray[np.float64]
 
 # So many lines of a lattice are worth a thread of their own: they have about as many vertices each.
 _LEAST_LINES = 64
+# The guard takes several times as long as a look at a cell, and acts in some places of a piece only: each thread takes so many ranges,
+# spread over all.
+_TURNS = 4
 
 
 class StepBuffers:
@@ -111,6 +114,7 @@ class StepBuffers:
                 self.face_stiffness,
             ],
             device=net.device,
+            turns=_TURNS,
         )
 
     @cached_property
@@ -166,6 +170,7 @@ class StepBuffers:
                 self.guarded,
             ],
             device=net.device,
+            turns=_TURNS,
         )
 
     @cached_property
