@@ -68,7 +68,7 @@ def gather_forces(
     position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`. bond_*: as
     `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all faces have been evaluated at these positions, 0 where only
     those that act were; then anchor, reach and guarded stay what they were.
-    force F [N], power F.v / K [m2/s], driving_force F~ [N], first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
+    force F [N], power F.v / K [m2/s], driving_force F~ [N], not written without viscosity, where it is F, first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
     the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all faces are evaluated again [m],
     guarded: 1 where a face around it acts. All #V.
     """
@@ -113,7 +113,8 @@ def gather_forces(
     driving = wp.cw_mul(driving, bonds.freedom[i]) * viscosity + total
     force[i] = total
     power[i] = wp.dot(total, velocity[i]) / k
-    driving_force[i] = driving
+    if viscosity != wp.float64(0.0):
+        driving_force[i] = driving
     first_guess[i] = driving * (time_step / (mass[i] + time_step * time_step * k))
     stiffness[i] = k
 
@@ -190,6 +191,7 @@ def advance(
     mass: wp.array(dtype=wp.float64),
     springs: Springs,
     bonds: Bonds,
+    force: wp.array(dtype=wp.vec2d),
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
@@ -213,8 +215,11 @@ def advance(
     while s < end:
         coupling += springs.stiffness[s] * first_guess[natural(springs.neighbor[s])]
         s += 1
+    driving = force[i]
+    if pace[0][0] != wp.float64(0.0):
+        driving = driving_force[i]
     h2 = time_step * time_step
-    dv = (driving_force[i] * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
+    dv = (driving * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
     v = velocity[i] * pace[0][1] + dv * pace[0][2]
     here = position[i]
     away = here - anchor[i] + v * time_step

@@ -54,10 +54,13 @@ class FarSteps:
     def _launches(self, kind: str, steps: int, watch_every: int, evaluated: bool) -> list[Launch]:
         buffers, smooth = self._buffers, kind == "smooth"
         damping = self._pieces.damping if self._damped and not smooth else []
-        launches = [] if smooth else [self._pace(0)]
+        launches = list[Launch]()
         for number in range(steps):
             if smooth:
                 launches.append(self._pace(2 + number))
+            elif number < 2:
+                # As in `Relaxation.sweep`.
+                launches.append(self._pace(1 if evaluated and number == 0 else 0))
             if number % watch_every:
                 launches += buffers.evaluate_on.launches
             elif number or not evaluated:

@@ -218,7 +218,7 @@ class Relaxation:
         watch_every: int = 1,
         evaluated: bool = False,
     ) -> None:
-        """Some steps in a row.
+        """Some steps in a row; from rest, if `evaluated`.
 
         Args:
             steps: how many.
@@ -231,8 +231,10 @@ class Relaxation:
             self._far_steps.sweep(steps, watch_every, evaluated=evaluated)
             self.steps += steps
             return
-        self._buffers.go_at(STEADY)
         for number in range(steps):
+            if number < 2:
+                # What has been evaluated was so at rest, without viscosity: of velocities that are zero that is the same.
+                self._buffers.go_at(STILL if evaluated and number == 0 else STEADY)
             self._evaluate(number, watch_every, evaluated=evaluated)
             if self.options.kinetic_damping:
                 self._restarts += self.pieces.damp()

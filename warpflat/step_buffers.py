@@ -61,7 +61,6 @@ class StepBuffers:
         self.velocity = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.force = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.load = wp.zeros(n, dtype=wp.vec2d, device=device)
-        self.driving_force = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.first_guess = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.power = wp.zeros(n, dtype=wp.float64, device=device)
         self.stiffness = wp.zeros(n, dtype=wp.float64, device=device)
@@ -69,7 +68,8 @@ class StepBuffers:
         self.reach = wp.zeros(n, dtype=wp.float64, device=device)
         self.guarded = wp.zeros(n, dtype=wp.int32, device=device)
         self.face_acting = wp.zeros(f, dtype=wp.int32, device=device)
-        # Written and read only where cells act, the second only with viscosity: elsewhere no memory stands behind them.
+        # Written and read only with viscosity, and of faces only where cells act: elsewhere no memory stands behind them.
+        self.driving_force = wp.empty(n, dtype=wp.vec2d, device=device)
         self.face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
         self.face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
         self.face_stiffness = wp.empty(4 * f, dtype=wp.float64, device=device)
@@ -199,6 +199,7 @@ class StepBuffers:
                 net.mass,
                 net.springs,
                 net.bonds,
+                self.force,
                 self.driving_force,
                 self.first_guess,
                 self.stiffness,
