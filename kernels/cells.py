@@ -244,7 +244,7 @@ def evaluate_guard(
     watch: int,
     first: int,
     # outputs
-    acting: wp.array(dtype=wp.int32),
+    acting: wp.array(dtype=wp.int8),
     clearance: wp.array(dtype=wp.float64),
     force: wp.array(dtype=wp.vec2d),
     viscosity: wp.array(dtype=wp.vec2d),
@@ -265,22 +265,22 @@ def evaluate_guard(
     stiffness k: 4 #F, bound on the energy's second derivative by the corner's place [N/m].
     """
     f = natural(wp.tid() + first)
-    if watch == 0 and acting[f] == 0:
+    if watch == 0 and acting[f] == wp.int8(0):
         return
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     begin = natural(cells.first[f])
-    height2, acts = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
+    height2, any_near = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
     wave = cells.wave[f]
     is_held = wp.dot(wave, wave) > wp.float64(0.0)
-    if lacks_shear or is_held:
-        acts = int(1)
-    acting[f] = acts
+    is_strained = any_near != 0 or lacks_shear
+    acts = is_strained or is_held
+    acting[f] = wp.int8(wp.where(acts, 1, 0))
     clearance[f] = wp.sqrt(height2)
-    if acts != 0:
+    if acts:
         viscous = pace[0][0] != wp.float64(0.0)
         weight = cell_weight(face)
         s = sheared(cells.shear[f], warp, weft, cells.slack[f])
@@ -292,7 +292,7 @@ def evaluate_guard(
             if viscous:
                 viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
         k = int(0)
-        end = count_cells(face)
+        end = wp.where(is_strained, count_cells(face), 0)
         while k < end:
             at = cell_places(face, k)
             i0 = natural(face[at[0]])

@@ -39,7 +39,7 @@ def gather_forces(
     spring_stiffness: wp.array(dtype=wp.float64),
     springs: Springs,
     cells: Cells,
-    face_acting: wp.array(dtype=wp.int32),
+    face_acting: wp.array(dtype=wp.int8),
     face_clearance: wp.array(dtype=wp.float64),
     face_force: wp.array(dtype=wp.vec2d),
     face_viscosity: wp.array(dtype=wp.vec2d),
@@ -61,16 +61,16 @@ def gather_forces(
     stiffness: wp.array(dtype=wp.float64),
     anchor: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
-    guarded: wp.array(dtype=wp.int32),
+    guarded: wp.array(dtype=wp.int8),
 ):
     """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), if there is to be viscosity, and the neighbours' share, eq. (9).
 
     position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`. bond_*: as
     `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all faces have been evaluated at these positions, 0 where only
     those that act were; then anchor, reach and guarded stay what they were.
-    force F [N], power F.v / K [m2/s], driving_force F~ [N], not written without viscosity, where it is F, first_guess F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and
-    the cells' around the vertex [N/m], anchor and reach: how far from where it may move until all faces are evaluated again [m],
-    guarded: 1 where a face around it acts. All #V.
+    force F [N], power F.v / K [m2/s], driving_force F~ [N], not written without viscosity, where it is F, first_guess
+    F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and the cells' around the vertex [N/m], anchor and reach: how far from where it
+    may move until all faces are evaluated again [m], guarded: 1 where a face around it acts. All #V.
     """
     i = natural(wp.tid() + first)
     viscosity = pace[0][0]
@@ -79,7 +79,7 @@ def gather_forces(
     k = spring_stiffness[i]
     if watch != 0:
         height = wp.float64(wp.inf)
-        acting = int(0)
+        acting = wp.int8(0)
         e = natural(cells.offset[i])
         end = cells.offset[i + 1]
         while e < end:
@@ -90,12 +90,12 @@ def gather_forces(
         anchor[i] = position[i]
         reach[i] = STEP_SHARE * height
         guarded[i] = acting
-    if guarded[i] != 0:
+    if guarded[i] != wp.int8(0):
         e = natural(cells.offset[i])
         end = cells.offset[i + 1]
         while e < end:
             slot = natural(cells.slot[e])
-            if face_acting[slot / 4] != 0:
+            if face_acting[slot / 4] != wp.int8(0):
                 total += face_force[slot]
                 k += face_stiffness[slot]
                 if viscosity != wp.float64(0.0):

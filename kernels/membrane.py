@@ -184,7 +184,7 @@ def evaluate_membrane(
     watch: int,
     first: int,
     # outputs
-    acting: wp.array(dtype=wp.int32),
+    acting: wp.array(dtype=wp.int8),
     clearance: wp.array(dtype=wp.float64),
     force: wp.array(dtype=wp.vec2d),
     viscosity: wp.array(dtype=wp.vec2d),
@@ -205,7 +205,7 @@ def evaluate_membrane(
     faces' corners [N]. stiffness: 4 #F [N/m].
     """
     f = natural(wp.tid() + first)
-    if watch == 0 and acting[f] == 0:
+    if watch == 0 and acting[f] == wp.int8(0):
         return
     face = cells.face[f]
     begin = cells.first[f]
@@ -287,7 +287,7 @@ def evaluate_membrane(
                 viscosity[slot + at[0]] -= d1 + d2
                 viscosity[slot + at[1]] += d1
                 viscosity[slot + at[2]] += d2
-    acting[f] = acts
+    acting[f] = wp.int8(acts)
     clearance[f] = least
 
 

@@ -56,9 +56,9 @@ def solve_lines(
     mass: wp.array(dtype=wp.float64),
     springs: Springs,
     cells: Cells,
-    face_acting: wp.array(dtype=wp.int32),
+    face_acting: wp.array(dtype=wp.int8),
     face_stiffness: wp.array(dtype=wp.float64),
-    guarded: wp.array(dtype=wp.int32),
+    guarded: wp.array(dtype=wp.int8),
     lines: ThreadLines,
     time_step: wp.float64,
     first: int,
@@ -99,15 +99,15 @@ def solve_lines(
             elif j != before:
                 held += held_across(position[j] - position[i], springs.rest_length[s], springs.stiffness[s], along)
             s += 1
-        if guarded[i] != 0:
+        if guarded[i] != wp.int8(0):
             c = natural(cells.offset[i])
             c_end = cells.offset[i + 1]
             while c < c_end:
                 slot = cells.slot[c]
-                if face_acting[slot / 4] != 0:
+                if face_acting[slot / 4] != wp.int8(0):
                     held += GUARD_LEFT * face_stiffness[slot]
                 c += 1
-            if after >= 0 and guarded[wp.max(after, 0)] != 0:
+            if after >= 0 and guarded[natural(after)] != wp.int8(0):
                 k_after = wp.float64(2.0) * k_after
         # Elimination from the first vertex on: here = pushed + passed * there.
         rest = wp.max(held + k_before * (wp.float64(1.0) - passed) + k_after, wp.float64(1.0e-300))

@@ -66,8 +66,8 @@ class StepBuffers:
         self.stiffness = wp.zeros(n, dtype=wp.float64, device=device)
         self.anchor = wp.zeros(n, dtype=wp.vec2d, device=device)
         self.reach = wp.zeros(n, dtype=wp.float64, device=device)
-        self.guarded = wp.zeros(n, dtype=wp.int32, device=device)
-        self.face_acting = wp.zeros(f, dtype=wp.int32, device=device)
+        self.guarded = wp.zeros(n, dtype=wp.int8, device=device)
+        self.face_acting = wp.zeros(f, dtype=wp.int8, device=device)
         # Written and read only with viscosity, and of faces only where cells act: elsewhere no memory stands behind them.
         self.driving_force = wp.empty(n, dtype=wp.vec2d, device=device)
         self.face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)

@@ -80,7 +80,7 @@ class Launched:
         self.arrays = {
             "position": vec2(self.positions),
             "velocity": vec2(still if self.velocities is None else self.velocities),
-            "face_acting": zeros(f, wp.int32),
+            "face_acting": zeros(f, wp.int8),
             "face_clearance": zeros(f),
             "face_force": zeros(4 * f, wp.vec2d),
             "face_viscosity": zeros(4 * f, wp.vec2d),
@@ -93,7 +93,7 @@ class Launched:
             "stiffness": zeros(n),
             "anchor": zeros(n, wp.vec2d),
             "reach": zeros(n),
-            "guarded": zeros(n, wp.int32),
+            "guarded": zeros(n, wp.int8),
             "pull": zeros(n),
             "pace": wp.array(np.array([self.pace]), dtype=wp.vec3d, device=DEVICE),
             "energy": zeros(n),

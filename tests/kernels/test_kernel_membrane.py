@@ -52,7 +52,7 @@ def evaluated(
     f, n = network.face_count, network.vertex_count
     v = np.zeros((n, 2)) if velocities is None else velocities
     names = {
-        "acting": wp.int32,
+        "acting": wp.int8,
         "clearance": wp.float64,
         "force": wp.vec2d,
         "viscosity": wp.vec2d,
