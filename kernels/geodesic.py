@@ -1,7 +1,8 @@
 """Shortest ways on a mesh to the vertices where they end: the best way out of each vertex, and what ways carry along.
 
 `find_ways` and `carry_along` are one thread each, which goes through the vertices in an order; every vertex uses what those before it
-have just got. Rounded without fused products, so that mirror images of each other get the same lengths.
+have just got. `go_around` says which vertices lie on which side of a line. Rounded without fused products, so that mirror images of each
+other get the same lengths.
 """
 
 import warp as wp
@@ -10,6 +11,7 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 # So many vertices in a row are counted together.
 CROWD = wp.constant(64)
+_PI = wp.constant(wp.float64(3.141592653589793))
 
 
 @wp.kernel
@@ -187,3 +189,74 @@ def carry_along(
                 new = value[a, j] + share[v] * (value[b, j] - value[a, j]) + grows * leg[v]
                 change[j] = wp.max(change[j], wp.abs(new - value[v, j]))
                 value[v, j] = new
+
+
+@wp.kernel
+def go_around(
+    path: wp.array(dtype=wp.int32),
+    on_path: wp.array(dtype=wp.int8),
+    offset: wp.array(dtype=wp.int32),
+    sides: wp.array(dtype=wp.vec2i),
+    angle: wp.array(dtype=wp.float64),
+    away: wp.array(dtype=wp.vec2d),
+    # outputs
+    visited: wp.array(dtype=wp.int32),
+    at: wp.array(dtype=wp.int32),
+    lies: wp.array(dtype=wp.vec3d),
+    count: wp.array(dtype=wp.int32),
+):
+    """For one thread: around each vertex of a line, from the ones before and after it on the line, either way, up to the border, the line
+    or half a turn. Where the ring is closed, angles are scaled to a full turn.
+
+    path: #P, vertices. on_path: #V, 1 for these. offset: #P+1, where each one's triangles begin. sides: #R, their other vertices
+    anticlockwise; angle: #R, between these [rad]; away: #R, how far they are [m].
+    visited: #N, vertices. at: #N, around which of the line. lies: #N, 1 to the right of the line and -1 to the left, the angle passed
+    [rad], how far it is [m]. count: 1, N.
+    """
+    last = path.shape[0] - 1
+    number = int(0)
+    for i in range(path.shape[0]):
+        begin = offset[i]
+        end = offset[i + 1]
+        turn = wp.float64(0.0)
+        closed = int(1)
+        for e in range(begin, end):
+            turn += angle[e]
+            led_on = int(0)
+            for f in range(begin, end):
+                if sides[f][0] == sides[e][1]:
+                    led_on = 1
+            if led_on == 0:
+                closed = 0
+        scale = wp.float64(1.0)
+        if closed == 1:
+            scale = wp.float64(2.0) * _PI / wp.max(turn, wp.float64(2.2250738585072014e-308))
+        # From the one before on, then from the one after, anticlockwise and clockwise.
+        kind = int(0)
+        while kind < 4:
+            start = kind / 2
+            way = kind % 2
+            # Anticlockwise of the one before lies the right, of the one after the left.
+            sign = wp.float64((1 - 2 * start) * (1 - 2 * way))
+            beside = i - 1 + 2 * start
+            here = int(-1)
+            if beside >= 0 and beside <= last:
+                here = path[beside]
+            passed = wp.float64(0.0)
+            while here >= 0 and number < visited.shape[0]:
+                over = int(-1)
+                for e in range(begin, end):
+                    if sides[e][way] == here:
+                        over = e
+                here = -1
+                if over >= 0:
+                    passed += angle[over] * scale
+                    on = sides[over][1 - way]
+                    if on_path[on] == wp.int8(0) and passed <= _PI:
+                        here = on
+                        visited[number] = on
+                        at[number] = i
+                        lies[number] = wp.vec3d(sign, passed, away[over][1 - way])
+                        number += 1
+            kind += 1
+    count[0] = number

@@ -277,19 +277,23 @@ def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: in
 def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArray) -> Ring:
     count = len(vertices)
     ring = Ring()
-    ring.vertices = wp.array(np.ascontiguousarray(vertices), dtype=wp.vec3d, device="cpu")
-    ring.layout = wp.array([] if layout is None else np.ascontiguousarray(layout), dtype=wp.vec2d, device="cpu")
+    ring.vertices = _given(vertices, wp.vec3d)
+    ring.layout = _given(np.zeros((0, 2)) if layout is None else layout, wp.vec2d)
     around = np.bincount(triangles.ravel(), minlength=count)
     room, sides = (begins(places) for places in (np.maximum(around + 2, _ROOM), around))
-    ring.offset = wp.array(room, dtype=wp.int32, device="cpu")
+    ring.offset = _given(room, wp.int32)
     ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
     ring.neighbor = wp.empty(int(room[-1]), dtype=wp.int32, device="cpu")
     side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
-    begin = wp.array(sides, dtype=wp.int32, device="cpu")
-    corners = wp.array(np.ascontiguousarray(triangles), dtype=wp.vec3i, device="cpu")
+    begin, corners = _given(sides, wp.int32), _given(triangles, wp.vec3i)
     wp.launch(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
     order = record(
         order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
     )
     order.launch()
     return ring
+
+
+def _given(values: NDArray[np.generic], dtype: type) -> wp.array:
+    """The values for a kernel that does not write to them."""
+    return wp.array(np.ascontiguousarray(values), dtype=dtype, device="cpu", copy=False)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from numpy.typing import NDArray
-from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, see_sides
+from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -146,3 +146,49 @@ def test_values_are_carried_along_the_ways():
     first, second, share, _ = ways
     np.testing.assert_allclose(both[2:, 0], ((1 - share) * both[first, 0] + share * both[second, 0])[2:], rtol=1e-13)
     assert 3.5 < both[6, 0] < 4.9
+
+
+def around_the_middle(turns: list[float], *, closed: bool) -> list[tuple[int, float, float, float]]:
+    """What is visited around vertex 0 on the line 5, 0, 2: vertices 1 to 6 lie around it anticlockwise, with these angles between them,
+    k m away, the last angle from 6 to 1 only if it is closed."""
+    count = 6 if closed else 5
+    sides = np.array([[k + 1, (k + 1) % 6 + 1] for k in range(count)], dtype=np.int32)
+    path, offset = np.array([5, 0, 2], dtype=np.int32), np.array([0, 0, count, count], dtype=np.int32)
+    on_path = np.isin(np.arange(7), path).astype(np.int8)
+    visited, at, lies = np.zeros(24, dtype=np.int32), np.zeros(24, dtype=np.int32), np.zeros((24, 3))
+    number = np.zeros(1, dtype=np.int32)
+    wp.launch(
+        go_around,
+        dim=1,
+        inputs=[path, on_path, offset, sides, np.array(turns[:count]), sides.astype(np.float64)],
+        outputs=[visited, at, lies, number],
+        device="cpu",
+    )
+    assert (at[: number[0]] == 1).all()
+    return [(int(v), *row) for v, row in zip(visited[: number[0]], lies[: number[0]].tolist(), strict=True)]
+
+
+def test_vertices_beside_a_line_are_right_or_left_of_it_by_the_angles_between() -> None:
+    turns = [0.5, 0.25, 1.0, 0.75, 0.5, 1.0]
+    full = 2 * np.pi / sum(turns)
+    expected = [
+        # From 5 on, anticlockwise until 2, which is on the line, and clockwise.
+        *[(6, 1.0, 0.5 * full, 6.0), (1, 1.0, 1.5 * full, 1.0)],
+        *[(4, -1.0, 0.75 * full, 4.0), (3, -1.0, 1.75 * full, 3.0)],
+        # From 2 on.
+        *[(3, -1.0, 0.25 * full, 3.0), (4, -1.0, 1.25 * full, 4.0)],
+        *[(1, 1.0, 0.5 * full, 1.0), (6, 1.0, 1.5 * full, 6.0)],
+    ]
+    np.testing.assert_allclose(around_the_middle(turns, closed=True), expected, rtol=1e-14)
+
+
+def test_what_lies_beyond_a_border_or_half_a_turn_is_not_beside_a_line() -> None:
+    seen = around_the_middle([0.5, 2.0, 2.0, 0.75, 0.5, 0.0], closed=False)
+    assert seen == [
+        # On the left 4 is more than half a turn away from 2; on the right both are the last before the border.
+        (6, 1.0, 0.5, 6.0),
+        (4, -1.0, 0.75, 4.0),
+        (3, -1.0, 2.75, 3.0),
+        (3, -1.0, 2.0, 3.0),
+        (1, 1.0, 0.5, 1.0),
+    ]

@@ -18,7 +18,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, see_sides
+from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
 from warpflat.surface.lines import line_from_curve
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
@@ -270,77 +270,51 @@ def _directions_at_line(
         and up [m] of it, by the angles of the triangles around it as in the plane. A straight way that passes between two
         of them has the mean of their places. Vertices not joined to that end lie beside their own place of a straight line.
     """
-    rings = _rings(surface.vertices, triangles, path)
-    beside: dict[int, float] = {}
-    place_on_line: dict[int, int] = {}
-    around: tuple[dict[int, complex], dict[int, complex]] = ({}, {})
-    on_line = set(path.tolist())
-    last = len(path) - 1
-    for i, centre in enumerate(path.tolist()):
-        # Counter-clockwise from the point before lies the right, from the point after the left.
-        starts = [(int(path[i - 1]), 1.0)] if i > 0 else []
-        starts += [(int(path[i + 1]), -1.0)] if i < last else []
-        for start, right in starts:
-            for follow, sign in zip(rings[centre], (right, -right), strict=True):
-                for vertex, angle, length in _walk(follow, start, on_line):
-                    beside[vertex] = beside.get(vertex, 0.0) + sign * length
-                    place_on_line[vertex] = i
-                    if i in (0, last):
-                        place = length * complex(sign * np.sin(angle), np.cos(angle) * (1.0 if i == 0 else -1.0))
-                        near = around[0 if i == 0 else 1]
-                        near[vertex] = near.get(vertex, 0j) + place
-    known = np.array([*path, *beside], dtype=np.int64)
-    side = np.array([*np.zeros(len(path)), *beside.values()])
-    station = chain_positions(surface.vertices[path])[[*range(len(path)), *place_on_line.values()]]
+    sides, angle, away, offset = _around(surface.vertices, triangles, path)
+    on_path = np.zeros(len(surface.vertices), dtype=np.int8)
+    on_path[path] = 1
+    # Each triangle may be passed from both neighbours on the line, either way.
+    room, count = 4 * len(sides), np.empty(1, dtype=np.int32)
+    visited, at, lies = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32), np.empty((room, 3))
+    given, made = [path, on_path, offset, sides, angle, away], [visited, at, lies, count]
+    wp.launch(go_around, dim=1, inputs=given, outputs=made, device="cpu")
+    visited, at, (right, passed, far) = visited[: count[0]], at[: count[0]], lies[: count[0]].T
+    beside, number = np.unique(visited, return_inverse=True)
+    known = np.concatenate([path, beside]).astype(np.int64)
+    side = np.concatenate([np.zeros(len(path)), np.bincount(number, right * far, minlength=len(beside))])
+    nearest = np.arange(len(known))
+    nearest[len(path) + number] = at
+    station = chain_positions(surface.vertices[path])[nearest]
     about_ends = []
-    for near, end in zip(around, (0, last), strict=True):
+    for end, up in ((0, 1.0), (len(path) - 1, -1.0)):
         about_end = np.column_stack([side, station - station[end]])
-        near_end = [k for k, vertex in enumerate(known.tolist()) if vertex in near]
-        places = [(near[int(vertex)].real, near[int(vertex)].imag) for vertex in known[near_end]]
-        about_end[near_end] = np.reshape(places, (-1, 2))
+        here = at == end
+        around, of = np.unique(number[here], return_inverse=True)
+        places = far[here] * right[here] * np.sin(passed[here]), far[here] * up * np.cos(passed[here])
+        about_end[len(path) + around] = np.stack([np.bincount(of, place, minlength=len(around)) for place in places], 1)
         about_ends.append(about_end)
     return known, side, (about_ends[0], about_ends[1])
 
 
-_Follow = dict[int, tuple[int, float, float]]
+def _around(
+    vertices: NDArray[np.float64], triangles: NDArray[np.int32], path: NDArray[np.int32]
+) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    """The triangles around each vertex of a line, one after the other.
 
-
-def _rings(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int32], centres: NDArray[np.int32]
-) -> dict[int, tuple[_Follow, _Follow]]:
-    """For each centre the next vertex around it, the angle [rad] to that and how far it is [m], counter-clockwise and clockwise.
-
-    Where the ring is closed the angles are scaled to a full turn.
+    Returns:
+        #R by 2, their other two vertices, anticlockwise; #R, the angle between these [rad]; #R by 2, how far they are [m]; #P+1, where
+        those of each vertex begin.
     """
-    wanted = np.zeros(len(vertices), dtype=bool)
-    wanted[centres] = True
-    rings: dict[int, tuple[_Follow, _Follow]] = {int(centre): ({}, {}) for centre in centres}
-    triangles = triangles[np.unique(np.flatnonzero(wanted[triangles]) // 3)]
-    for shift in range(3):
-        corner = triangles[wanted[triangles[:, shift]]][:, [shift, (shift + 1) % 3, (shift + 2) % 3]]
-        u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
-        angles = np.arctan2(norm(cross(u, v)), dot(u, v))
-        measured = zip(corner.tolist(), angles.tolist(), norm(u).tolist(), norm(v).tolist(), strict=True)
-        for (centre, a, b), angle, to_a, to_b in measured:
-            rings[centre][0][a], rings[centre][1][b] = (b, angle, to_b), (a, angle, to_a)
-    for follow in rings.values():
-        if set(follow[0]) == set(follow[1]):
-            factor = 2 * np.pi / max(sum(angle for _, angle, _ in follow[0].values()), np.finfo(float).tiny)
-            for way in follow:
-                way.update({a: (b, angle * factor, length) for a, (b, angle, length) in way.items()})
-    return rings
-
-
-def _walk(follow: _Follow, start: int, stop: set[int]) -> list[tuple[int, float, float]]:
-    """The vertices after `start` around a centre, up to the border or the line, with the angle passed and how far they are."""
-    passed, here, total = [], start, 0.0
-    while here in follow:
-        here, step, length = follow[here]
-        total += step
-        if here in stop or total > np.pi:
-            break
-        passed.append((here, total, length))
-    return passed
+    place = np.full(len(vertices), -1, dtype=np.int32)
+    place[path] = np.arange(len(path), dtype=np.int32)
+    near = triangles[(place[triangles] >= 0).any(axis=1)]
+    corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
+    corner = corner[place[corner[:, 0]] >= 0]
+    order, offset = order_by(place[corner[:, 0]], len(path))
+    corner = corner[order]
+    u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
+    angle = np.arctan2(norm(cross(u, v)), dot(u, v))
+    return np.ascontiguousarray(corner[:, 1:]), angle, np.stack([norm(u), norm(v)], axis=1), offset
 
 
 def _sides(surface: Surface, path: NDArray[np.int32]) -> NDArray[np.float64] | None:
