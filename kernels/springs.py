@@ -46,20 +46,21 @@ def spring_forces_on(
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if springs.pull != wp.float64(0.0):
-        begin = natural(springs.offset[i])
-        end = springs.offset[i + 1]
         here = position[i]
-        s = begin
+        s = natural(springs.offset[i])
+        end = springs.offset[i + 1]
+        if viscous:
+            moving = velocity[i]
+            while s < end:
+                there = natural(springs.neighbor[s])
+                stiffness = springs.stiffness[s]
+                force += spring_force(position[there] - here, springs.rest_length[s], stiffness)
+                viscosity += stiffness * (velocity[there] - moving)
+                s += 1
         while s < end:
             there = natural(springs.neighbor[s])
             force += spring_force(position[there] - here, springs.rest_length[s], springs.stiffness[s])
             s += 1
-        if viscous:
-            moving = velocity[i]
-            s = begin
-            while s < end:
-                viscosity += springs.stiffness[s] * (velocity[natural(springs.neighbor[s])] - moving)
-                s += 1
     return force, time_step * viscosity
 
 
