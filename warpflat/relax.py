@@ -233,7 +233,7 @@ class Relaxation:
             return
         for number in range(steps):
             if number < 2:
-                # What has been evaluated was so at rest, without viscosity: of velocities that are zero that is the same.
+                # Forces that have been evaluated were so at rest: they hold no viscosity, and none is due yet.
                 self._buffers.go_at(STILL if evaluated and number == 0 else STEADY)
             self._evaluate(number, watch_every, evaluated=evaluated)
             if self.options.kinetic_damping:
