@@ -34,12 +34,13 @@ from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import triangulate
-from warpflat.thinning import Transfer, spread_of, thinned_of
+from warpflat.thinning import Transfer, can_be_thinned, spread_of, thinned_of
 
 __all__ = [
     "Coarser",
     "coarser",
     "coarser_surfaces",
+    "has_coarser",
     "inherit_levels",
     "is_coarsest",
     "levels_meanwhile",
@@ -139,6 +140,14 @@ def inherit_levels(surface: Surface, other: Surface) -> None:
         if following is None:
             return
         surface = following.surface
+
+
+def has_coarser(surface: Surface) -> bool:
+    """Whether a surface has a coarser level; of a grid none is made to tell, since one that is large starts without them."""
+    if is_coarsest(surface):
+        return False
+    grid = rows_and_columns(surface)
+    return _next(surface) is not None if grid is None else can_be_thinned(grid)
 
 
 @once_per_surface

@@ -154,11 +154,13 @@ def relax_multilevel(
     options: RelaxOptions = state.options
     begun = time.perf_counter()
     whole, first, start = state, state.steps, state.work_units
-    state.hold_upright()
     if not state.looked:
+        state.hold_upright()
         state.begin()
     below = carry_up(state) if nested and levels is None else None
-    if below is not None and each_step is not None:
+    if below is None:
+        state.hold_upright()
+    elif each_step is not None:
         each_step(state, state.last.total, float(state.last.residual.max()))
     levels, carried = Levels(state, mend=nested, below=below) if levels is None else levels, below is not None
     # What is not among the levels themselves is not needed any more.

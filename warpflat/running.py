@@ -11,7 +11,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.coarsen import coarser_surfaces
+from warpflat.coarsen import coarser_surfaces, has_coarser
 from warpflat.develop import Development
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric, grain_axes
 from warpflat.joined import join_networks
@@ -209,7 +209,7 @@ def relax_runs(
 
 
 def _has_levels(run: Run, network: SpringNetwork) -> bool:
-    return run.options.solver == "multilevel" and levels_pay(network) and bool(coarser_surfaces(network.surface))
+    return run.options.solver == "multilevel" and levels_pay(network) and has_coarser(network.surface)
 
 
 class _Batch:

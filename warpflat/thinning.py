@@ -26,7 +26,7 @@ from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, read_only
 from warpflat.surface.unfold import corners_of
 
-__all__ = ["Spread", "Thinned", "Transfer", "spread_of", "thinned_of"]
+__all__ = ["Spread", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -134,7 +134,7 @@ def _fine_spread(surface: Surface) -> Spread | None:
 
 def _spread(surface: Surface, side: int) -> Spread | None:
     grid = rows_and_columns(surface)
-    if grid is None or min(grid.shape) < _LEAST_LINES:
+    if grid is None or not can_be_thinned(grid):
         return None
     lines = tuple(
         np.linspace(0.0, count - 1.0, quads + 1)
@@ -171,6 +171,11 @@ def _faces_of(rows: int, columns: int) -> IntArray:
     return np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
+def can_be_thinned(grid: IntArray) -> bool:
+    """Whether a grid (#rows by #columns vertices) has a coarser one."""
+    return min(grid.shape) >= _LEAST_LINES
+
+
 def thinned_of(surface: Surface) -> Thinned | None:
     """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having.
 
@@ -180,7 +185,7 @@ def thinned_of(surface: Surface) -> Thinned | None:
     grid = rows_and_columns(surface)
     if grid is None:
         return _of_lattice(surface)
-    if min(grid.shape) < _LEAST_LINES:
+    if not can_be_thinned(grid):
         return None
     rows, columns = (places_of_rows(surface.vertices, lines)[-1] / (len(lines) - 1) for lines in (grid, grid.T))
     if rows > _MUCH * columns:
