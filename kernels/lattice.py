@@ -4,7 +4,8 @@ import warp as wp
 
 from .indices import natural
 
-wp.set_module_options({"enable_backward": False})
+# Rounded without fused products, as the same lengths and sums of any other mesh are.
+wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 
 @wp.kernel
@@ -86,6 +87,21 @@ def is_on_grid(rows: int, columns: int, row: int, column: int):
 
 
 @wp.func
+def face_between(columns: int, i: int, j: int, up: int, right: int):
+    """The face with the vertex in row i and column j and the one a row up or down (1, -1) and a column to the right or left."""
+    return natural((i + wp.min(up, 0)) * (columns - 1) + j + wp.min(right, 0))
+
+
+@wp.func
+def which_diagonal(rising: int, up: int, right: int):
+    """0 for the diagonal of a face's corners 0-2, 1 for that of 1-3."""
+    which = rising
+    if up != right:
+        which = 1 - rising
+    return which
+
+
+@wp.func
 def spring_to(rows: int, columns: int, rising: int, i: int, j: int, row: int, column: int):
     """The number of the spring from the vertex in row i and column j of a grid that is numbered row by row to one of the eight around it.
 
@@ -102,9 +118,7 @@ def spring_to(rows: int, columns: int, rising: int, i: int, j: int, row: int, co
     elif column == j:
         s = wp.min(i, row) * of_row + wp.min(2 * j + 1, of_row - 1)
     else:
-        which = rising
-        if row - i != column - j:
-            which = 1 - rising
+        which = which_diagonal(rising, row - i, column - j)
         edges = rows * (columns - 1) + (rows - 1) * columns
         faces = (rows - 1) * (columns - 1)
         s = edges + which * faces + wp.min(i, row) * (columns - 1) + wp.min(j, column)
@@ -152,4 +166,74 @@ def list_values(
         for right in range(-1, 2):
             if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
                 listed[at] = value[spring_to(rows, columns, rising, i, j, i + up, j + right)]
+                at += 1
+
+
+@wp.kernel
+def list_lengths(
+    rows: int,
+    columns: int,
+    rising: int,
+    offset: wp.array(dtype=wp.int32),
+    vertices: wp.array(dtype=wp.vec3d),
+    diagonal: wp.array(dtype=wp.vec2d),
+    first: int,
+    # outputs
+    listed: wp.array(dtype=wp.float64),
+):
+    """Lengths [m] of the springs to these vertices: of edges the distance, of diagonals those of their faces' corners 0-2 and 1-3 (#F)."""
+    v = natural(wp.tid() + first)
+    i = v / columns
+    j = v - i * columns
+    at = natural(offset[v])
+    for up in range(-1, 2):
+        for right in range(-1, 2):
+            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
+                if up == 0 or right == 0:
+                    listed[at] = wp.length(vertices[v] - vertices[natural(v + up * columns + right)])
+                else:
+                    listed[at] = diagonal[face_between(columns, i, j, up, right)][which_diagonal(rising, up, right)]
+                at += 1
+
+
+@wp.kernel
+def list_stiffness(
+    rows: int,
+    columns: int,
+    rising: int,
+    sides: wp.vec4i,
+    offset: wp.array(dtype=wp.int32),
+    side: wp.array(dtype=wp.vec4d),
+    diagonal: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    listed: wp.array(dtype=wp.float64),
+):
+    """Stiffnesses [N/m] of the springs to these vertices: of edges the sum of what the faces on both sides give to them (#F), of diagonals
+    what their face gives to both of its (#F).
+
+    sides: which side of a face is the one below, on the left, on the right, above.
+    """
+    v = natural(wp.tid() + first)
+    i = v / columns
+    j = v - i * columns
+    at = natural(offset[v])
+    for up in range(-1, 2):
+        for right in range(-1, 2):
+            if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):
+                total = wp.float64(0.0)
+                if up == 0:
+                    # The face below has it above, the face above has it below.
+                    if i > 0:
+                        total += side[face_between(columns, i, j, -1, right)][sides[3]]
+                    if i < rows - 1:
+                        total += side[face_between(columns, i, j, 1, right)][sides[0]]
+                elif right == 0:
+                    if j > 0:
+                        total += side[face_between(columns, i, j, up, -1)][sides[2]]
+                    if j < columns - 1:
+                        total += side[face_between(columns, i, j, up, 1)][sides[1]]
+                else:
+                    total = diagonal[face_between(columns, i, j, up, right)]
+                listed[at] = total
                 at += 1

@@ -12,7 +12,7 @@ from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
-from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.topology import border_of, corner_triangles
 from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
 
 __all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
@@ -98,7 +98,7 @@ def creases_of(surface: Surface) -> NDArray[np.int8]:
         return quad_creases(surface.vertices, surface.faces)
     around = corners_of(surface)
     return quad_creases(
-        surface.vertices, surface.faces, sides=half_edges_of(surface), around=(around.offset, around.entry)
+        surface.vertices, surface.faces, border=border_of(surface), around=(around.offset, around.entry)
     )
 
 

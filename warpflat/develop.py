@@ -25,6 +25,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
 from warpflat.surface.topology import (
     border_loops,
+    border_of,
     corner_triangles,
     euler_characteristic,
     half_edges,
@@ -283,7 +284,7 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
     that do not belong together.
     """
-    place = places_of(surface.vertices, surface.faces, sides=half_edges_of(surface))
+    place = places_of(surface.vertices, surface.faces, border=border_of(surface))
     here = np.arange(len(place))
     moves = place != here
     if not moves.any() or len(np.unique(place[datum])) < len(datum):

@@ -199,8 +199,7 @@ def springs_of(
     own, faces, is_quad = unweighed_springs(surface), surface.faces, surface.is_quad
     warp, _ = grain_axes(grain_angle)
     first = first_of_faces(surface, 4, 3)
-    sides = half_edges_of(surface).edge
-    of_side, stiffness = np.empty(len(sides)), np.empty(own.around.count)
+    of_side, diagonal = np.empty(3 * len(faces) + np.count_nonzero(is_quad)), np.empty(0)
     position, lack, wave = np.ascontiguousarray(positions, dtype=np.float64), None, None
     aligned, shear_excess = False, 1.0
     if not is_quad.all():
@@ -224,7 +223,6 @@ def springs_of(
             lattice,
         ]
         launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short, hold])
-        stiffness[own.edge_count :] = np.concatenate([diagonal, diagonal])
         # Most have none: what is not written to takes no memory.
         if short.any():
             lacks, lack = short.any(axis=1), np.zeros((len(faces), 2))
@@ -234,17 +232,25 @@ def springs_of(
             weights, wave = np.empty((len(held), 4)), np.zeros((len(faces), 4))
             launch_each(weigh_waves, len(held), [surface.vertices, quads[held], hold[held]], [weights])
             wave[np.flatnonzero(is_quad)[held]] = weights
-    stiffness[: own.edge_count] = np.bincount(sides, of_side, minlength=own.edge_count)
     return SpringArrays(
         around=own.around,
         listed_length=own.listed_length,
-        listed_stiffness=own.around.listed(stiffness),
+        listed_stiffness=_listed_stiffness(surface, own, of_side, diagonal),
         edge_count=own.edge_count,
         lack=lack,
         wave=wave,
         aligned=aligned,
         shear_excess=shear_excess,
     )
+
+
+def _listed_stiffness(surface: Surface, own: _Unweighed, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """2 #S [N/m], from what faces give to the springs along their sides (#H) and, quads, to both diagonals (#Q)."""
+    numbered = row_by_row(surface)
+    if numbered is not None:
+        return numbered.listed_stiffness(own.around.offset, of_side, diagonal)
+    at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
+    return own.around.listed(np.concatenate([at_edges, diagonal, diagonal]))
 
 
 def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
@@ -306,8 +312,12 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 @once_per_surface
 def unweighed_springs(surface: Surface) -> _Unweighed:
     """What no fabric changes of a surface's springs, worked out once."""
-    vertices, edges, around = surface.vertices, half_edges_of(surface).edges, _springs_around(surface)
+    vertices, around, numbered = surface.vertices, _springs_around(surface), row_by_row(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
+    if numbered is not None:
+        lengths = numbered.listed_lengths(around.offset, vertices, diagonal)
+        return read_only(_Unweighed(edge_count=numbered.edge_count, around=around, listed_length=lengths))
+    edges = half_edges_of(surface).edges
     rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
     launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])

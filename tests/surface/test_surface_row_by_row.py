@@ -47,6 +47,37 @@ def test_what_follows_from_the_numbers_is_what_is_sorted_out_of_the_faces(
     for ours, theirs in zip((offset, spring, neighbor), springs_by_ends(surface), strict=True):
         np.testing.assert_array_equal(ours, theirs)
     np.testing.assert_array_equal(numbered.listed(offset, value), value[spring])
+    assert numbered.edge_count == len(edges)
+    np.testing.assert_array_equal(numbered.border, np.unique(edges[count == 1]))
+
+
+@pytest.mark.parametrize(("rows", "columns"), [(2, 2), (2, 7), (7, 2), (5, 8)])
+@pytest.mark.parametrize(("turn", "mirrored"), TURNS)
+def test_springs_of_a_grid_are_measured_as_those_of_any_other_mesh(
+    rows: int, columns: int, turn: int, mirrored: bool
+) -> None:
+    surface = grid(rows, columns, turn, mirrored=mirrored)
+    numbered, he = row_by_row(surface), half_edges(surface.faces)
+    assert numbered is not None
+    random = np.random.default_rng(1)
+    vertices, diagonals = random.normal(size=(rows * columns, 3)), random.normal(size=(len(surface.faces), 2))
+    offset, _ = numbered.neighbors_around()
+    lengths = np.linalg.norm(vertices[he.edges[:, 1]] - vertices[he.edges[:, 0]], axis=1)
+    wished = numbered.listed(offset, np.concatenate([lengths, diagonals.T.ravel()]))
+    np.testing.assert_allclose(numbered.listed_lengths(offset, vertices, diagonals), wished, rtol=1e-15)
+    of_side, of_face = random.normal(size=len(he.edge)), random.normal(size=len(surface.faces))
+    wished = numbered.listed(offset, np.concatenate([np.bincount(he.edge, of_side), of_face, of_face]))
+    np.testing.assert_array_equal(numbered.listed_stiffness(offset, of_side, of_face), wished)
+
+
+def test_neighbors_on_a_grid_are_those_an_edge_joins() -> None:
+    surface = grid(5, 4)
+    numbered = row_by_row(surface)
+    assert numbered is not None
+    a, b = np.divmod(np.arange(400), 20)
+    joined = {(int(i), int(j)) for edge in half_edges(surface.faces).edges for i, j in (edge, edge[::-1])}
+    assert {(i, j) for i, j in zip(a.tolist(), b.tolist(), strict=True) if numbered.are_joined(i, j)} == joined
+    np.testing.assert_array_equal(numbered.are_joined(a, b), [pair in joined for pair in zip(a, b, strict=True)])
 
 
 @pytest.mark.parametrize(

@@ -301,7 +301,7 @@ def test_the_two_sides_of_a_crack_are_at_one_place():
     both[10] = both[6]
     assert places_of(both, cut)[16:].tolist() == [1, 5, 9]
     assert np.array_equal(places_of(both, cut)[:16], np.arange(16))
-    assert np.array_equal(places_of(both, cut, sides=half_edges(cut)), places_of(both, cut))
+    assert np.array_equal(places_of(both, cut, border=np.unique(border_edges(cut))), places_of(both, cut))
 
 
 def test_twins_run_along_the_same_edge_the_other_way():

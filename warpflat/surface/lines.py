@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import EdgeGraph, are_joined, as_vertex, path_in
+from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
@@ -52,7 +53,7 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
     line, given = line[~same], given[~same]
     if len(line) < 2:
         raise InputError("a line needs at least two different vertices")
-    broken = np.flatnonzero(~are_joined(half_edges_of(surface).edges, line[:-1], line[1:]))
+    broken = np.flatnonzero(~_are_neighbors(surface, line[:-1], line[1:]))
     if len(broken):
         a, b = given[broken[0]], given[broken[0] + 1]
         raise InputError(
@@ -60,6 +61,12 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
             "list every vertex along the edges, or give its two ends as a shortest path"
         )
     return line
+
+
+def _are_neighbors(surface: Surface, a: NDArray[np.int32], b: NDArray[np.int32]) -> NDArray[np.bool_]:
+    """Whether edges join them (#N each)."""
+    numbered = row_by_row(surface)
+    return are_joined(half_edges_of(surface).edges, a, b) if numbered is None else numbered.are_joined(a, b)
 
 
 def line_between(

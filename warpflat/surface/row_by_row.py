@@ -9,9 +9,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
+import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.kernels.lattice import list_corners, list_neighbors, list_values
+from warpflat.kernels.lattice import list_corners, list_lengths, list_neighbors, list_stiffness, list_values
 from warpflat.launching import launch_each
 from warpflat.sums import begins
 from warpflat.surface.mesh import Surface, once_per_faces
@@ -90,6 +91,38 @@ class RowByRow:
         given = [self.rows, self.columns, self._rising, offset, np.ascontiguousarray(values, dtype=np.float64)]
         launch_each(list_values, self.rows * self.columns, given, [listed])
         return listed
+
+    def listed_lengths(self, offset: IntArray, vertices: FloatArray, diagonal: FloatArray) -> FloatArray:
+        """The springs' lengths [m] in the same order: on the body (#V by 3 [m]), and of the diagonals as given (#F by 2)."""
+        listed = np.empty(offset[-1])
+        given = [self.rows, self.columns, self._rising, offset, vertices, diagonal]
+        launch_each(list_lengths, self.rows * self.columns, given, [listed])
+        return listed
+
+    def listed_stiffness(self, offset: IntArray, side: FloatArray, diagonal: FloatArray) -> FloatArray:
+        """Their stiffnesses [N/m]: of what faces give to their sides (4 #F) the sum, of what they give to both diagonals (#F) that."""
+        listed, of_side = np.empty(offset[-1]), [set(self._side(k)) for k in range(4)]
+        sides = wp.vec4i(*(of_side.index(corners) for corners in ({0, 1}, {0, 2}, {1, 3}, {2, 3})))
+        given = [self.rows, self.columns, self._rising, sides, offset, side.reshape(-1, 4), diagonal]
+        launch_each(list_stiffness, self.rows * self.columns, given, [listed])
+        return listed
+
+    @property
+    def edge_count(self) -> int:
+        """#E."""
+        return self.rows * (self.columns - 1) + (self.rows - 1) * self.columns
+
+    def are_joined(self, a: IntArray, b: IntArray) -> NDArray[np.bool_]:
+        """#N, whether there are edges from `a` to `b` (#N each)."""
+        (i, j), (k, m) = (np.divmod(vertex, self.columns) for vertex in (a, b))
+        return np.abs(i - k) + np.abs(j - m) == 1
+
+    @cached_property
+    def border(self) -> IntArray:
+        """The vertices on the border, in the order of their numbers."""
+        inner = np.zeros((self.rows, self.columns), dtype=bool)
+        inner[1:-1, 1:-1] = True
+        return self.vertices[~inner]
 
     @property
     def _rising(self) -> int:

@@ -26,6 +26,7 @@ __all__ = [
     "HalfEdges",
     "border_edges",
     "border_loops",
+    "border_of",
     "components",
     "components_of",
     "corner_fans",
@@ -389,17 +390,28 @@ def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) 
     return sorted(loops, key=length, reverse=True)
 
 
-def places_of(vertices: NDArray[np.float64], faces: ArrayLike, *, sides: HalfEdges | None = None) -> NDArray[np.int64]:
+def border_of(surface: Surface) -> NDArray[np.int32]:
+    """The vertices on the border, in the order of their numbers."""
+    numbered = row_by_row(surface)
+    return _on_border(half_edges_of(surface)) if numbered is None else numbered.border
+
+
+def _on_border(he: HalfEdges) -> NDArray[np.int32]:
+    return np.unique(he.edges[he.count == 1])
+
+
+def places_of(
+    vertices: NDArray[np.float64], faces: ArrayLike, *, border: NDArray[np.int32] | None = None
+) -> NDArray[np.int64]:
     """#V, for each vertex the lowest one at the very same place, of which only border vertices have any: sides of a crack.
 
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4.
-        sides: of the faces, if they are known.
+        border: the vertices on it, in the order of their numbers, if they are known.
     """
     place = np.arange(len(vertices))
-    he = half_edges(faces) if sides is None else sides
-    border = np.unique(he.edges[he.count == 1])
+    border = _on_border(half_edges(faces)) if border is None else border
     order = np.lexsort(vertices[border].T)
     sorted_places = vertices[border[order]]
     begins = np.append(True, (sorted_places[1:] != sorted_places[:-1]).any(axis=1))[: len(order)]

@@ -17,7 +17,7 @@ from warpflat.kernels.surface_cells import lay_cells as lay_each
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import HalfEdges, order_by, places_of
+from warpflat.surface.topology import order_by, places_of
 
 __all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases"]
 
@@ -37,7 +37,7 @@ def quad_creases(
     vertices: FloatArray,
     faces: IntArray,
     *,
-    sides: HalfEdges | None = None,
+    border: IntArray | None = None,
     around: tuple[IntArray, IntArray] | None = None,
 ) -> NDArray[np.int8]:
     """Along which diagonal each quad is creased.
@@ -45,7 +45,7 @@ def quad_creases(
     Args:
         vertices: #V by 3, positions [m]. Vertices at the same place count as one, so that a cut changes nothing.
         faces: #F by 4, -1 in the last column of a triangle.
-        sides: of the faces, if they are known.
+        border: the vertices on it, in the order of their numbers, if they are known.
         around: the faces' corners around each vertex, if they are known: #V+1, where each vertex's begin, and 4 times the face
             plus the corner.
 
@@ -63,7 +63,7 @@ def quad_creases(
     launch_each(find_bends, len(faces), [vertices, faces], [normal, bent])
     if not bent.any():
         return crease
-    count, place = len(vertices), places_of(vertices, faces, sides=sides)
+    count, place = len(vertices), places_of(vertices, faces, border=border)
     if (place != np.arange(count)).any():
         faces, around = np.where(faces >= 0, place[faces], -1).astype(np.int32), None
     offset, corner = around or corners_around(faces, count)
