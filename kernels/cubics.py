@@ -2,6 +2,8 @@
 
 import warp as wp
 
+from .indices import natural
+
 wp.set_module_options({"enable_backward": False})
 
 # Neighbours count as at least so far apart [m].
@@ -144,18 +146,20 @@ def sample_grid(
 ):
     """Values between the rows and columns of a grid: of each place those of the rows and columns around it by their weights.
 
-    values: #V by #D. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N by 4 or fewer.
-    sampled: #M by #N by #D.
+    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N by
+    4 or fewer. sampled: #M by #N by #D.
     """
-    p = wp.tid() + first
-    place = p / sampled.shape[2]
-    d = p - place * sampled.shape[2]
-    i = place / sampled.shape[1]
-    j = place - i * sampled.shape[1]
-    total = wp.float64(0.0)
+    p = natural(wp.tid() + first)
+    i = p / sampled.shape[1]
+    j = p - i * sampled.shape[1]
+    total = wp.vec3d()
     for a in range(row.shape[1]):
-        on_row = wp.float64(0.0)
+        on_row = wp.vec3d()
         for b in range(column.shape[1]):
-            on_row += column_weight[j, b] * values[grid[row[i, a], column[j, b]], d]
+            v = natural(grid[row[i, a], column[j, b]])
+            weight = column_weight[j, b]
+            for d in range(sampled.shape[2]):
+                on_row[d] += weight * values[v, d]
         total += row_weight[i, a] * on_row
-    sampled[i, j, d] = total
+    for d in range(sampled.shape[2]):
+        sampled[i, j, d] = total[d]

@@ -1,4 +1,4 @@
-"""Quads numbered by rows and columns: a walk over the mesh from face to face, and what lies around each vertex of a grid."""
+"""Quads numbered by rows and columns: a walk over the mesh from face to face, what lies around each vertex of a grid, and its rows laid out."""
 
 import warp as wp
 
@@ -237,3 +237,48 @@ def list_stiffness(
                     total = diagonal[face_between(columns, i, j, up, right)]
                 listed[at] = total
                 at += 1
+
+
+@wp.kernel
+def is_row_by_row(
+    faces: wp.array(dtype=wp.vec4i),
+    columns: int,
+    corner: wp.vec4i,
+    first: int,
+    # outputs
+    as_expected: wp.array(dtype=wp.bool),
+):
+    """Whether a face (#F) is the one that it is in a grid numbered row by row; `corner`: the first face's vertices."""
+    f = natural(wp.tid() + first)
+    row = f / (columns - 1)
+    as_expected[f] = faces[f] - corner == wp.vec4i(f + row, f + row, f + row, f + row)
+
+
+@wp.kernel
+def lay_profiles(
+    vertices: wp.array(dtype=wp.vec3d),
+    grid: wp.array2d(dtype=wp.int32),
+    column: int,
+    side: wp.float64,
+    station: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    position: wp.array(dtype=wp.vec2d),
+):
+    """Each row of a grid laid out along x at its arc lengths on the body (#V) from one column, to the right where `side` is 1, to the left
+    where it is -1; y is its station (#rows). All [m]."""
+    i = natural(wp.tid() + first)
+    middle = grid[i, column]
+    position[middle] = wp.vec2d(wp.float64(0.0), station[i])
+    for way in range(2):
+        step = 1 - 2 * way
+        before = vertices[middle]
+        along = side * wp.float64(step)
+        x = wp.float64(0.0)
+        j = column + step
+        while j >= 0 and j < grid.shape[1]:
+            v = natural(grid[i, j])
+            x += along * wp.length(vertices[v] - before)
+            before = vertices[v]
+            position[v] = wp.vec2d(x, station[i])
+            j += step

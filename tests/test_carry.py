@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.carry import GridCarry, cubics_between
+from warpflat.carry import GridCarry, cubics_between, places_of_rows
 
 
 def every_second(count: int) -> np.ndarray:
@@ -16,6 +16,10 @@ def in_space(across: np.ndarray, up: np.ndarray) -> np.ndarray:
     """A flat grid with its columns and rows at these places, row by row."""
     u, v = np.meshgrid(across, up)
     return np.stack([u, v, np.zeros_like(u)], axis=-1)
+
+
+def grid_carry(vertices: np.ndarray, grid: np.ndarray, lines: tuple[np.ndarray, np.ndarray]) -> GridCarry:
+    return GridCarry(grid, [places_of_rows(vertices, of) for of in (grid, grid.T)], lines)
 
 
 @pytest.mark.parametrize("even", [True, False], ids=["even", "uneven"])
@@ -45,7 +49,7 @@ def test_a_smooth_layout_comes_back_sixteen_times_as_well_from_twice_as_many(cou
         layout = np.stack([u + 0.1 * np.sin(3.0 * v), v + 0.1 * np.cos(2.0 * u + v)], axis=-1)
         grid = np.arange(layout[..., 0].size, dtype=np.int32).reshape(layout.shape[:2])
         rows, columns = every_second(side + 4), every_second(side)
-        carry = GridCarry(space.reshape(-1, 3), grid, (rows, columns))
+        carry = grid_carry(space.reshape(-1, 3), grid, (rows, columns))
         carried = carry(layout[np.ix_(rows, columns)].reshape(-1, 2))
         errors.append(np.abs(carried - layout.reshape(-1, 2)).max())
     assert errors[0] / errors[1] > 10
@@ -59,7 +63,7 @@ def test_any_numbering_of_the_grid_and_rows_of_any_width() -> None:
     space = in_space(np.cumsum(rng.uniform(0.5, 2.0, 12)), np.cumsum(rng.uniform(0.5, 2.0, 9)))
     vertices, layout = np.empty((grid.size, 3)), np.empty((grid.size, 2))
     vertices[grid], layout[grid] = space, space[..., :2]
-    carried = GridCarry(vertices, grid, (rows, columns))(layout[grid[np.ix_(rows, columns)]].reshape(-1, 2))
+    carried = grid_carry(vertices, grid, (rows, columns))(layout[grid[np.ix_(rows, columns)]].reshape(-1, 2))
     np.testing.assert_allclose(carried, layout, atol=1e-12)
 
 
@@ -67,7 +71,7 @@ def test_rows_at_one_place_are_told_apart_by_number() -> None:
     space = in_space(np.linspace(0.0, 1.0, 7), np.array([0.0, 0.5, 0.5, 1.0, 1.5, 2.0, 2.5]))
     grid = np.arange(49, dtype=np.int32).reshape(7, 7)
     keep = every_second(7)
-    carried = GridCarry(space.reshape(-1, 3), grid, (keep, keep))(np.ones((16, 2)))
+    carried = grid_carry(space.reshape(-1, 3), grid, (keep, keep))(np.ones((16, 2)))
     np.testing.assert_allclose(carried, 1.0, rtol=1e-12)
 
 
@@ -79,7 +83,7 @@ def test_sampled_from_a_finer_grid_and_carried_back_cubics_are_kept() -> None:
     u, v = space[..., 0], space[..., 1]
     layout = np.stack([u**3 - u * v**2, v**3 + 2.0 * u**2 * v], axis=-1).reshape(-1, 2)
     grid = np.arange(14 * 11, dtype=np.int32).reshape(11, 14)
-    carry = GridCarry(space.reshape(-1, 3), grid, (np.linspace(0.0, 10.0, 6), np.linspace(0.0, 13.0, 8)))
+    carry = grid_carry(space.reshape(-1, 3), grid, (np.linspace(0.0, 10.0, 6), np.linspace(0.0, 13.0, 8)))
     coarse = carry.sample(layout)
     assert coarse.shape == (48, 2)
     np.testing.assert_allclose(coarse[[0, 7, 40, 47]], layout[[0, 13, 140, 153]], rtol=1e-14)

@@ -6,6 +6,7 @@ coarse vertices would leave kinks, several per cent of the energy, for the finer
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeVar
@@ -51,17 +52,16 @@ def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
         nodes: #K, rising; of fewer than four, the polynomial through all.
         place: #N, from the first node to the last.
     """
-    count, points = len(place), min(4, len(nodes))
+    points = min(4, len(nodes))
     before = np.searchsorted(nodes, place, side="right") - 1
     begin = np.clip(before - (points // 2 - 1), 0, len(nodes) - points)
     column = begin[:, None] + np.arange(points)
-    node = nodes[column]
-    weight = np.ones((count, points))
-    for k in range(points):
-        for other in range(points):
-            if other != k:
-                weight[:, k] *= (place - node[:, other]) / (node[:, k] - node[:, other])
-    return Cubics(column=column.astype(np.int32), weight=weight)
+    node, itself = nodes[column], np.arange(points)
+    apart = node[:, :, None] - node[:, None, :]
+    apart[:, itself, itself] = 1.0
+    share = (place[:, None] - node)[:, None, :] / apart
+    share[:, itself, itself] = 1.0
+    return Cubics(column=column.astype(np.int32), weight=share.prod(axis=2))
 
 
 def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
@@ -75,24 +75,19 @@ def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
 class GridCarry:
     """From the layout of a coarser grid to that of the finer one, and the other way."""
 
-    def __init__(self, vertices: FloatArray, grid: IntArray, lines: tuple[IntArray | FloatArray, ...]) -> None:
+    def __init__(self, grid: IntArray, places: Sequence[FloatArray], lines: tuple[IntArray | FloatArray, ...]) -> None:
         """Of a grid.
 
         Args:
-            vertices: #V by 3, the finer grid's, in space [m].
-            grid: #rows by #columns, their numbers.
+            grid: #rows by #columns, numbers of the finer grid's vertices.
+            places: how far its rows lie from the first, and its columns [m] (`places_of_rows`).
             lines: where the coarser one's rows and columns lie, counted in those of the finer one, the first and the last among them;
                 its vertices are numbered row by row.
         """
-        self._vertices, self._grid, self._lines = vertices, grid, lines
-
-    @cached_property
-    def _places(self) -> list[tuple[FloatArray, FloatArray]]:
-        """Of rows and of columns: where the coarser grid's lie, and the finer one's."""
-        found = [places_of_rows(self._vertices, grid) for grid in (self._grid, self._grid.T)]
-        return [
-            (np.interp(lines, np.arange(len(place)), place), place)
-            for lines, place in zip(self._lines, found, strict=True)
+        self._grid, self._lines = grid, lines
+        # Of rows and of columns: where the coarser grid's lie, and the finer one's.
+        self._places = [
+            (np.interp(at, np.arange(len(place)), place), place) for at, place in zip(lines, places, strict=True)
         ]
 
     @cached_property
@@ -105,7 +100,7 @@ class GridCarry:
         sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
         of_rows, of_columns = ((cubics.column, cubics.weight) for cubics in (by_rows, by_columns))
         given = [np.ascontiguousarray(values), self._grid, *of_rows, *of_columns]
-        launch_each(sample_grid, sampled.size, given, [sampled])
+        launch_each(sample_grid, len(by_rows.column) * len(by_columns.column), given, [sampled])
         return sampled.reshape(-1, values.shape[1])
 
     def __call__(self, layout: FloatArray) -> FloatArray:

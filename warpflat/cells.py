@@ -118,5 +118,8 @@ def inherit_cells(surface: Surface, whole: Surface) -> None:
 
 def first_of_faces(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
     """#F, the first of each face's cells or sides, where a quad and a triangle have so many."""
-    counts = np.where(surface.is_quad, np.int32(of_quad), np.int32(of_triangle))
+    is_quad = surface.is_quad
+    if is_quad.all():
+        return np.arange(0, of_quad * len(is_quad), of_quad, dtype=np.int32)
+    counts = np.where(is_quad, np.int32(of_quad), np.int32(of_triangle))
     return np.cumsum(counts, dtype=np.int32) - counts

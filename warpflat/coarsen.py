@@ -116,7 +116,7 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
             kept=thinned.kept,
             transfer=thinned.transfer,
             face_of=thinned.face_of,
-            smooth_carry=thinned.carry(surface.vertices),
+            smooth_carry=thinned.carry(surface),
         )
     return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
 
@@ -183,7 +183,7 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
     spread = spread_of(surface, fine=fine)
     if spread is None:
         return None
-    carry = spread.carry(surface.vertices)
+    carry = spread.carry(surface)
     part = _part(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
     return part, carry, spread.face_of
 

@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from warpflat.cells import CellArrays, cells_of
 from warpflat.coarsen import Coarser, coarser_surfaces
 from warpflat.errors import InputError
+from warpflat.kernels.lattice import lay_profiles
+from warpflat.launching import launch_each
 from warpflat.strain import signed_cell_areas
 from warpflat.surface.band import line_along_band
 from warpflat.surface.geodesic import signed_distance_and_station
@@ -64,6 +66,8 @@ _HANGS = np.cos(np.radians(10.0))
 # A piece is flat if it strays no further from its plane, to this share of its size: single precision leaves that much.
 _FLAT = 1e-5
 _FEW_VERTICES = 100
+# Rows of a grid that are worth a thread of their own.
+_FEW_ROWS = 64
 _GOLDEN = 0.6180339887498949
 # A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
 _LEAST_AREA = 0.01
@@ -413,13 +417,9 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
         y, x = np.unravel_index([int(np.argmax(grid == vertex)) for vertex in surface.faces[0]], grid.shape)
         turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
         side = 1.0 if (turns == upwards) != mirrored else -1.0
-        step = norm(np.diff(points_at(surface.vertices, ordered), axis=2))
         positions = np.empty((len(surface.vertices), 2))
-        away = np.zeros(ordered.shape)
-        away[:, at + 1 :] = np.cumsum(side * step[:, at:], axis=1)
-        away[:, :at] = np.cumsum(-side * step[:, :at][:, ::-1], axis=1)[:, ::-1]
-        positions[ordered, 0] = away
-        positions[ordered, 1] = chain_positions(surface.vertices[datum])[:, None]
+        given = [surface.vertices, ordered, at, side, chain_positions(surface.vertices[datum])]
+        launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
         return positions
     return None
 

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import warp as wp
 
 from warpflat.joined import join_networks
 from warpflat.levels import ENERGY_WORK, Levels
 from warpflat.relax import Relaxation
 from warpflat.rungs import far_below
+from warpflat.upright import turn_upright
 
 __all__ = ["carry_up"]
 
@@ -40,7 +40,7 @@ def carry_up(state: Relaxation) -> Levels | None:
     levels = Levels(coarse, mend=True)
     levels.start()
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
-    carried, relaxed = layout.copy(), coarse.positions()
+    carried, relaxed = np.empty_like(layout), coarse.positions()
     for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
         up = relaxed[of]
         if way is not None:
@@ -49,14 +49,11 @@ def carry_up(state: Relaxation) -> Levels | None:
             for carry in way.carries:
                 up = carry(up)
         carried[own] = up
-    load = wp.clone(state.load)
+    turn_upright(state.upright, carried)
     state.position.assign(carried)
-    state.hold_upright()
     state.work_units += ENERGY_WORK
     if (state.begin().potential < before.potential).all():
         return levels
     state.position.assign(layout)
-    state.velocity.zero_()
-    wp.copy(state.load, load)
     state.last = before
     return None

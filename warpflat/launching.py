@@ -179,6 +179,7 @@ def launch_each(
     outputs: SequenceOf[Any],
     *,
     device: str | wp.Device = "cpu",
+    least: int | None = None,
 ) -> None:
     """Run a kernel, whose last input is ``first: int``, once: on all cores where it is long enough.
 
@@ -188,9 +189,10 @@ def launch_each(
         inputs: all but `first`; arrays of Warp on the device, or on the CPU of NumPy.
         outputs: arrays it writes, likewise.
         device: Warp device.
+        least: shortest range worth a thread of its own.
     """
     inputs = [np.ascontiguousarray(given) if isinstance(given, np.ndarray) else given for given in inputs]
-    record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device).launch()
+    record(kernel, dim=count, inputs=inputs, outputs=outputs, device=device, least=least).launch()
 
 
 class _Barrier:

@@ -195,7 +195,7 @@ class Relaxation:
         return (
             0.25
             * self.least_strain**2
-            * np.array([np.einsum("i,i,i->", s.listed_stiffness, s.listed_length, s.listed_length) for s in springs])
+            * np.array([dot(s.listed_stiffness * s.listed_length, s.listed_length) for s in springs])
         )
 
     @cached_property

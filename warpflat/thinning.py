@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
-from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, read_only
+from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
 __all__ = ["Spread", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of"]
@@ -83,7 +83,7 @@ class Thinned:
         faces: #G by 4, among these.
         face_of: #G, for each of them one of the finer level's that lies in it.
         transfer: linear by index.
-        carry: of the finer level's vertices (#V by 3 [m]), what carries layouts up by cubics.
+        carry: of a surface with the finer level's faces, what carries layouts up to it by cubics.
         of_faces: what is worked out of the faces (`warpflat.surface.mesh.once_per_faces`), for all surfaces that have them.
     """
 
@@ -91,7 +91,7 @@ class Thinned:
     faces: IntArray
     face_of: IntArray
     transfer: Transfer
-    carry: Callable[[FloatArray], GridCarry | LatticeCarry]
+    carry: Callable[[Surface], GridCarry | LatticeCarry]
     of_faces: dict[str, Any]
 
 
@@ -102,12 +102,12 @@ class Spread:
     Attributes:
         of_faces: what is known of its faces (`warpflat.surface.mesh.once_per_faces`).
         face_of: #G, for each of them one of the large grid's that lies in it.
-        carry: of the large grid's vertices (#V by 3 [m]), what carries layouts up by cubics, and samples what is there.
+        carry: of a surface with the large grid's faces, what carries layouts up to it by cubics, and samples what is there.
     """
 
     of_faces: dict[str, Any]
     face_of: IntArray
-    carry: Callable[[FloatArray], GridCarry]
+    carry: Callable[[Surface], GridCarry]
 
     @property
     def faces(self) -> IntArray:
@@ -144,7 +144,7 @@ def _spread(surface: Surface, side: int) -> Spread | None:
     return Spread(
         of_faces=_known_of_grid(*map(len, lines)),
         face_of=_some_face(surface, grid[np.ix_(*middle)].ravel()),
-        carry=lambda vertices: GridCarry(vertices, grid, lines),
+        carry=lambda surface: GridCarry(grid, _places_of_lines(surface), lines),
     )
 
 
@@ -187,10 +187,18 @@ def thinned_of(surface: Surface) -> Thinned | None:
         return _of_lattice(surface)
     if not can_be_thinned(grid):
         return None
-    rows, columns = (places_of_rows(surface.vertices, lines)[-1] / (len(lines) - 1) for lines in (grid, grid.T))
+    rows, columns = (place[-1] / (len(place) - 1) for place in _places_of_lines(surface))
     if rows > _MUCH * columns:
         return _across_rows(surface)
     return _across_columns(surface) if columns > _MUCH * rows else _both_ways(surface)
+
+
+@once_per_surface
+def _places_of_lines(surface: Surface) -> tuple[FloatArray, FloatArray]:
+    """How far a grid's rows lie from the first one, and its columns [m]."""
+    grid = rows_and_columns(surface)
+    assert grid is not None
+    return places_of_rows(surface.vertices, grid), places_of_rows(surface.vertices, grid.T)
 
 
 @once_per_faces
@@ -229,7 +237,7 @@ def _every_second(surface: Surface, *, rows: bool, columns: bool) -> Thinned:
         faces=faces,
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
-        carry=lambda vertices: GridCarry(vertices, grid, keep),
+        carry=lambda surface: GridCarry(grid, _places_of_lines(surface), keep),
         of_faces=known_of_faces(faces),
     )
 
@@ -307,7 +315,7 @@ def _every_other(lattice: Lattice) -> Thinned | None:
         faces=faces,
         face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
-        carry=lambda vertices: LatticeCarry(vertices, lattice, keep),
+        carry=lambda surface: LatticeCarry(surface.vertices, lattice, keep),
         of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
     )
 

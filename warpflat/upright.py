@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.sums import dot
 
-__all__ = ["Upright", "hold_upright", "take_out_turning"]
+__all__ = ["Upright", "hold_upright", "take_out_turning", "turn_upright"]
 
 FloatArray = NDArray[np.float64]
 ComplexArray = NDArray[np.complex128]
@@ -33,6 +33,24 @@ class Upright:
     vertices: slice = field(default_factory=lambda: slice(None))
 
 
+def turn_upright(pieces: Sequence[Upright], position: FloatArray) -> None:
+    """Turn each piece about its centre so that its chord points up; the positions (#V by 2 [m]) are changed in place."""
+    for piece in pieces:
+        _turn(piece, position)
+
+
+def _turn(piece: Upright, position: FloatArray) -> tuple[ComplexArray, complex]:
+    """Turn a piece; where its vertices then are, and by what they were turned."""
+    place = _complex(position[piece.vertices])
+    chord = complex(*(position[piece.upper] - position[piece.lower]))
+    turn = 1j * abs(chord) / chord if chord else 1.0 + 0.0j
+    centre = place.mean()
+    place -= centre
+    place *= turn
+    place += centre
+    return place, turn
+
+
 def hold_upright(
     pieces: Sequence[Upright],
     position: FloatArray,
@@ -41,7 +59,7 @@ def hold_upright(
     force: FloatArray,
     weight: FloatArray,
 ) -> None:
-    """Turn each piece about its centre so that its chord points up; the first three arrays are changed in place.
+    """Turn each piece so, and balance what would turn it back; the first three arrays are changed in place.
 
     Args:
         pieces: which.
@@ -52,13 +70,8 @@ def hold_upright(
     """
     for piece in pieces:
         here = piece.vertices
-        place, moving, held = (_complex(vectors[here]) for vectors in (position, velocity, load))
-        chord = complex(*(position[piece.upper] - position[piece.lower]))
-        turn = 1j * abs(chord) / chord if chord else 1.0 + 0.0j
-        centre = place.mean()
-        place -= centre
-        place *= turn
-        place += centre
+        moving, held = (_complex(vectors[here]) for vectors in (velocity, load))
+        place, turn = _turn(piece, position)
         arm, inertia = _arm(place, weight[here])
         # Forces are of the layout before it was turned.
         arm *= turn.conjugate()

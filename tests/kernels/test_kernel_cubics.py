@@ -91,6 +91,6 @@ def test_values_between_rows_and_columns_are_summed_by_both_weights(depth: int) 
     row, column = rng.integers(6, size=(5, 4)).astype(np.int32), rng.integers(8, size=(3, 2)).astype(np.int32)
     row_weight, column_weight = rng.normal(size=(5, 4)), rng.normal(size=(3, 2))
     sampled = np.empty((5, 3, depth))
-    launch_each(sample_grid, sampled.size, [values, grid, row, row_weight, column, column_weight], [sampled])
+    launch_each(sample_grid, 15, [values, grid, row, row_weight, column, column_weight], [sampled])
     whole = values[grid][row[:, :, None, None], column]
     np.testing.assert_allclose(sampled, np.einsum("ia,jb,iajbd->ijd", row_weight, column_weight, whole), rtol=1e-13)

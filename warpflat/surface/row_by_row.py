@@ -12,7 +12,14 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.kernels.lattice import list_corners, list_lengths, list_neighbors, list_stiffness, list_values
+from warpflat.kernels.lattice import (
+    is_row_by_row,
+    list_corners,
+    list_lengths,
+    list_neighbors,
+    list_stiffness,
+    list_values,
+)
 from warpflat.launching import launch_each
 from warpflat.sums import begins
 from warpflat.surface.mesh import Surface, once_per_faces
@@ -151,7 +158,8 @@ def row_by_row(surface: Surface) -> RowByRow | None:
     a, b, c, d = (places.get(at, -1) for at in corner.tolist())
     if sorted((a, b, c, d)) != [0, 1, 2, 3] or a + c != 3:
         return None
-    below_left = np.arange(count, dtype=np.int32).reshape(-1, columns)[:-1, :-1]
-    if not np.array_equal(faces, below_left.reshape(-1, 1) + corner):
+    as_expected = np.empty(len(faces), dtype=bool)
+    launch_each(is_row_by_row, len(faces), [faces, columns, wp.vec4i(*faces[0].tolist())], [as_expected])
+    if faces[0].min() != 0 or not as_expected.all():
         return None
     return RowByRow(rows=count // columns, columns=columns, place=(a, b, c, d))
