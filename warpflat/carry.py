@@ -27,6 +27,8 @@ BoolArray = NDArray[np.bool_]
 
 # Columns along which the distances of rows are measured, and the other way round.
 _LINES = 16
+# Places whose values are worth a thread of their own: each is a sum of sixteen.
+_PLACES = 512
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -100,7 +102,8 @@ class GridCarry:
         sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
         of_rows, of_columns = ((cubics.column, cubics.weight) for cubics in (by_rows, by_columns))
         given = [np.ascontiguousarray(values), self._grid, *of_rows, *of_columns]
-        launch_each(sample_grid, len(by_rows.column) * len(by_columns.column), given, [sampled])
+        places = len(by_rows.column) * len(by_columns.column)
+        launch_each(sample_grid, places, given, [sampled], least=_PLACES)
         return sampled.reshape(-1, values.shape[1])
 
     def __call__(self, layout: FloatArray) -> FloatArray:

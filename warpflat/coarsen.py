@@ -45,6 +45,7 @@ __all__ = [
     "is_coarsest",
     "levels_meanwhile",
     "spread_surface",
+    "steps_down",
 ]
 
 FloatArray = NDArray[np.float64]
@@ -153,14 +154,17 @@ def has_coarser(surface: Surface) -> bool:
 @once_per_surface
 def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
     """All coarser levels of a surface, good on the body, the finest first, down to the coarsest; made once for each surface."""
-    steps: list[Coarser] = []
+    return tuple(steps_down(surface))
+
+
+def steps_down(surface: Surface) -> Iterator[Coarser]:
+    """The same, each made when it is asked for."""
     while not is_coarsest(surface):
         step = _next(surface)
         if step is None:
-            break
-        steps.append(step)
+            return
+        yield step
         surface = step.surface
-    return tuple(steps)
 
 
 def spread_surface(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArray] | None:

@@ -138,22 +138,22 @@ def record(
         turns: ranges that each thread takes, every so many-th, where some may take much longer than others.
     """
     where = wp.get_device(device)
+    least = _LEAST_RANGE if least is None else max(least, 1)
+    if where.is_cuda or dim < 2 * least:
+        return Launch(commands_of(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where)
     threads = thread_count() if threads is None else threads
-    if where.is_cpu:
-        ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
-    else:
-        ranges = [(0, dim)] if dim > 0 else []
+    ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
     commands = commands_of(kernel, ranges, inputs, outputs, where)
     if len(commands) > threads:
         commands = [partial(_run_all, commands[i::threads]) for i in range(threads)]
     return Launch(commands, keep=(inputs, outputs), device=where)
 
 
-def _fair_turns(dim: int, threads: int, most: int, least: int | None) -> int:
+def _fair_turns(dim: int, threads: int, most: int, least: int) -> int:
     """How many ranges each of the threads can take, as many as the others."""
     if threads == 1:
         return 1
-    return max(1, min(most, dim // (threads * max(_LEAST_RANGE if least is None else least, 1))))
+    return max(1, min(most, dim // (threads * least)))
 
 
 def _run_all(commands: SequenceOf[Command]) -> None:

@@ -215,8 +215,8 @@ class Levels:
     def _way(fine: Relaxation, steps: Sequence[Coarser], coarse: Relaxation) -> _Way:
         device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
         first = begins([net.vertex_count for net in fine.network.pieces])
-        ids = np.concatenate([step.kept + at for step, at in zip(steps, first, strict=False)])
-        kept = wp.array(ids, dtype=wp.int32, device=device)
+        ids = [step.kept + at if at else step.kept for step, at in zip(steps, first, strict=False)]
+        kept = wp.array(ids[0] if len(ids) == 1 else np.concatenate(ids), dtype=wp.int32, device=device, copy=False)
         prolongation = _weights([step.prolongation for step in steps], device)
         transpose = _transpose([step.transfer.transpose for step in steps], device)
         base, correction = wp.empty(n, dtype=wp.vec2d, device=device), fine.spare

@@ -8,6 +8,7 @@ takes is found out once, from a launch that Warp records, and later launches are
 from __future__ import annotations
 
 import ctypes
+import struct
 import threading
 from collections.abc import Callable, Sequence
 from copy import copy
@@ -91,17 +92,22 @@ class _Form:
         on_host = self._device.is_cpu
         self.fits = len(values) == len(args) and not recorded.kernel.is_generic
         self.fits = self.fits and (recorded.block_dim == 1 or not on_host)
-        self._first, self._label = first, args[first].label
+        self._first = first
         if on_host:
             # Code stays loaded as long as this is held.
             self._code = recorded.kernel.module.load(self._device, 1)
             self._run = self._code.get_kernel_hooks(recorded.kernel).forward
-        self._arguments: type[ctypes.Structure] = type(
-            "Arguments",
-            (ctypes.Structure,),
-            {"_fields_": [(a.label, type(v)) for a, v in zip(args, values, strict=True)]},
-        )
-        self._ways = [_way(arg.type, type(value), self._device) for arg, value in zip(args, values, strict=True)]
+        self._kinds = [type(value) for value in values]
+        fields = [(f"_{number}", kind) for number, kind in enumerate(self._kinds)]
+        self._arguments = type("Arguments", (ctypes.Structure,), {"_fields_": fields})
+        begins = [getattr(self._arguments, name).offset for name, _ in fields]
+        rooms = np.diff([*begins, ctypes.sizeof(self._arguments)]).tolist()
+        self._first_at = begins[first]
+        ways = [
+            _way(arg.type, kind, room, self._device) for arg, kind, room in zip(args, self._kinds, rooms, strict=True)
+        ]
+        self._ways = [way for way in ways if way is not None]
+        self.fits = self.fits and len(self._ways) == len(ways)
 
     def commands(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command] | None:
         """For each range; None if there are arguments that it does not know."""
@@ -113,19 +119,20 @@ class _Form:
             return None
         return self._on_host(ranges, packed) if self._device.is_cpu else self._on_device(ranges, packed)
 
-    def _on_host(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command]:
-        made, packed = list[Command](), (whole := self._arguments(*values))
+    def _on_host(self, ranges: Sequence[tuple[int, int]], packed: Sequence[Any]) -> list[Command]:
+        made, whole = list[Command](), bytearray().join(packed)
         for begin, end in ranges:
-            if made:
-                packed = self._arguments.from_buffer_copy(whole)
-            setattr(packed, self._label, begin)
-            made.append(partial(self._run, ctypes.byref(self._bounds((end - begin,))), ctypes.byref(packed)))
+            block = bytearray(whole) if made else whole
+            _INT.pack_into(block, self._first_at, begin)
+            bounds, arguments = self._bounds((end - begin,)), self._arguments.from_buffer(block)
+            made.append(partial(self._run, ctypes.byref(bounds), ctypes.byref(arguments)))
         return made
 
-    def _on_device(self, ranges: Sequence[tuple[int, int]], values: list[Any]) -> list[Command]:
+    def _on_device(self, ranges: Sequence[tuple[int, int]], packed: Sequence[Any]) -> list[Command]:
+        values = [kind.from_buffer_copy(value) for kind, value in zip(self._kinds, packed, strict=True)]
         made = list[Command]()
         for begin, end in ranges:
-            values[self._first] = type(values[self._first])(begin)
+            values[self._first] = self._kinds[self._first](begin)
             launch = copy(self._launch)
             launch.bounds = self._bounds((end - begin,))
             launch.params = [launch.bounds, *values]
@@ -138,55 +145,71 @@ _forms: dict[tuple[wp.Kernel, str], _Form] = {}
 _loading = threading.Lock()
 
 
-def _way(of: Any, packed: type, device: wp.Device) -> Callable[[Any], Any]:
-    """How a value for an argument of this type becomes the C value that Warp packed it into."""
+# What a kernel gets of an array: where it is, nothing of a gradient, its shape and strides (of one dimension, and three more) and their number.
+_LINE = struct.Struct("=QQiiiiiiiiHH4x")
+_INT = struct.Struct("=i")
+
+
+def _way(of: Any, kind: type, room: int, device: wp.Device) -> Callable[[Any], Any] | None:
+    """How a value for an argument of this type becomes bytes, as many as there is room for, or something that lies so in memory. kind: the C
+    value that Warp packed it into. None where arrays are laid out otherwise than they are taken to be here."""
     if isinstance(of, wp.array):
         scalar = getattr(of.dtype, "_wp_scalar_type_", of.dtype)
         inner = tuple(getattr(of.dtype, "_shape_", ()))
-        return partial(_array, of.dtype, of.ndim, np.dtype(wp.dtype_to_numpy(scalar)), inner, packed, device)
-    if issubclass(packed, ctypes._SimpleCData):
-        return partial(_number, packed)
-    return partial(_composite, packed)
+        if room != _LINE.size:
+            return None
+        return _array_way(of.dtype, of.ndim, np.dtype(wp.dtype_to_numpy(scalar)), inner, kind, device)
+    fill = bytes(room - ctypes.sizeof(kind))
+    if issubclass(kind, ctypes._SimpleCData):
+        return partial(_number, kind, fill)
+    return partial(_composite, kind, fill)
 
 
-def _array(
-    dtype: Any, ndim: int, scalar: np.dtype[Any], inner: tuple[int, ...], packed: type, device: wp.Device, value: Any
-) -> Any:
-    kind = type(value)
-    if kind is wp.array:
-        if value.dtype is not dtype or value.ndim != ndim or value.device is not device:
+def _array_way(
+    dtype: Any, ndim: int, scalar: np.dtype[Any], inner: tuple[int, ...], kind: type, device: wp.Device
+) -> Callable[[Any], Any]:
+    on_host, line, in_row = device.is_cpu, ndim == 1, np.empty(inner, scalar).strides
+
+    def way(value: Any) -> Any:
+        given = type(value)
+        if given is wp.array:
+            if value.dtype is not dtype or value.ndim != ndim or value.device is not device:
+                raise _Misfit
+            return value.__ctype__()
+        if (
+            given is not np.ndarray
+            or not on_host
+            or value.dtype != scalar
+            or value.ndim != ndim + len(inner)
+            or value.shape[ndim:] != inner
+        ):
             raise _Misfit
-        return value.__ctype__()
-    if (
-        kind is not np.ndarray
-        or not device.is_cpu
-        or value.dtype != scalar
-        or value.ndim != ndim + len(inner)
-        or value.shape[ndim:] != inner
-    ):
-        raise _Misfit
-    strides = value.strides
-    if inner and strides[ndim:] != np.empty(inner, scalar).strides:
-        raise _Misfit
-    return packed(value.__array_interface__["data"][0], 0, ndim, value.shape[:ndim], strides[:ndim])
+        strides = value.strides
+        if strides[ndim:] != in_row:
+            raise _Misfit
+        at = value.__array_interface__["data"][0]
+        if line:
+            return _LINE.pack(at, 0, value.shape[0], 0, 0, 0, strides[0], 0, 0, 0, 1, 0)
+        return kind(at, 0, ndim, value.shape[:ndim], strides[:ndim])
+
+    return way
 
 
-def _number(packed: type, value: Any) -> Any:
+def _number(kind: Any, fill: bytes, value: Any) -> bytes:
     if isinstance(value, (np.integer, np.floating, np.bool_)):
         value = value.item()
     try:
-        return packed(value)
+        return bytes(kind(value)) + fill
     except TypeError:
         raise _Misfit from None
 
 
-def _composite(packed: type, value: Any) -> Any:
-    if type(value) is packed:
-        return value
-    try:
-        made = value.__ctype__()
-    except AttributeError:
-        raise _Misfit from None
-    if type(made) is not packed:
-        raise _Misfit
-    return made
+def _composite(kind: type, fill: bytes, value: Any) -> Any:
+    if type(value) is not kind:
+        try:
+            value = value.__ctype__()
+        except AttributeError:
+            raise _Misfit from None
+        if type(value) is not kind:
+            raise _Misfit
+    return bytes(value) + fill if fill else value

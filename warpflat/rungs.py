@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye
 
 from warpflat.cells import cells_of
-from warpflat.coarsen import Coarser, coarser, coarser_surfaces, is_coarsest, spread_surface
+from warpflat.coarsen import Coarser, coarser, is_coarsest, spread_surface, steps_down
 from warpflat.heap import give_back, is_large
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.launching import launch_each
@@ -82,7 +82,7 @@ def rungs_of(
     """
     rungs: list[Rung] = []
     # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
-    ready = iter(coarser_surfaces(network.surface))
+    ready: Iterator[Coarser] = steps_down(network.surface)
     while not _is_lowest(network):
         step = next(ready, None)
         rung = known.get(step.surface) if known and step is not None else None
@@ -143,7 +143,7 @@ def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow
         np.arange(network.vertex_count, dtype=np.int32),
         np.arange(len(network.surface.faces), dtype=np.int32),
     )
-    for step in coarser_surfaces(network.surface):
+    for step in steps_down(network.surface):
         if step.smooth_carry is None or len(kept) <= most:
             break
         kept, face_of = kept[step.kept], face_of[step.face_of]
