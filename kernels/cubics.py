@@ -146,8 +146,8 @@ def sample_grid(
 ):
     """Values between the rows and columns of a grid: of each place those of the rows and columns around it by their weights.
 
-    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N by
-    4 or fewer. sampled: #M by #N by #D.
+    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N
+    by 4 or fewer. sampled: #M by #N by #D.
     """
     p = natural(wp.tid() + first)
     i = p / sampled.shape[1]

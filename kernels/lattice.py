@@ -1,4 +1,4 @@
-"""Quads numbered by rows and columns: a walk over the mesh from face to face, what lies around each vertex of a grid, and its rows laid out."""
+"""Quads numbered by rows and columns: a walk from face to face, what lies around each vertex of a grid, and its rows laid out."""
 
 import warp as wp
 

@@ -140,7 +140,9 @@ def record(
     where = wp.get_device(device)
     least = _LEAST_RANGE if least is None else max(least, 1)
     if where.is_cuda or dim < 2 * least:
-        return Launch(commands_of(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where)
+        return Launch(
+            commands_of(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where
+        )
     threads = thread_count() if threads is None else threads
     ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
     commands = commands_of(kernel, ranges, inputs, outputs, where)

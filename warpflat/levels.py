@@ -14,6 +14,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array
 
+from warpflat.carry import GridCarry
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
 from warpflat.joined import join_networks
@@ -58,6 +59,10 @@ _LEAST_OF_LEAP = 0.2
 _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
 _CYCLES_ALONG_LINES = 2
+# At the start of a stiff cloth on a rectangular grid, up to such a K/G, what is left on levels of no more vertices than this is rough: so
+# many steps take as much of it as a cycle, in a third of the time. Beside a crack it is not.
+_STIFF = 5.0
+_STEPS_INSTEAD, _FEW = 16, 700
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
 LINE_WORK = 2.0
@@ -249,10 +254,17 @@ class Levels:
         finest = self._levels[0].state
         finest.work_units += units * self._levels[level].state.network.vertex_count / finest.network.vertex_count
 
-    def smooth(self, level: int, each_step: Callable[[], None] | None = None, *, evaluated: bool = False) -> FloatArray:
-        """Some steps from rest; `evaluated` says that the forces there have just been evaluated. In a soft cloth on a lattice the last goes
-        along its lines. Returns #P, the energy that they have led to [J]."""
-        state, steps = self._levels[level].state, self._levels[level].steps
+    def smooth(
+        self,
+        level: int,
+        each_step: Callable[[], None] | None = None,
+        *,
+        evaluated: bool = False,
+        steps: int | None = None,
+    ) -> FloatArray:
+        """Some steps from rest, as many as are usual on the level, or so many; `evaluated` says that the forces there have just been
+        evaluated. In a soft cloth on a lattice the last goes along its lines. Returns #P, the energy that they have led to [J]."""
+        state, steps = self._levels[level].state, self._levels[level].steps if steps is None else steps
         state.velocity.zero_()
         go = state.sweep if self._soft else state.smooth
         go(steps, each_step, watch_every=self._watch_every, evaluated=evaluated)
@@ -311,13 +323,16 @@ class Levels:
         state = self._levels[level].state
         return np.asarray(state.potentials().sum(axis=1) - state.work_of_load())
 
-    def cycle(self, level: int, each_step: Callable[[], None] | None = None) -> FloatArray:
-        """One cycle from this level down and up again; on the finest one its forces must have been evaluated, and their work counted.
+    def cycle(self, level: int, each_step: Callable[[], None] | None = None, *, brief: bool = False) -> FloatArray:
+        """One cycle from this level down and up again; on the finest one its forces must have been evaluated, and their work counted. If
+        it is `brief`, steps alone on the first small level.
 
         Returns:
             #P, energy at the end [J].
         """
         state, way = self._levels[level].state, self._levels[level].way
+        if brief and level and state.network.vertex_count <= _FEW * len(self._ladders):
+            return self.smooth(level, steps=_STEPS_INSTEAD)
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
         before = self.smooth(level, each_step, evaluated=level == 0)
@@ -336,7 +351,7 @@ class Levels:
         if mirrored.all():
             return self.smooth(level, each_step)
         way.load.launch()
-        self.cycle(level + 1)
+        self.cycle(level + 1, brief=brief)
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, state.pieces.mark())
@@ -439,7 +454,13 @@ class Levels:
             assert way is not None
             sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
             if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
-                self.cycle(number)
+                self.cycle(number, brief=self._rises_smoothly)
+
+    @property
+    def _rises_smoothly(self) -> bool:
+        """Whether each level starts so near to its rest that only what is rough is left."""
+        grids = all(isinstance(rungs[0].step.smooth_carry, GridCarry) for rungs in self._ladders if rungs)
+        return grids and self._levels[0].state.network.fabric.softness < _STIFF
 
     def start(self) -> None:
         """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: in such a cloth more is
@@ -451,7 +472,7 @@ class Levels:
             finest.state.evaluate_at_rest()
             self._count(0, FORCE_WORK)
             if not finest.lines:
-                self.cycle(0)
+                self.cycle(0, brief=self._rises_smoothly)
                 continue
             self.remember(memories)
             self.leap(self.cycle(0))

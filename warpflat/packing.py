@@ -99,7 +99,7 @@ class _Form:
             self._run = self._code.get_kernel_hooks(recorded.kernel).forward
         self._kinds = [type(value) for value in values]
         fields = [(f"_{number}", kind) for number, kind in enumerate(self._kinds)]
-        self._arguments = type("Arguments", (ctypes.Structure,), {"_fields_": fields})
+        self._arguments: type[ctypes.Structure] = type("Arguments", (ctypes.Structure,), {"_fields_": fields})
         begins = [getattr(self._arguments, name).offset for name, _ in fields]
         rooms = np.diff([*begins, ctypes.sizeof(self._arguments)]).tolist()
         self._first_at = begins[first]
@@ -145,14 +145,14 @@ _forms: dict[tuple[wp.Kernel, str], _Form] = {}
 _loading = threading.Lock()
 
 
-# What a kernel gets of an array: where it is, nothing of a gradient, its shape and strides (of one dimension, and three more) and their number.
+# What a kernel gets of an array of one dimension: where it is, nothing of a gradient, shape and strides with room for four, and how many.
 _LINE = struct.Struct("=QQiiiiiiiiHH4x")
 _INT = struct.Struct("=i")
 
 
 def _way(of: Any, kind: type, room: int, device: wp.Device) -> Callable[[Any], Any] | None:
-    """How a value for an argument of this type becomes bytes, as many as there is room for, or something that lies so in memory. kind: the C
-    value that Warp packed it into. None where arrays are laid out otherwise than they are taken to be here."""
+    """How a value for an argument of this type becomes bytes, as many as there is room for, or something that lies so in memory. kind: the
+    C value that Warp packed it into. None where arrays are laid out otherwise than they are taken to be here."""
     if isinstance(of, wp.array):
         scalar = getattr(of.dtype, "_wp_scalar_type_", of.dtype)
         inner = tuple(getattr(of.dtype, "_shape_", ()))
@@ -204,7 +204,7 @@ def _number(kind: Any, fill: bytes, value: Any) -> bytes:
         raise _Misfit from None
 
 
-def _composite(kind: type, fill: bytes, value: Any) -> Any:
+def _composite(kind: Any, fill: bytes, value: Any) -> Any:
     if type(value) is not kind:
         try:
             value = value.__ctype__()

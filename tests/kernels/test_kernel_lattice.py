@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-
 from warpflat.kernels.lattice import lay_profiles
+
 from warpflat.launching import launch_each
 
 
