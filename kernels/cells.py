@@ -83,10 +83,18 @@ def cell_places(face: wp.vec4i, k: int):
 
 
 @wp.func
+def corner_at(face: wp.vec4i, k: int):
+    """The face's corner k, 0 to 3. To ask a vector for a component that is only known when the kernel runs would take several times as long."""
+    below = wp.where((k & 1) != 0, face[1], face[0])
+    above = wp.where((k & 1) != 0, face[3], face[2])
+    return natural(wp.where((k & 2) != 0, above, below))
+
+
+@wp.func
 def cell_corner(face: wp.vec4i, k: int):
     """The vertices of the face's cell k."""
     at = cell_places(face, k)
-    return wp.vec3i(face[at[0]], face[at[1]], face[at[2]])
+    return wp.vec3i(corner_at(face, at[0]), corner_at(face, at[1]), corner_at(face, at[2]))
 
 
 @wp.func
@@ -126,7 +134,10 @@ def edge_matrix(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d):
 @wp.func
 def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
     """The cell's edges from corner 0 to corners 1 and 2 in the plane, as columns [m]."""
-    return edge_matrix(position[corner[0]], position[corner[1]], position[corner[2]])
+    p0 = position[natural(corner[0])]
+    p1 = position[natural(corner[1])]
+    p2 = position[natural(corner[2])]
+    return edge_matrix(p0, p1, p2)
 
 
 @wp.func
@@ -187,9 +198,9 @@ def look_at_face(
     else:
         p3 = position[natural(face[3])]
         h0, near0 = look_at(p3, p0, p1, laid[begin], warp, weft, onset)
-        h1, near1 = look_at(p0, p1, p2, laid[begin + 1], warp, weft, onset)
-        h2, near2 = look_at(p1, p2, p3, laid[begin + 2], warp, weft, onset)
-        h3, near3 = look_at(p2, p3, p0, laid[begin + 3], warp, weft, onset)
+        h1, near1 = look_at(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset)
+        h2, near2 = look_at(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset)
+        h3, near3 = look_at(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset)
         height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
         near = near0 | near1 | near2 | near3
     return height2, near
@@ -295,10 +306,10 @@ def evaluate_guard(
         end = wp.where(is_strained, count_cells(face), 0)
         while k < end:
             at = cell_places(face, k)
-            i0 = natural(face[at[0]])
-            i1 = natural(face[at[1]])
-            i2 = natural(face[at[2]])
-            laid = cells.laid[begin + k]
+            i0 = corner_at(face, at[0])
+            i1 = corner_at(face, at[1])
+            i2 = corner_at(face, at[2])
+            laid = cells.laid[natural(begin + k)]
             q0 = position[i0]
             q1 = position[i1]
             q2 = position[i2]
@@ -449,8 +460,11 @@ def compute_guard_energy(
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
-    s = sheared(cells.shear[f], warp, weft, cells.slack[f])
-    t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
+    s = wp.vec2d()
+    t = wp.vec2d()
+    if wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0):
+        s = sheared(cells.shear[f], warp, weft, cells.slack[f])
+        t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
     begin = natural(cells.first[f])
     p0 = position[natural(face[0])]
     p1 = position[natural(face[1])]
@@ -461,9 +475,9 @@ def compute_guard_energy(
         p3 = position[natural(face[3])]
         energy[f] = wp.float64(0.5) * (
             guard_energy(p3, p0, p1, cells.laid[begin], warp, weft, onset, s, t, guard)
-            + guard_energy(p0, p1, p2, cells.laid[begin + 1], warp, weft, onset, s, t, guard)
-            + guard_energy(p1, p2, p3, cells.laid[begin + 2], warp, weft, onset, s, t, guard)
-            + guard_energy(p2, p3, p0, cells.laid[begin + 3], warp, weft, onset, s, t, guard)
+            + guard_energy(p0, p1, p2, cells.laid[natural(begin + 1)], warp, weft, onset, s, t, guard)
+            + guard_energy(p1, p2, p3, cells.laid[natural(begin + 2)], warp, weft, onset, s, t, guard)
+            + guard_energy(p2, p3, p0, cells.laid[natural(begin + 3)], warp, weft, onset, s, t, guard)
         )
         wave = cells.wave[f]
         if wp.dot(wave, wave) > wp.float64(0.0):

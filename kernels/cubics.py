@@ -123,13 +123,15 @@ def carry_along_rows(
 
     values: #R by #K [m]. grid: #R by #C, numbers of the vertices. column, weight: #C by 4 or fewer. result: #V [m].
     """
-    p = wp.tid() + first
+    p = natural(wp.tid() + first)
     i = p / grid.shape[1]
     j = p - i * grid.shape[1]
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    for k in range(column.shape[1]):
-        total += weight[j, k] * values[i, column[j, k]]
-    result[grid[i, j]] = total
+    k = int(0)
+    while k < column.shape[1]:
+        total += weight[j, k] * values[i, natural(column[j, k])]
+        k += 1
+    result[natural(grid[i, j])] = total
 
 
 @wp.kernel

@@ -16,13 +16,16 @@ import warp as wp
 
 from .cells import (
     Cells,
+    across,
     cell_corner,
     cell_places,
     cell_weight,
     count_cells,
+    edge_matrix,
     flat_edges,
     laid_edges,
     longest_square,
+    on_body,
 )
 from .indices import natural
 
@@ -71,15 +74,18 @@ def follow_curve(e: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.
     pulled = wp.float64(0.0)
     energy = wp.float64(0.0)
     slope = wp.float64(0.0)
-    for i in range(count - 1):
-        if i == 0 or e > strain[i]:
-            slope = (tension[i + 1] - tension[i]) / (strain[i + 1] - strain[i])
-            upper = e
-            if i < count - 2:
-                upper = wp.min(e, strain[i + 1])
-            d = upper - strain[i]
-            pulled = tension[i] + slope * d
-            energy += (tension[i] + wp.float64(0.5) * slope * d) * d
+    i = int(0)
+    while i < count - 1 and (i == 0 or e > strain[i]):
+        here = natural(i)
+        following = natural(i + 1)
+        slope = (tension[following] - tension[here]) / (strain[following] - strain[here])
+        upper = e
+        if i < count - 2:
+            upper = wp.min(e, strain[following])
+        d = upper - strain[here]
+        pulled = tension[here] + slope * d
+        energy += (tension[here] + wp.float64(0.5) * slope * d) * d
+        i += 1
     return wp.vec3d(pulled, energy, slope)
 
 
@@ -208,12 +214,14 @@ def evaluate_membrane(
     if watch == 0 and acting[f] == wp.int8(0):
         return
     face = cells.face[f]
-    begin = cells.first[f]
+    begin = natural(cells.first[f])
     slot = 4 * f
     viscous = pace[0][0] != wp.float64(0.0)
     acts = int(0)
     least = wp.float64(wp.inf)
-    for k in range(count_cells(face)):
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
         corner = cell_corner(face, k)
         D = flat_edges(position, corner)
         det = wp.max(wp.determinant(D), wp.float64(0.0))
@@ -227,7 +235,7 @@ def evaluate_membrane(
                         viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
             acts = 1
             inv = wp.inverse(D)
-            F = laid_edges(cells.laid[begin + k]) * inv
+            F = laid_edges(cells.laid[natural(begin + k)]) * inv
             warp = cloth.warp * cells.slack[f][0]
             weft = cloth.weft * cells.slack[f][1]
             worn_warp = F * warp
@@ -287,6 +295,7 @@ def evaluate_membrane(
                 viscosity[slot + at[0]] -= d1 + d2
                 viscosity[slot + at[1]] += d1
                 viscosity[slot + at[2]] += d2
+        k += 1
     acting[f] = wp.int8(acts)
     clearance[f] = least
 
@@ -309,11 +318,13 @@ def bound_membrane(
     """
     f = natural(wp.tid() + first)
     face = cells.face[f]
-    begin = cells.first[f]
+    begin = natural(cells.first[f])
     warp = cloth.warp * cells.slack[f][0]
     weft = cloth.weft * cells.slack[f][1]
-    for k in range(count_cells(face)):
-        c = begin + k
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
+        c = natural(begin + k)
         D = flat_edges(position, cell_corner(face, k))
         det = wp.determinant(D)
         if det > wp.float64(0.0):
@@ -333,6 +344,23 @@ def bound_membrane(
             weight[3 * c] = wp.max(-area * pair_bound(w0, w1, warp, weft, q, psi), none)
             weight[3 * c + 1] = wp.max(-area * pair_bound(w1, w2, warp, weft, q, psi), none)
             weight[3 * c + 2] = wp.max(-area * pair_bound(w2, w0, warp, weft, q, psi), none)
+        k += 1
+
+
+@wp.func
+def membrane_energy(
+    p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, cloth: Cloth
+):
+    """(Flat area) psi of a cell with these corners, which counts with all of its area [J]; infinite if it is collapsed or mirrored."""
+    D = edge_matrix(p0, p1, p2)
+    det = wp.determinant(D)
+    if det <= wp.float64(0.0):
+        return wp.float64(wp.inf)
+    worn_warp = on_body(laid, across(D, warp)) / det
+    worn_weft = on_body(laid, across(D, weft)) / det
+    e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
+    law = stretched_sheet(e, cloth)
+    return wp.float64(0.5) * det * (law[2] + sheared_threads(wp.dot(worn_warp, worn_weft), cloth)[1])
 
 
 @wp.kernel
@@ -347,25 +375,22 @@ def compute_membrane_energy(
     """(Flat area) psi per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
     f = natural(wp.tid() + first)
     face = cells.face[f]
-    begin = cells.first[f]
+    c = natural(cells.first[f])
     warp = cloth.warp * cells.slack[f][0]
     weft = cloth.weft * cells.slack[f][1]
-    total = wp.float64(0.0)
-    for k in range(count_cells(face)):
-        D = flat_edges(position, cell_corner(face, k))
-        det = wp.determinant(D)
-        if det > wp.float64(0.0):
-            F = laid_edges(cells.laid[begin + k]) * wp.inverse(D)
-            worn_warp = F * warp
-            worn_weft = F * weft
-            e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
-            gamma = wp.dot(worn_warp, worn_weft)
-            law = stretched_sheet(e, cloth)
-            psi = law[2] + sheared_threads(gamma, cloth)[1]
-            total += wp.float64(0.5) * det * cell_weight(face) * psi
-        else:
-            total = wp.float64(wp.inf)
-    energy[f] = total
+    p0 = position[natural(face[0])]
+    p1 = position[natural(face[1])]
+    p2 = position[natural(face[2])]
+    if face[3] < 0:
+        energy[f] = membrane_energy(p0, p1, p2, cells.laid[c], warp, weft, cloth)
+    else:
+        p3 = position[natural(face[3])]
+        energy[f] = wp.float64(0.5) * (
+            membrane_energy(p3, p0, p1, cells.laid[c], warp, weft, cloth)
+            + membrane_energy(p0, p1, p2, cells.laid[natural(c + 1)], warp, weft, cloth)
+            + membrane_energy(p1, p2, p3, cells.laid[natural(c + 2)], warp, weft, cloth)
+            + membrane_energy(p2, p3, p0, cells.laid[natural(c + 3)], warp, weft, cloth)
+        )
 
 
 @wp.kernel
@@ -387,8 +412,10 @@ def compute_membrane_strain(
     """
     f = natural(wp.tid() + first)
     face = cells.face[f]
-    for k in range(count_cells(face)):
-        c = cells.first[f] + k
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
+        c = natural(cells.first[f] + k)
         D = flat_edges(position, cell_corner(face, k))
         det = wp.determinant(D)
         area[c] = wp.float64(0.5) * det * cell_weight(face)
@@ -407,3 +434,4 @@ def compute_membrane_strain(
         strain[c] = e
         stress[c] = wp.vec3d(law[0], law[1], across[0])
         energy[c] = (law[2] + across[1]) * area[c]
+        k += 1

@@ -130,7 +130,11 @@ def sum_stiffness(
 @wp.func
 def first_direction(position: wp.array(dtype=wp.vec2d), quad: wp.vec4i):
     """Along a quad's edges 0-1 and 3-2, in the plane."""
-    return (position[quad[1]] - position[quad[0]]) + (position[quad[2]] - position[quad[3]])
+    p0 = position[natural(quad[0])]
+    p1 = position[natural(quad[1])]
+    p2 = position[natural(quad[2])]
+    p3 = position[natural(quad[3])]
+    return (p1 - p0) + (p2 - p3)
 
 
 @wp.kernel
@@ -175,11 +179,15 @@ class Lattice:
 
 
 @wp.func
-def wave_hold(k: wp.float64, lattice: Lattice, ratio: wp.float64):
+def wave_hold(k: wp.float64, lattice: Lattice, ratio: wp.float64, inverse: wp.float64):
     """What a quad should hold a wave from vertex to vertex by [N/m], along the sides of K = k: a quarter of what a membrane does, or the
-    share of that by which structural springs do in a square, where it is less, as off the grain. ratio: of the other sides to these."""
-    in_square = wp.max(k - lattice.shear, lattice.least * k) / (k + lattice.shear)
-    return wp.min(HELD, in_square) * (k * ratio + lattice.shear / ratio)
+    share of that by which structural springs do in a square, where it is less, as off the grain. ratio: of the other sides to these, and
+    its inverse."""
+    in_square = wp.max(k - lattice.shear, lattice.least * k)
+    share = HELD
+    if in_square < HELD * (k + lattice.shear):
+        share = in_square / (k + lattice.shear)
+    return share * (k * ratio + lattice.shear * inverse)
 
 
 @wp.kernel
@@ -215,33 +223,34 @@ def weigh_quads(
     if wp.abs(lattice.direction[0] * d[1] - lattice.direction[1] * d[0]) > wp.abs(wp.dot(lattice.direction, d)):
         ka = lattice.across
         kb = lattice.along
-    p0 = vertices[quad[0]]
-    p1 = vertices[quad[1]]
-    p2 = vertices[quad[2]]
-    p3 = vertices[quad[3]]
+    p0 = vertices[natural(quad[0])]
+    p1 = vertices[natural(quad[1])]
+    p2 = vertices[natural(quad[2])]
+    p3 = vertices[natural(quad[3])]
     half = wp.float64(0.5)
     a = half * (wp.length(p1 - p0) + wp.length(p3 - p2)) * wider[q][0]
     b = half * (wp.length(p2 - p1) + wp.length(p0 - p3)) * wider[q][1]
     ratio = b / a
-    most = (wp.float64(1.0) - lattice.least) * wp.min(ka * ratio * ratio, kb / (ratio * ratio))
+    inverse = a / b
+    most = (wp.float64(1.0) - lattice.least) * wp.min(ka * ratio * ratio, kb * inverse * inverse)
     shear = wp.min(lattice.shear, most)
-    half_a = half * (ka - shear / (ratio * ratio)) * ratio
-    half_b = half * (kb - shear * ratio * ratio) / ratio
+    half_a = half * (ka * ratio - shear * inverse)
+    half_b = half * (kb * inverse - shear * ratio)
     lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if shear < lattice.shear:
         lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
     # A wave of 1 m strains a side by 2 m, and what holds the quad against it by 4 m.
     short = wp.max(
-        wave_hold(ka, lattice, ratio) - wp.float64(2.0) * half_a,
-        wave_hold(kb, lattice, wp.float64(1.0) / ratio) - wp.float64(2.0) * half_b,
+        wave_hold(ka, lattice, ratio, inverse) - wp.float64(2.0) * half_a,
+        wave_hold(kb, lattice, inverse, ratio) - wp.float64(2.0) * half_b,
     )
     hold[q] = wp.float64(0.25) * wp.max(short, wp.float64(0.0))
-    h = side[q]
+    h = natural(side[q])
     stiffness[h] = half_a
     stiffness[h + 1] = half_b
     stiffness[h + 2] = half_a
     stiffness[h + 3] = half_b
-    diagonal[q] = shear * (a * a + b * b) / (wp.float64(2.0) * a * b)
+    diagonal[q] = half * shear * (inverse + ratio)
 
 
 @wp.kernel

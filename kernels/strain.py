@@ -2,7 +2,7 @@
 
 import warp as wp
 
-from .cells import Cells, cell_corner, cell_weight, count_cells, flat_edges, laid_edges
+from .cells import Cells, across, cell_corner, cell_weight, count_cells, edge_matrix, flat_edges, on_body
 from .indices import natural
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
@@ -37,23 +37,21 @@ def measure_flat_cells(
 
 
 @wp.func
-def worn_strain(position: wp.array(dtype=wp.vec2d), cells: Cells, membrane: Membrane, f: int, k: int):
-    """Of a face's k-th cell the weighted flat area [m2], 0 or less if it is mirrored, and its strains along warp and weft and in
-    shear, then 0."""
-    face = cells.face[f]
-    D = flat_edges(position, cell_corner(face, k))
+def worn_strain(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
+    """Of a cell with these corners the determinant of its edges in the plane [m2], 0 or less if it is mirrored, and its strains along warp and
+    weft and in shear, then 0."""
+    D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if det > wp.float64(0.0):
-        F = laid_edges(cells.laid[cells.first[f] + k]) * wp.inverse(D)
-        worn_warp = F * membrane.warp
-        worn_weft = F * membrane.weft
+        worn_warp = on_body(laid, across(D, membrane.warp)) / det
+        worn_weft = on_body(laid, across(D, membrane.weft)) / det
         e = wp.vec3d(
             wp.length(worn_warp) - wp.float64(1.0),
             wp.length(worn_weft) - wp.float64(1.0),
             wp.dot(worn_warp, worn_weft),
         )
-    return wp.float64(0.5) * det * cell_weight(face), e
+    return det, e
 
 
 @wp.func
@@ -64,6 +62,13 @@ def stress_of(e: wp.vec3d, membrane: Membrane):
         membrane.c_weft * e[1] + membrane.c_cross * e[0],
         membrane.shear * e[2],
     )
+
+
+@wp.func
+def stored_energy(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
+    """Of a cell, which counts with all of its area [J]."""
+    det, e = worn_strain(p0, p1, p2, laid, membrane)
+    return wp.float64(0.25) * wp.dot(stress_of(e, membrane), e) * det
 
 
 @wp.kernel
@@ -86,14 +91,23 @@ def compute_worn_strain(
     energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
     """
     f = natural(wp.tid() + first)
-    for k in range(count_cells(cells.face[f])):
-        c = cells.first[f] + k
-        flat, e = worn_strain(position, cells, membrane, f, k)
+    face = cells.face[f]
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
+        c = natural(cells.first[f] + k)
+        at = cell_corner(face, k)
+        p0 = position[natural(at[0])]
+        p1 = position[natural(at[1])]
+        p2 = position[natural(at[2])]
+        det, e = worn_strain(p0, p1, p2, cells.laid[c], membrane)
+        flat = wp.float64(0.5) * det * cell_weight(face)
         s = stress_of(e, membrane)
         strain[c] = e
         stress[c] = s
         energy[c] = wp.float64(0.5) * wp.dot(s, e) * flat
         area[c] = flat
+        k += 1
 
 
 @wp.kernel
@@ -107,11 +121,21 @@ def compute_strain_energy(
 ):
     """The energy of `compute_worn_strain` alone, per face. position: #V [m]. energy: #F [J]."""
     f = natural(wp.tid() + first)
-    total = wp.float64(0.0)
-    for k in range(count_cells(cells.face[f])):
-        flat, e = worn_strain(position, cells, membrane, f, k)
-        total += wp.float64(0.5) * wp.dot(stress_of(e, membrane), e) * flat
-    energy[f] = total
+    face = cells.face[f]
+    c = natural(cells.first[f])
+    p0 = position[natural(face[0])]
+    p1 = position[natural(face[1])]
+    p2 = position[natural(face[2])]
+    if face[3] < 0:
+        energy[f] = stored_energy(p0, p1, p2, cells.laid[c], membrane)
+    else:
+        p3 = position[natural(face[3])]
+        energy[f] = wp.float64(0.5) * (
+            stored_energy(p3, p0, p1, cells.laid[c], membrane)
+            + stored_energy(p0, p1, p2, cells.laid[natural(c + 1)], membrane)
+            + stored_energy(p1, p2, p3, cells.laid[natural(c + 2)], membrane)
+            + stored_energy(p2, p3, p0, cells.laid[natural(c + 3)], membrane)
+        )
 
 
 @wp.kernel

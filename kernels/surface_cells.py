@@ -119,11 +119,12 @@ def find_creases(
 
 
 @wp.func
-def unfolded(a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, q: wp.vec3d, normal: wp.vec3d):
-    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad."""
+def unfolded(
+    a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, q: wp.vec3d, normal: wp.vec3d, straight: wp.float64, length: wp.float64
+):
+    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad. straight, length:
+    distances of a and b, and of p and q, as they are."""
     hinge = q - p
-    length = wp.length(hinge)
-    straight = wp.length(b - a)
     if length == wp.float64(0.0):
         return straight
     cross_a = wp.cross(p - a, hinge)
@@ -153,12 +154,14 @@ def unfold_diagonals(
     p2 = vertices[natural(quad[2])]
     p3 = vertices[natural(quad[3])]
     normal = wp.cross(p2 - p0, p3 - p1)
-    l02 = wp.length(p2 - p0)
-    l13 = wp.length(p3 - p1)
+    straight_02 = wp.length(p2 - p0)
+    straight_13 = wp.length(p3 - p1)
+    l02 = straight_02
+    l13 = straight_13
     if crease[q] != wp.int8(0):
-        l02 = unfolded(p0, p2, p1, p3, normal)
+        l02 = unfolded(p0, p2, p1, p3, normal, straight_02, straight_13)
     if crease[q] != wp.int8(1):
-        l13 = unfolded(p1, p3, p2, p0, normal)
+        l13 = unfolded(p1, p3, p2, p0, normal, straight_13, straight_02)
     length[q] = wp.vec2d(l02, l13)
 
 
@@ -251,16 +254,16 @@ def add_areas(
     e = natural(offset[i])
     end = offset[i + 1]
     while e < end:
-        f = slot[e] / 4
+        f = natural(slot[e]) / 4
         if faces[f][3] < 0:
-            laid_flat = laid[cell[f]]
+            laid_flat = laid[natural(cell[f])]
             twice += laid_flat[0] * laid_flat[2]
         else:
             # A quad's corner is in three of its four cells, not in that of the corner across.
-            beyond = (slot[e] + 2) & 3
-            for k in range(4):
-                if k != beyond:
-                    laid_flat = laid[cell[f] + k]
-                    twice += wp.float64(0.5) * laid_flat[0] * laid_flat[2]
+            c = cell[f]
+            before = laid[natural(c + ((slot[e] + 3) & 3))]
+            here = laid[natural(c + (slot[e] & 3))]
+            after = laid[natural(c + ((slot[e] + 1) & 3))]
+            twice += wp.float64(0.5) * (before[0] * before[2] + here[0] * here[2] + after[0] * after[2])
         e += 1
     total[i] = twice / wp.float64(6.0)
