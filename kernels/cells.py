@@ -84,7 +84,7 @@ def cell_places(face: wp.vec4i, k: int):
 
 @wp.func
 def corner_at(face: wp.vec4i, k: int):
-    """The face's corner k, 0 to 3. To ask a vector for a component that is only known when the kernel runs would take several times as long."""
+    """The vertex at the face's corner k, 0 to 3, without asking a vector for a component that is known only when the kernel runs."""
     below = wp.where((k & 1) != 0, face[1], face[0])
     above = wp.where((k & 1) != 0, face[3], face[2])
     return natural(wp.where((k & 2) != 0, above, below))

@@ -53,24 +53,44 @@ def number_faces(
                     seen += 1
 
 
+@wp.func
+def lines_before(i: int, most: int):
+    """How many entries the lines before line i have, where each has `most`, and the first and the last one less."""
+    return most * i - wp.min(i, 1)
+
+
+@wp.func
+def lines_here(i: int, count: int, most: int):
+    """How many line i has, of so many."""
+    return lines_before(i + 1, most) - lines_before(i, most) - wp.where(i == count - 1, 1, 0)
+
+
+@wp.func
+def entries_before(i: int, j: int, rows: int, columns: int, most: int):
+    """How many entries the vertices before that in row i and column j have, each those of its row times those of its column."""
+    return lines_before(i, most) * (most * columns - 2) + lines_here(i, rows, most) * lines_before(j, most)
+
+
 @wp.kernel
 def list_corners(
     rows: int,
     columns: int,
-    slot_of: wp.array(dtype=wp.int32),
-    offset: wp.array(dtype=wp.int32),
+    slot_of: wp.vec4i,
     first: int,
     # outputs
+    offset: wp.array(dtype=wp.int32),
     corner: wp.array(dtype=wp.int32),
 ):
     """The faces' corners around each vertex of a grid that is numbered row by row: 4 times the face plus the corner.
 
-    slot_of: 4, a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin.
+    slot_of: a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin; the last is not
+    written.
     """
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
-    at = offset[v]
+    at = natural(entries_before(i, j, rows, columns, 2))
+    offset[v] = at
     for up in range(2):
         for right in range(2):
             row = i - 1 + up
@@ -129,16 +149,19 @@ def spring_to(rows: int, columns: int, rising: int, i: int, j: int, row: int, co
 def list_neighbors(
     rows: int,
     columns: int,
-    offset: wp.array(dtype=wp.int32),
     first: int,
     # outputs
+    offset: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
 ):
-    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin."""
+    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin; the
+    last is not written."""
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
-    at = offset[v]
+    # Of the three by three around it, not the vertex itself.
+    at = natural(entries_before(i, j, rows, columns, 3) - v)
+    offset[v] = at
     for up in range(-1, 2):
         for right in range(-1, 2):
             if (up != 0 or right != 0) and is_on_grid(rows, columns, i + up, j + right):

@@ -38,8 +38,8 @@ def measure_flat_cells(
 
 @wp.func
 def worn_strain(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
-    """Of a cell with these corners the determinant of its edges in the plane [m2], 0 or less if it is mirrored, and its strains along warp and
-    weft and in shear, then 0."""
+    """Of a cell with these corners the determinant of its edges in the plane [m2], 0 or less if it is mirrored, and its strains along
+    warp and weft and in shear, then 0."""
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))

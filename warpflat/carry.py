@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.launching import launch_each
 from warpflat.surface.grid import Lattice
+from warpflat.surface.vectors import norm, points_at
 
 __all__ = ["GridCarry", "LatticeCarry", "cubics_between", "places_of_rows"]
 
@@ -69,8 +70,8 @@ def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
 def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
     """#N, how far each row of a grid (#N by #M, of vertices #V by 3 [m]) lies from the first one, along the surface: the mean over some
     columns. By number where two of them lie at one place."""
-    some = vertices[grid[:, np.unique(np.linspace(0, grid.shape[1] - 1, _LINES).astype(int))]]
-    steps = np.linalg.norm(np.diff(some, axis=0), axis=2).mean(axis=1)
+    some = points_at(vertices, grid[:, np.unique(np.linspace(0, grid.shape[1] - 1, _LINES).astype(int))])
+    steps = norm(some[:, 1:] - some[:, :-1]).mean(axis=1)
     return np.append(0.0, np.cumsum(steps if steps.min() > 0.0 else np.ones_like(steps)))
 
 

@@ -25,13 +25,13 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry
-from warpflat.cells import cells_of
+from warpflat.cells import cells_of, creases_of
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
 from warpflat.launching import record, thread_count
 from warpflat.springs import unweighed_springs
 from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.mesh import Surface, once_per_surface
+from warpflat.surface.mesh import Surface, once_per_surface, tell
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import triangulate
 from warpflat.thinning import Transfer, can_be_thinned, spread_of, thinned_of
@@ -113,7 +113,7 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     thinned = thinned_of(surface)
     if thinned is not None:
         return Coarser(
-            surface=_part(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
+            surface=_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
             kept=thinned.kept,
             transfer=thinned.transfer,
             face_of=thinned.face_of,
@@ -188,7 +188,7 @@ def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArr
     if spread is None:
         return None
     carry = spread.carry(surface)
-    part = _part(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
+    part = _quads(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
     return part, carry, spread.face_of
 
 
@@ -211,6 +211,14 @@ def _prepare_levels(surface: Surface) -> None:
             cells_of(step.surface)
             unweighed_springs(step.surface)
             _ = step.transfer.transpose
+
+
+def _quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
+    """A coarser level of quads. Creases are not looked for there: a level is only to lead to where the finer one is at rest, and as to that
+    there is no difference."""
+    part = _part(surface, vertices, faces, of_faces)
+    tell(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
+    return part
 
 
 def _part(

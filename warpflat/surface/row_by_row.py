@@ -21,7 +21,6 @@ from warpflat.kernels.lattice import (
     list_values,
 )
 from warpflat.launching import launch_each
-from warpflat.sums import begins
 from warpflat.surface.mesh import Surface, once_per_faces
 
 __all__ = ["RowByRow", "row_by_row"]
@@ -71,22 +70,25 @@ class RowByRow:
 
     def corners_around(self) -> tuple[IntArray, IntArray]:
         """The faces' corners around each vertex, as `unfold.corners_around` has them."""
-        rows, columns = (_there(count, 2) for count in (self.rows, self.columns))
-        slot_of = np.empty(4, dtype=np.int32)
-        slot_of[list(self.place)] = range(4)
-        offset = begins(np.multiply.outer(rows, columns).ravel())
-        corner = np.empty(offset[-1], dtype=np.int32)
-        launch_each(list_corners, self.rows * self.columns, [self.rows, self.columns, slot_of, offset], [corner])
+        slot_of = wp.vec4i(*(self.place.index(corner) for corner in range(4)))
+        offset, corner = self._lists(2, 0)
+        launch_each(list_corners, self.rows * self.columns, [self.rows, self.columns, slot_of], [offset, corner])
         return offset, corner
 
     def neighbors_around(self) -> tuple[IntArray, IntArray]:
         """#V+1, where each vertex's springs begin, edges and both diagonals of each face; and the vertices at their far ends, by which they
         are sorted."""
-        rows, columns = (_there(count, 3) for count in (self.rows, self.columns))
-        offset = begins(np.multiply.outer(rows, columns).ravel() - 1)
-        neighbor = np.empty(offset[-1], dtype=np.int32)
-        launch_each(list_neighbors, self.rows * self.columns, [self.rows, self.columns, offset], [neighbor])
+        offset, neighbor = self._lists(3, 1)
+        launch_each(list_neighbors, self.rows * self.columns, [self.rows, self.columns], [offset, neighbor])
         return offset, neighbor
+
+    def _lists(self, most: int, less: int) -> tuple[IntArray, IntArray]:
+        """Room for where each vertex's entries begin, and for these: so many squared, fewer on the border, and so many less."""
+        count = self.rows * self.columns
+        entries = (most * self.rows - 2) * (most * self.columns - 2) - less * count
+        offset = np.empty(count + 1, dtype=np.int32)
+        offset[-1] = entries
+        return offset, np.empty(entries, dtype=np.int32)
 
     def springs_around(self, offset: IntArray) -> IntArray:
         """Those springs' numbers: edges first, then the faces' diagonals 0-2, then 1-3. offset: #V+1, where each vertex's begin."""
@@ -135,14 +137,6 @@ class RowByRow:
     def _rising(self) -> int:
         """Which of a face's two diagonals runs from below left to above right."""
         return self.place.index(0) % 2
-
-
-def _there(count: int, most: int) -> IntArray:
-    """Of each of so many lines how many lines or strips there are beside it, itself included: `most`, and one less at both ends."""
-    there = np.full(count, most, dtype=np.int32)
-    there[0] -= 1
-    there[-1] -= 1
-    return there
 
 
 @once_per_faces
