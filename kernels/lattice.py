@@ -154,8 +154,8 @@ def list_neighbors(
     offset: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
 ):
-    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin; the
-    last is not written."""
+    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin;
+    the last is not written."""
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
