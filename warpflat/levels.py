@@ -36,8 +36,9 @@ BoolArray = NDArray[np.bool_]
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
 # the very first, or so many times the vertices along its side: a crack that opens is slow there too. In a cycle it is enough, too, once
 # they take no more than this share of what all before have taken of its energy: it is not the fine level's to the last per cent.
-# After every second time it leaps to where the ways so far say that its energy is least: a crack opens in a third of the steps. In cycles
-# that is for lattices only: a coarse level of triangles stores roughly what the fine one does, and is not worth following to its end.
+# After every second time it leaps to where the ways so far say that its energy is least: a crack opens in a third of the steps. A
+# rectangular grid is at rest as soon without. In cycles that is for lattices only: a coarse level of triangles stores roughly what the fine
+# one does, and is not worth following to its end.
 _BOTTOM_STEPS = 8
 _LEAP_EVERY = 2
 _AT_REST = 0.05
@@ -173,7 +174,9 @@ class Levels:
         self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = (), *, mend: bool
     ) -> None:
         self._ladders, self._mend = ladders, mend
-        self._lattice = all(rungs[0].step.smooth_carry is not None for rungs in ladders if rungs)
+        carries = [rungs[0].step.smooth_carry for rungs in ladders if rungs]
+        self._lattice = None not in carries
+        self._grids = all(isinstance(carry, GridCarry) for carry in carries)
         self._soft = finest.network.fabric.softness >= _SOFT
         few = _STEPS_SOFT if self._soft else _STEPS
         self._levels = [_Level(finest, steps=_STEPS_SMOOTH if self._lattice or not mend else few)]
@@ -297,9 +300,10 @@ class Levels:
 
         aim, most = share * state.pieces.force_sizes(), max(net.vertex_count for net in state.network.pieces)
         first = before = now = self._objective(last)
-        leaping, lines = self._lattice or not little, self._levels[last].lines
+        leaping, lines = not self._grids and (self._lattice or not little), self._levels[last].lines
         steps = self._levels[last].steps if lines else _BOTTOM_STEPS
-        _begin(state, memories, state.pieces.mark_with_load())
+        if leaping:
+            _begin(state, memories, state.pieces.mark_with_load())
         for number in range(1, 1 + math.ceil(_MOST_BOTTOM_STEPS * math.sqrt(most) / _BOTTOM_STEPS)):
             state.sweep(steps, watch_every=self._watch_every)
             self._count(last, steps)
@@ -459,8 +463,7 @@ class Levels:
     @property
     def _rises_smoothly(self) -> bool:
         """Whether each level starts so near to its rest that only what is rough is left."""
-        grids = all(isinstance(rungs[0].step.smooth_carry, GridCarry) for rungs in self._ladders if rungs)
-        return grids and self._levels[0].state.network.fabric.softness < _STIFF
+        return self._grids and self._levels[0].state.network.fabric.softness < _STIFF
 
     def start(self) -> None:
         """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: in such a cloth more is
