@@ -29,7 +29,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache, partial
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -174,21 +175,19 @@ class SpringNetwork:
         cells.laid = _on(device, c.laid, wp.vec3d)
         cells.offset = _on(device, corners.offset, wp.int32)
         cells.slot = _on(device, corners.entry, wp.int32)
-        slack = np.broadcast_to(np.ones(2), (self.face_count, 2)) if self.stretch is None else 1.0 / self.stretch
-        cells.slack = _on(device, slack, wp.vec2d)
-        fabric = self.fabric
+        fabric, faces = self.fabric, self.face_count
         hold = np.minimum(fabric.shear_stiffness, self.shear_hold)
         onset = np.stack([hold / fabric.stiffness_warp, hold / fabric.stiffness_weft], axis=-1)
-        cells.onset = _on(device, np.broadcast_to(onset, (self.face_count, 2)), wp.vec2d)
-        lack = np.broadcast_to(np.zeros(2), (self.face_count, 2)) if s.lack is None else s.lack
-        cells.shear = _on(device, lack, wp.vec2d)
-        wave = np.broadcast_to(np.zeros(4), (self.face_count, 4)) if s.wave is None else s.wave
-        cells.wave = _on(device, wave, wp.vec4d)
+        cells.onset = _on(device, np.broadcast_to(onset, (faces, 2)), wp.vec2d)
+        same = partial(_same, device.alias)
+        cells.slack = same(wp.vec2d, 1.0, faces) if self.stretch is None else _on(device, 1.0 / self.stretch, wp.vec2d)
+        cells.shear = same(wp.vec2d, 0.0, faces) if s.lack is None else _on(device, s.lack, wp.vec2d)
+        cells.wave = same(wp.vec4d, 0.0, faces) if s.wave is None else _on(device, s.wave, wp.vec4d)
         self.cells = cells
         self.bonds = Bonds()
-        self.bonds.offset = _on(device, np.broadcast_to(np.zeros(1, dtype=np.int32), count + 1), wp.int32)
-        self.bonds.slot = wp.zeros(0, dtype=wp.int32, device=device)
-        self.bonds.freedom = _on(device, np.broadcast_to(np.ones(2), (count, 2)), wp.vec2d)
+        self.bonds.offset = same(wp.int32, 0, count + 1)
+        self.bonds.slot = same(wp.int32, 0, 0)
+        self.bonds.freedom = same(wp.vec2d, 1.0, count)
 
         warp, weft = grain_axes(self.grain_angle)
         guard = ThreadGuard()
@@ -341,6 +340,16 @@ def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array
     if len(values) and values.strides[0] == 0:
         return _repeated(wp.array(np.ascontiguousarray(values[:1]), dtype=dtype, device=device), len(values))
     return wp.array(np.ascontiguousarray(values), dtype=dtype, device=device, copy=False)
+
+
+@lru_cache
+def _row(device: str, dtype: Any, value: float) -> wp.array:
+    return wp.full(1, value=value, dtype=dtype, device=device)
+
+
+def _same(device: str, dtype: Any, value: float, count: int) -> wp.array:
+    """An array of so many that are all alike, not to be written to."""
+    return _repeated(_row(device, dtype, value), count)
 
 
 def _repeated(row: wp.array, count: int) -> wp.array:
