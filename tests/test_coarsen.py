@@ -39,8 +39,11 @@ from warpflat.surface.topology import (
     non_manifold_edges,
     non_manifold_vertices,
 )
+from warpflat.thinning import SpreadKind
 
 FloatArray = NDArray[np.float64]
+
+KINDS: tuple[SpreadKind, ...] = ("fine", "halves", "thirds")
 
 
 def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
@@ -233,7 +236,7 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
     all can be halved."""
     surface = sheet(columns, rows)
-    found = spread_surface(surface, fine=True)
+    found = spread_surface(surface, "fine")
     assert found is not None
     small, carry, face_of = found
     grid = rows_and_columns(small)
@@ -244,17 +247,35 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     assert (there.min(axis=1) - 1e-9 <= middle).all()
     assert (middle <= there.max(axis=1) + 1e-9).all()
     np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
-    assert spread_surface(surface, fine=True) is found
+    assert spread_surface(surface, "fine") is found
 
 
 def test_stiff_cloth_has_a_coarser_one():
     surface = sheet(101, 101)
     sizes = []
-    for fine in (True, False):
-        found = spread_surface(surface, fine=fine)
+    for kind in KINDS:
+        found = spread_surface(surface, kind)
         assert found is not None
-        sizes.append(len(found[0].vertices))
-    assert sizes == [57**2, 49**2]
+        sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarser_surfaces(found[0]))])
+    assert sizes == [[57**2, 29**2, 15**2, 8**2], [49**2, 25**2, 13**2, 7**2], [49**2, 17**2, 9**2]]
+
+
+@pytest.mark.parametrize("shape", [(72, 143), (90, 70), (1_000, 21)])
+def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape: tuple[int, int]):
+    """All of them where a small grid has as many as it likes; every second one where a large grid has too few rows, or long quads."""
+    surface = sheet(*shape)
+    found = spread_surface(surface, "thirds")
+    assert found is not None
+    step = coarser_surfaces(found[0])[0]
+    fine, coarse = (rows_and_columns(of) for of in (found[0], step.surface))
+    assert fine is not None
+    assert coarse is not None
+    np.testing.assert_array_equal(
+        step.kept.reshape(coarse.shape), fine[::3, ::3] if min(shape) > 21 else fine[::2, ::2]
+    )
+    np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(found[0]), atol=1e-12)
+    assert step.smooth_carry is not None
+    np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(found[0]), atol=1e-12)
 
 
 def test_rows_much_farther_apart_than_columns_all_stay():
@@ -289,9 +310,9 @@ def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
 
 
 def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
-    for fine in (True, False):
-        assert spread_surface(sheet(2_000, 4), fine=fine) is None
-        assert spread_surface(sheet(21, 21, triangles=True), fine=fine) is None
+    for kind in KINDS:
+        assert spread_surface(sheet(2_000, 4), kind) is None
+        assert spread_surface(sheet(21, 21, triangles=True), kind) is None
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])

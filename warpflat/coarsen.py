@@ -34,7 +34,7 @@ from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface, tell
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import triangulate
-from warpflat.thinning import Transfer, can_be_thinned, spread_of, thinned_of
+from warpflat.thinning import SpreadKind, Thinned, Transfer, can_be_thinned, spread_of, thinned_of, thirds_of
 
 __all__ = [
     "Coarser",
@@ -83,6 +83,7 @@ class Coarser:
         transfer: weights by which layouts go up, and forces down.
         face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
         smooth_carry: of quads on a lattice, what carries layouts up by cubics.
+        is_lowest: whether it is relaxed without a coarser one.
     """
 
     surface: Surface
@@ -90,6 +91,7 @@ class Coarser:
     transfer: Transfer
     face_of: IntArray
     smooth_carry: GridCarry | LatticeCarry | None = None
+    is_lowest: bool = False
 
     @property
     def prolongation(self) -> csr_array:
@@ -112,14 +114,18 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     """
     thinned = thinned_of(surface)
     if thinned is not None:
-        return Coarser(
-            surface=_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
-            kept=thinned.kept,
-            transfer=thinned.transfer,
-            face_of=thinned.face_of,
-            smooth_carry=thinned.carry(surface),
-        )
+        return _thinner(surface, thinned)
     return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
+
+
+def _thinner(surface: Surface, thinned: Thinned) -> Coarser:
+    return Coarser(
+        surface=_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
+        kept=thinned.kept,
+        transfer=thinned.transfer,
+        face_of=thinned.face_of,
+        smooth_carry=thinned.carry(surface),
+    )
 
 
 _inherited: WeakKeyDictionary[Surface, Coarser] = WeakKeyDictionary()
@@ -167,28 +173,29 @@ def steps_down(surface: Surface) -> Iterator[Coarser]:
         surface = step.surface
 
 
-def spread_surface(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArray] | None:
+def spread_surface(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, IntArray] | None:
     """The small grid that is spread over a large one (`warpflat.thinning.spread_of`), what carries layouts up from it, and #G, for each of
     its faces one of the large grid's that lies in it; None of any other surface. Made once for each."""
-    return _fine_spread(surface) if fine else _coarse_spread(surface)
+    known = _spreads(surface)
+    if kind not in known:
+        known[kind] = _spread(surface, kind)
+    return known[kind]
 
 
 @once_per_surface
-def _coarse_spread(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
-    return _spread(surface, fine=False)
+def _spreads(surface: Surface) -> dict[SpreadKind, tuple[Surface, GridCarry, IntArray] | None]:
+    return {}
 
 
-@once_per_surface
-def _fine_spread(surface: Surface) -> tuple[Surface, GridCarry, IntArray] | None:
-    return _spread(surface, fine=True)
-
-
-def _spread(surface: Surface, *, fine: bool) -> tuple[Surface, GridCarry, IntArray] | None:
-    spread = spread_of(surface, fine=fine)
+def _spread(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, IntArray] | None:
+    spread = spread_of(surface, kind)
     if spread is None:
         return None
     carry = spread.carry(surface)
     part = _quads(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
+    thirds = thirds_of(part) if kind == "thirds" else None
+    if thirds is not None:
+        _inherited[part] = replace(_thinner(part, thirds), is_lowest=True)
     return part, carry, spread.face_of
 
 

@@ -60,10 +60,11 @@ _LEAST_OF_LEAP = 0.2
 _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
 _CYCLES_ALONG_LINES = 2
-# At the start of a stiff cloth on a rectangular grid, up to such a K/G, what is left on levels of no more vertices than this is rough: so
-# many steps take as much of it as a cycle, in a third of the time. Beside a crack it is not.
-_STIFF = 5.0
+# At the start of a stiff cloth on a rectangular grid what is left on levels of no more vertices than this is rough: so many steps take as
+# much of it as a cycle, in a third of the time. Beside a crack it is not. The finest level there takes more steps, since the next one has
+# a ninth of its vertices.
 _STEPS_INSTEAD, _FEW = 16, 700
+_STEPS_AT_START = 6
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
 LINE_WORK = 2.0
@@ -339,7 +340,8 @@ class Levels:
             return self.smooth(level, steps=_STEPS_INSTEAD)
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
-        before = self.smooth(level, each_step, evaluated=level == 0)
+        steps = _STEPS_AT_START if brief and level == 0 else None
+        before = self.smooth(level, each_step, evaluated=level == 0, steps=steps)
         if level == 0:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
@@ -359,7 +361,7 @@ class Levels:
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, state.pieces.mark())
-        energy = self.smooth(level, each_step, evaluated=True)
+        energy = self.smooth(level, each_step, evaluated=True, steps=steps)
         higher = ~(energy <= before)
         if higher.any():
             _put_way(state, way.base, way.correction)
@@ -463,7 +465,7 @@ class Levels:
     @property
     def _rises_smoothly(self) -> bool:
         """Whether each level starts so near to its rest that only what is rough is left."""
-        return self._grids and self._levels[0].state.network.fabric.softness < _STIFF
+        return self._grids and self._levels[0].state.network.is_stiff
 
     def start(self) -> None:
         """`rise`, and a cycle on the finest level; two of them, each with its leap, where steps go along lines: in such a cloth more is

@@ -61,8 +61,10 @@ IntArray = NDArray[np.int32]
 # outweighs all others move against each other (the short side of a needle) without any correction; this share of the
 # stiffest spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
 _PAIR_SHARE = 0.5
-# K/G from which two of the steps on a lattice are one along its lines.
+# K/G from which two of the steps on a lattice are one along its lines, and up to which what is left of a layout that has been carried up
+# from a coarser grid is rough.
 _SOFT = 12.0
+_STIFF = 5.0
 
 
 @dataclass(kw_only=True)
@@ -231,6 +233,11 @@ class SpringNetwork:
     def goes_along_lines(self) -> bool:
         """Whether some of the steps go along the lines of its lattices, if it has any."""
         return self.model == "springs" and self.fabric.softness >= _SOFT
+
+    @property
+    def is_stiff(self) -> bool:
+        """Whether steps alone bring it to rest that has been carried up from a coarser grid at rest."""
+        return self.model == "springs" and self.fabric.softness < _STIFF
 
     @property
     def vertex_count(self) -> int:

@@ -21,7 +21,7 @@ from warpflat.surface.mesh import Surface, forget
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of
 from warpflat.surface.untangle import untangle
-from warpflat.thinning import Transfer
+from warpflat.thinning import SpreadKind, Transfer
 
 __all__ = ["Rung", "far_below", "let_go", "rungs_of", "stay"]
 
@@ -83,7 +83,7 @@ def rungs_of(
     rungs: list[Rung] = []
     # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
     ready: Iterator[Coarser] = steps_down(network.surface)
-    while not _is_lowest(network):
+    while not (_is_lowest(network) or (rungs and rungs[-1].step.is_lowest)):
         step = next(ready, None)
         rung = known.get(step.surface) if known and step is not None else None
         rung = rung or _rung(network, layout, step, mend=mend)
@@ -133,7 +133,7 @@ class FarBelow:
 def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow | None:
     """The small grid that is spread over a grid, or the largest coarser one of any other lattice that has at most so many vertices; None
     if there is none, or where it would be mirrored."""
-    spread = spread_surface(network.surface, fine=network.goes_along_lines)
+    spread = spread_surface(network.surface, _spread_for(network))
     if spread is not None:
         surface, carry, face_of = spread
         found = _network_below(network, surface, carry.sample(layout), face_of, mend=True)
@@ -156,6 +156,12 @@ def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow
     rung = Rung(step=steps[-1], network=found[0], layout=found[1])
     carries = [step.smooth_carry for step in reversed(steps) if step.smooth_carry is not None]
     return FarBelow(network=rung.network, layout=rung.layout, carries=carries, rung=rung)
+
+
+def _spread_for(network: SpringNetwork) -> SpreadKind:
+    if network.goes_along_lines:
+        return "fine"
+    return "thirds" if network.is_stiff else "halves"
 
 
 def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> Rung | None:

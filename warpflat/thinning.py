@@ -15,7 +15,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
 from itertools import pairwise
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,14 +26,19 @@ from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
-__all__ = ["Spread", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of"]
+__all__ = ["Spread", "SpreadKind", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of", "thirds_of"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
 BoolArray = NDArray[np.bool_]
 
+# Which small grid is spread over a large one: for stiff cloth, whose next level has every third row and column; for others, whose levels
+# have every second one; and for cloth so soft that steps go along lines.
+SpreadKind = Literal["thirds", "halves", "fine"]
+
 # A grid of fewer rows or columns has no coarser one.
 _LEAST_LINES = 5
+_LEAST_THIRDS = 13
 # Quads that are left across a strip between two lines in which the border turns: a single one bends several times as stiffly as its cloth.
 _LEAST_QUADS = 2
 # Rows this many times as far apart as columns all stay, and columns as rows.
@@ -42,9 +47,9 @@ _MUCH = 2.5
 _MOST_LEFT = 0.7
 # A small grid spread over a large one has so many quads along its sides, more along the longer one. What cubics leave of a layout is then
 # .002 % of the energy on the dome, .03 % on the bodice, from grids of any size; of soft cloth, .09 % with the finer one. Multiples of eight
-# can be halved thrice.
-_SPREAD, _SPREAD_FINE = 48, 56
-_MULTIPLE = 8
+# can be halved thrice, of six have a third that can be halved.
+_SIDES: dict[SpreadKind, int] = {"thirds": 48, "halves": 48, "fine": 56}
+_MULTIPLES: dict[SpreadKind, int] = {"thirds": 6, "halves": 8, "fine": 8}
 
 
 class Transfer:
@@ -116,30 +121,25 @@ class Spread:
         return faces
 
 
-def spread_of(surface: Surface, *, fine: bool) -> Spread | None:
-    """The small grid, for soft cloth a finer one, that is spread over a large one; None of any other surface, and where there are too few
-    rows or columns."""
-    return _fine_spread(surface) if fine else _coarse_spread(surface)
+def spread_of(surface: Surface, kind: SpreadKind) -> Spread | None:
+    """The small grid that is spread over a large one; None of any other surface, and where there are too few rows or columns."""
+    known = _spreads(surface)
+    if kind not in known:
+        known[kind] = _spread(surface, kind)
+    return known[kind]
 
 
 @once_per_faces
-def _coarse_spread(surface: Surface) -> Spread | None:
-    return _spread(surface, _SPREAD)
+def _spreads(surface: Surface) -> dict[SpreadKind, Spread | None]:
+    return {}
 
 
-@once_per_faces
-def _fine_spread(surface: Surface) -> Spread | None:
-    return _spread(surface, _SPREAD_FINE)
-
-
-def _spread(surface: Surface, side: int) -> Spread | None:
+def _spread(surface: Surface, kind: SpreadKind) -> Spread | None:
     grid = rows_and_columns(surface)
     if grid is None or not can_be_thinned(grid):
         return None
-    lines = tuple(
-        np.linspace(0.0, count - 1.0, quads + 1)
-        for count, quads in zip(grid.shape, _quads(grid.shape, side), strict=True)
-    )
+    quads = _quads(grid.shape, _SIDES[kind], _MULTIPLES[kind])
+    lines = tuple(np.linspace(0.0, count - 1.0, of + 1) for count, of in zip(grid.shape, quads, strict=True))
     middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
     return Spread(
         of_faces=_known_of_grid(*map(len, lines)),
@@ -148,14 +148,15 @@ def _spread(surface: Surface, side: int) -> Spread | None:
     )
 
 
-def _quads(shape: tuple[int, ...], side: int) -> list[int]:
-    """Of a small grid's columns and rows, about as long for their width as those of a grid of this shape; `side` of a square one."""
+def _quads(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
+    """Of a small grid's columns and rows, about as long for their width as those of a grid of this shape; `side` of a square one. Multiples
+    of this number, but where the large grid has fewer."""
     quads = [count - 1 for count in shape]
     short, long = np.argsort(quads).tolist()
     share = side / float(np.sqrt(np.prod(quads, dtype=float)))
     result = [0, 0]
-    result[short] = min(quads[short], max(round(quads[short] * share / _MULTIPLE), 1) * _MULTIPLE)
-    result[long] = min(quads[long], max(round(side**2 / result[short] / _MULTIPLE), 1) * _MULTIPLE)
+    result[short] = min(quads[short], max(round(quads[short] * share / multiple), 1) * multiple)
+    result[long] = min(quads[long], max(round(side**2 / result[short] / multiple), 1) * multiple)
     return result
 
 
@@ -187,10 +188,26 @@ def thinned_of(surface: Surface) -> Thinned | None:
         return _of_lattice(surface)
     if not can_be_thinned(grid):
         return None
+    wide = _how_wide(surface)
+    if wide == "rows":
+        return _across_rows(surface)
+    return _across_columns(surface) if wide == "columns" else _both_ways(surface)
+
+
+def thirds_of(surface: Surface) -> Thinned | None:
+    """Every third row and column of a grid; None where they do not come out even, or where its quads are long."""
+    grid = rows_and_columns(surface)
+    if grid is None or any(count < _LEAST_THIRDS or count % 3 != 1 for count in grid.shape) or _how_wide(surface):
+        return None
+    return _thirds(surface)
+
+
+def _how_wide(surface: Surface) -> Literal["rows", "columns", ""]:
+    """Which of a grid's lines lie much farther apart than the others, if any do."""
     rows, columns = (place[-1] / (len(place) - 1) for place in _places_of_lines(surface))
     if rows > _MUCH * columns:
-        return _across_rows(surface)
-    return _across_columns(surface) if columns > _MUCH * rows else _both_ways(surface)
+        return "rows"
+    return "columns" if columns > _MUCH * rows else ""
 
 
 @once_per_surface
@@ -209,27 +226,29 @@ def _of_lattice(surface: Surface) -> Thinned | None:
 
 @once_per_faces
 def _both_ways(surface: Surface) -> Thinned:
-    return _every_second(surface, rows=True, columns=True)
+    return _thinner(surface, rows=_second, columns=_second)
 
 
 @once_per_faces
 def _across_rows(surface: Surface) -> Thinned:
-    return _every_second(surface, rows=False, columns=True)
+    return _thinner(surface, rows=_every, columns=_second)
 
 
 @once_per_faces
 def _across_columns(surface: Surface) -> Thinned:
-    return _every_second(surface, rows=True, columns=False)
+    return _thinner(surface, rows=_second, columns=_every)
 
 
-def _every_second(surface: Surface, *, rows: bool, columns: bool) -> Thinned:
-    """Every second row of a grid, or column, or both, and the last ones; between them linear by index."""
+@once_per_faces
+def _thirds(surface: Surface) -> Thinned:
+    return _thinner(surface, rows=_third, columns=_third)
+
+
+def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]) -> Thinned:
+    """Some rows and columns of a grid, which of so many these tell, and the last ones; between them linear by index."""
     grid = rows_and_columns(surface)
     assert grid is not None
-    keep = tuple(
-        _second(count) if thin else np.arange(count, dtype=np.int32)
-        for count, thin in zip(grid.shape, (rows, columns), strict=True)
-    )
+    keep = rows(grid.shape[0]), columns(grid.shape[1])
     kept = grid[np.ix_(*keep)]
     faces = _faces_of(*kept.shape)
     return Thinned(
@@ -255,6 +274,14 @@ def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
     prolongation.eliminate_zeros()
     # Without the room for what was zero.
     return prolongation.copy()
+
+
+def _every(count: int) -> IntArray:
+    return np.arange(count, dtype=np.int32)
+
+
+def _third(count: int) -> IntArray:
+    return np.arange(0, count, 3, dtype=np.int32)
 
 
 def _second(count: int) -> IntArray:
