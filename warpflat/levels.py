@@ -61,10 +61,10 @@ _WATCH_EVERY = 4
 _WATCH_SOFT = 20.0
 _CYCLES_ALONG_LINES = 2
 # At the start of a stiff cloth on a rectangular grid what is left on levels of no more vertices than this is rough: so many steps take as
-# much of it as a cycle, in a third of the time. Beside a crack it is not. The finest level there takes more steps, since the next one has
-# a ninth of its vertices.
+# much of it as a cycle, in a third of the time. Beside a crack it is not. The finest level there takes more steps after a correction, since
+# the next one has a ninth of its vertices.
 _STEPS_INSTEAD, _FEW = 16, 700
-_STEPS_AT_START = 6
+_STEPS_AFTER = 7
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
 LINE_WORK = 2.0
@@ -340,8 +340,7 @@ class Levels:
             return self.smooth(level, steps=_STEPS_INSTEAD)
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
-        steps = _STEPS_AT_START if brief and level == 0 else None
-        before = self.smooth(level, each_step, evaluated=level == 0, steps=steps)
+        before = self.smooth(level, each_step, evaluated=level == 0)
         if level == 0:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
@@ -361,7 +360,7 @@ class Levels:
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, state.pieces.mark())
-        energy = self.smooth(level, each_step, evaluated=True, steps=steps)
+        energy = self.smooth(level, each_step, evaluated=True, steps=_STEPS_AFTER if brief and level == 0 else None)
         higher = ~(energy <= before)
         if higher.any():
             _put_way(state, way.base, way.correction)
