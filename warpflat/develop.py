@@ -356,7 +356,8 @@ def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     """A piece that lies in a plane already, as it lies there: #V by 2 [m], the datum's chord upwards; None if it does not."""
     # Most do not, and a few of their vertices tell: by golden sections of their number, since every so many are one row or column.
     some = surface.vertices[(np.arange(_FEW_VERTICES) * _GOLDEN % 1.0 * len(surface.vertices)).astype(int)]
-    strays = np.linalg.svd(some - some.mean(axis=0), compute_uv=False)[-1]
+    away = some - some.mean(axis=0)
+    strays = np.sqrt(max(np.linalg.eigvalsh(away.T @ away)[0], 0.0))
     if strays > np.sqrt(_FEW_VERTICES) * 4 * _FLAT * np.linalg.norm(np.ptp(some, axis=0)):
         return None
     triangles, _ = triangulate(surface.faces)

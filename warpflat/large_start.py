@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.joined import join_networks
 from warpflat.levels import ENERGY_WORK, Levels
@@ -11,6 +12,8 @@ from warpflat.rungs import far_below
 from warpflat.upright import turn_upright
 
 __all__ = ["carry_up"]
+
+FloatArray = NDArray[np.float64]
 
 # Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
 # of a per cent.
@@ -40,17 +43,18 @@ def carry_up(state: Relaxation) -> Levels | None:
     levels = Levels(coarse, mend=True)
     levels.start()
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
-    carried, relaxed = np.empty_like(layout), coarse.positions()
-    for own, of, way in zip(state.vertices, coarse.vertices, below, strict=True):
+    carried, relaxed = list[FloatArray](), coarse.positions()
+    for of, way in zip(coarse.vertices, below, strict=True):
         up = relaxed[of]
         if way is not None:
             if way.rung is not None:
                 levels.leading[way.rung.step.surface] = way.rung
             for carry in way.carries:
                 up = carry(up)
-        carried[own] = up
-    turn_upright(state.upright, carried)
-    state.position.assign(carried)
+        carried.append(up)
+    there = carried[0] if len(carried) == 1 else np.concatenate(carried)
+    turn_upright(state.upright, there)
+    state.position.assign(there)
     state.work_units += ENERGY_WORK
     if (state.begin().potential < before.potential).all():
         return levels

@@ -145,15 +145,16 @@ def row_by_row(surface: Surface) -> RowByRow | None:
     faces, count = surface.faces, len(surface.vertices)
     if len(faces) == 0 or faces[0, 3] < 0:
         return None
-    columns, corner = int(np.ptp(faces[0])) - 1, faces[0] - faces[0].min()
+    corner = faces[0].tolist()
+    columns = max(corner) - 1
     if columns < 2 or count % columns or len(faces) != (count // columns - 1) * (columns - 1):
         return None
     places = {0: 0, 1: 1, columns: 2, columns + 1: 3}
-    a, b, c, d = (places.get(at, -1) for at in corner.tolist())
+    a, b, c, d = (places.get(at, -1) for at in corner)
     if sorted((a, b, c, d)) != [0, 1, 2, 3] or a + c != 3:
         return None
     as_expected = np.empty(len(faces), dtype=bool)
-    launch_each(is_row_by_row, len(faces), [faces, columns, wp.vec4i(*faces[0].tolist())], [as_expected])
-    if faces[0].min() != 0 or not as_expected.all():
+    launch_each(is_row_by_row, len(faces), [faces, columns, wp.vec4i(*corner)], [as_expected])
+    if not as_expected.all():
         return None
     return RowByRow(rows=count // columns, columns=columns, place=(a, b, c, d))
