@@ -381,20 +381,24 @@ def sum_strain_fields(
     stored: wp.array(dtype=wp.vec3d),
     products: wp.array(dtype=wp.mat33d),
 ):
-    """Sums over the springs around each vertex of k L^2 w, w their `strain_field` in a layout [J], and of k L^2 w w^T."""
+    """Sums over the springs around each vertex of k L^2 w, w their `strain_field` in a layout [J], and, if there is room for them, of
+    k L^2 w w^T."""
     i = natural(wp.tid() + first)
     total = wp.vec3d()
     squares = wp.mat33d()
+    asked = products.shape[0] > 0
     e = natural(offset[i])
     end = offset[i + 1]
     while e < end:
         field = strain_field(position[natural(neighbor[e])] - position[i])
         share = stiffness[e] * rest_length[e] * rest_length[e] * field
         total += share
-        squares += wp.outer(share, field)
+        if asked:
+            squares += wp.outer(share, field)
         e += 1
     stored[i] = total
-    products[i] = squares
+    if asked:
+        products[i] = squares
 
 
 @wp.kernel

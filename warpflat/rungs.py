@@ -45,14 +45,14 @@ class Rung:
     layout: FloatArray
 
 
-def _strain_fields(network: SpringNetwork, layout: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """3, and 3 by 3, sums over the springs: what they store of uniform strains, by their directions, and what each of three weights of
-    directions adds to that."""
+def _strain_fields(network: SpringNetwork, layout: FloatArray, *, products: bool = False) -> tuple[FloatArray, ...]:
+    """3, the sums over the springs of what they store of uniform strains, by their directions; if asked for, 3 by 3, what each of three
+    weights of directions adds to that."""
     s, count = network.spring_arrays, network.vertex_count
-    stored, products = np.empty((count, 3)), np.empty((count, 3, 3))
+    stored, added = np.empty((count, 3)), np.empty((count if products else 0, 3, 3))
     given = [layout, s.around.offset, s.around.neighbor, s.listed_length, s.listed_stiffness]
-    launch_each(sum_strain_fields, count, given, [stored, products])
-    return stored.sum(axis=0), products.sum(axis=0)
+    launch_each(sum_strain_fields, count, given, [stored, added])
+    return stored.sum(axis=0), added.sum(axis=0)
 
 
 def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray) -> None:
@@ -61,7 +61,7 @@ def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, 
     if network.model != "springs" or network.surface.is_quad.all():
         return
     wished, _ = _strain_fields(fine, fine_layout)
-    _, products = _strain_fields(network, layout)
+    _, products = _strain_fields(network, layout, products=True)
     factor = np.linalg.lstsq(products, wished, rcond=1e-6)[0]
     s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
     given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_WEIGHTS]

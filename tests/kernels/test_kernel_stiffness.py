@@ -140,6 +140,9 @@ def test_what_springs_store_by_their_directions_is_that_of_numpy(name: str):
     launch_each(sum_strain_fields, count, given, [stored, products])
     np.testing.assert_allclose(stored.sum(axis=0), 2.0 * fields.T @ energy, rtol=1e-12)
     np.testing.assert_allclose(products.sum(axis=0), 2.0 * fields.T @ (fields * energy[:, None]), rtol=1e-12)
+    alone = np.empty_like(stored)
+    launch_each(sum_strain_fields, count, given, [alone, np.empty((0, 3, 3))])
+    np.testing.assert_array_equal(alone, stored)
 
     factor, listed = np.array([1.4, 0.7, -2.0]), s.listed_stiffness.copy()
     given = [positions, around.offset, around.neighbor, wp.vec3d(*factor), 0.5, 1.2]
