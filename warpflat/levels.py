@@ -65,6 +65,9 @@ _CYCLES_ALONG_LINES = 2
 # the next one has a ninth of its vertices.
 _STEPS_INSTEAD, _FEW = 16, 700
 _STEPS_AFTER = 7
+# What rising between triangles leaves is mostly rough, since each mesh is uneven in its own way: in the first cycle so many steps before the
+# correction and after it spare another cycle.
+_STEPS_FIRST = 12, 8
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
 LINE_WORK = 2.0
@@ -184,6 +187,7 @@ class Levels:
         self.leading: dict[Surface, Rung] = {}
         self._watch_every = _watch_every(finest.network)
         self._memories: Sequence[CycleMemory] = ()
+        self._is_rough = False
         self.stale = False
         ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
         for rungs in zip(*ladders, strict=True):
@@ -340,7 +344,8 @@ class Levels:
             return self.smooth(level, steps=_STEPS_INSTEAD)
         if way is None:
             return self._settle(_AT_REST, _LITTLE_GAIN)
-        before = self.smooth(level, each_step, evaluated=level == 0)
+        first, self._is_rough = level == 0 and self._is_rough, level > 0 and self._is_rough
+        before = self.smooth(level, each_step, evaluated=level == 0, steps=_STEPS_FIRST[0] if first else None)
         if level == 0:
             self._count(level, -FORCE_WORK)
         state.evaluate_at_rest()
@@ -360,7 +365,8 @@ class Levels:
         self._correct(level, way)
         if level == 0 and self._memories:
             _come_to(state, self._memories, state.pieces.mark())
-        energy = self.smooth(level, each_step, evaluated=True, steps=_STEPS_AFTER if brief and level == 0 else None)
+        steps = _STEPS_FIRST[1] if first else _STEPS_AFTER if brief and level == 0 else None
+        energy = self.smooth(level, each_step, evaluated=True, steps=steps)
         higher = ~(energy <= before)
         if higher.any():
             _put_way(state, way.base, way.correction)
@@ -460,6 +466,7 @@ class Levels:
             sizes = [net.vertex_count for net in self._levels[number].state.network.pieces]
             if number and any(size > len(step.kept) for size, step in zip(sizes, way.steps, strict=True)):
                 self.cycle(number, brief=self._rises_smoothly)
+        self._is_rough = not (self._lattice or self._soft)
 
     @property
     def _rises_smoothly(self) -> bool:
