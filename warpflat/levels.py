@@ -65,8 +65,8 @@ _CYCLES_ALONG_LINES = 2
 # the next one has a ninth of its vertices.
 _STEPS_INSTEAD, _FEW = 16, 700
 _STEPS_AFTER = 7
-# What rising between triangles leaves is mostly rough, since each mesh is uneven in its own way: in the first cycle so many steps before the
-# correction and after it spare another cycle.
+# What rising between triangles leaves is mostly rough, since each mesh is uneven in its own way: in the first cycle so many steps before
+# the correction and after it spare another cycle.
 _STEPS_FIRST = 12, 8
 # In units of a step: evaluating the forces, a step along lines, evaluating the energy.
 FORCE_WORK = 1.0
