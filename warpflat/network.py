@@ -80,7 +80,6 @@ class SpringNetwork:
         shear_hold: shear stiffness of the springs that keeps threads straight [N/m], one for all or #F; the fabric's where that is less.
         parts: the networks of which this one was joined, to be relaxed side by side (see `warpflat.joined`); none of any other.
         springs, cells, guard, cloth: what the kernels take.
-        mass: #V [kg]. spring_stiffness: #V, sum of k_ij around each vertex, and a half of the stiffest [N/m].
         device: Warp device.
     """
 
@@ -101,8 +100,6 @@ class SpringNetwork:
     cloth: Cloth | None = field(init=False, default=None)
     seams: Seams | None = field(init=False, default=None)
     bonds: Bonds = field(init=False)
-    mass: wp.array = field(init=False)
-    spring_stiffness: wp.array = field(init=False)
 
     @classmethod
     def build(
@@ -167,10 +164,8 @@ class SpringNetwork:
         springs.rest_length = _on(device, s.listed_length, wp.float64)
         springs.pull = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
-        self.spring_stiffness = wp.empty(count, dtype=wp.float64, device=device)
         self.make_springs(s.listed_stiffness)
 
-        self.mass = _on(device, self.fabric.areal_density * c.vertex_areas, wp.float64)
         cells = Cells()
         cells.face = _on(device, c.faces, wp.vec4i)
         cells.first = _on(device, c.first, wp.int32)
@@ -206,16 +201,31 @@ class SpringNetwork:
         # Those of a membrane follow it.
         k_ij = listed_stiffness if self.model == "springs" else listed_stiffness.copy()
         self.springs.stiffness = _on(self.device, k_ij, wp.float64)
-        self._sum_stiffness()
+        vars(self).pop("spring_stiffness", None)
 
     def weigh(self, stiffness: FloatArray) -> None:
         """Give the springs (#S) of a membrane these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
         self.springs.stiffness.assign(self.spring_arrays.listed(stiffness))
-        self._sum_stiffness()
+        if "spring_stiffness" in vars(self):
+            self._sum_stiffness(self.spring_stiffness)
 
-    def _sum_stiffness(self) -> None:
+    def _sum_stiffness(self, around: wp.array) -> None:
         given = [self.springs.offset, self.springs.stiffness, _PAIR_SHARE]
-        launch_each(sum_stiffness, self.vertex_count, given, [self.spring_stiffness], device=self.device)
+        launch_each(sum_stiffness, self.vertex_count, given, [around], device=self.device)
+
+    # What only steps ask for: a network that is measured alone, or one of several that are stepped as one, has neither.
+
+    @cached_property
+    def mass(self) -> wp.array:
+        """#V [kg]."""
+        return _on(self.device, self.fabric.areal_density * self.cell_arrays.vertex_areas, wp.float64)
+
+    @cached_property
+    def spring_stiffness(self) -> wp.array:
+        """#V, sum of k_ij around each vertex, and a half of the stiffest [N/m]."""
+        around = wp.empty(self.vertex_count, dtype=wp.float64, device=self.device)
+        self._sum_stiffness(around)
+        return around
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
