@@ -20,6 +20,7 @@ from warpflat.coarsen import (
     _prolongation,
     coarser,
     coarser_surfaces,
+    has_coarser,
     inherit_levels,
     is_coarsest,
     levels_meanwhile,
@@ -248,6 +249,18 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     assert (middle <= there.max(axis=1) + 1e-9).all()
     np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
     assert spread_surface(surface, "fine") is found
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "quads", "triangles"),
+    [(7, 9, False, False), (11, 11, True, False), (200, 4, False, True), (200, 5, True, True), (30, 30, True, True)],
+)
+def test_whether_there_is_a_coarser_level_is_told_before_it_is_made(
+    columns: int, rows: int, quads: bool, triangles: bool
+):
+    for surface, wished in ((sheet(columns, rows), quads), (sheet(columns, rows, triangles=True), triangles)):
+        assert has_coarser(surface) == wished
+        assert bool(coarser_surfaces(surface)) == wished
 
 
 def test_stiff_cloth_has_a_coarser_one():

@@ -340,9 +340,10 @@ def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
     surface = sheet(4, 3, 0.01, 0.01, split=5)
     network = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], model="membrane", device=DEVICE)
     before, lists = network.spring_arrays.listed_stiffness.copy(), network.springs.stiffness.ptr
+    sums = network.spring_stiffness.ptr
     wished = np.random.default_rng(2).uniform(1.0, 9.0, network.spring_count)
     network.weigh(wished)
-    assert network.springs.stiffness.ptr == lists
+    assert (network.springs.stiffness.ptr, network.spring_stiffness.ptr) == (lists, sums)
     np.testing.assert_array_equal(network.spring_arrays.listed_stiffness, before)
     offset, neighbor = network.springs.offset.numpy(), network.springs.neighbor.numpy()
     between = {(int(i), int(j)): k for (i, j), k in zip(network.spring_arrays.ends, wished, strict=True)}
