@@ -98,7 +98,7 @@ class GridCarry:
         return [cubics_between(coarse, fine) for coarse, fine in self._places]
 
     def sample(self, values: FloatArray) -> FloatArray:
-        """#C by #K, values of the coarser grid from those of the finer one (#V by #K)."""
+        """#C by #K, values of the coarser grid from those of the finer one (#V by #K, three or fewer)."""
         by_rows, by_columns = (cubics_between(fine, coarse) for coarse, fine in self._places)
         sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
         of_rows, of_columns = ((cubics.column, cubics.weight) for cubics in (by_rows, by_columns))

@@ -114,13 +114,13 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
     """
     thinned = thinned_of(surface)
     if thinned is not None:
-        return _thinner(surface, thinned)
+        return _step_to(surface, thinned)
     return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
 
 
-def _thinner(surface: Surface, thinned: Thinned) -> Coarser:
+def _step_to(surface: Surface, thinned: Thinned) -> Coarser:
     return Coarser(
-        surface=_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
+        surface=_part_of_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
         kept=thinned.kept,
         transfer=thinned.transfer,
         face_of=thinned.face_of,
@@ -192,10 +192,10 @@ def _spread(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, Int
     if spread is None:
         return None
     carry = spread.carry(surface)
-    part = _quads(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
+    part = _part_of_quads(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
     thirds = thirds_of(part) if kind == "thirds" else None
     if thirds is not None:
-        _inherited[part] = replace(_thinner(part, thirds), is_lowest=True)
+        _inherited[part] = replace(_step_to(part, thirds), is_lowest=True)
     return part, carry, spread.face_of
 
 
@@ -220,7 +220,7 @@ def _prepare_levels(surface: Surface) -> None:
             _ = step.transfer.transpose
 
 
-def _quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
+def _part_of_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
     """A coarser level of quads. Creases are not looked for there: a level is only to lead to where the finer one is at rest, and as to that
     there is no difference."""
     part = _part(surface, vertices, faces, of_faces)

@@ -331,11 +331,10 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
 
     Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
     """
-    he = half_edges_of(surface)
     corner, _, weight = corner_triangles(cells.faces)
     # Around an inner vertex, once is one corner through which a ray to the right passes.
     in_question = np.zeros(len(positions), dtype=bool)
-    in_question[he.edges[he.count == 1]] = True
+    in_question[border_of(surface)] = True
     y, triangle = np.take(positions[:, 1], corner.T), weight == 1.0
     passed = np.zeros(len(positions), dtype=np.int64)
     for k in range(3):

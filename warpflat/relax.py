@@ -319,11 +319,8 @@ class Relaxation:
     def piece_energies(self) -> FloatArray:
         """#P by 3, the same of each piece."""
         spring, cells = self.potentials().T
-        kinetic = np.zeros_like(spring)
-        # Nothing moves before the first step.
-        if self.steps:
-            self._buffers.measure_motion.launch()
-            kinetic = self.pieces.of_vertices()
+        self._buffers.measure_motion.launch()
+        kinetic = self.pieces.of_vertices()
         if self.network.model == "springs":
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)

@@ -36,7 +36,7 @@ BoolArray = NDArray[np.bool_]
 # have every second one; and for cloth so soft that steps go along lines.
 SpreadKind = Literal["thirds", "halves", "fine"]
 
-# A grid of fewer rows or columns has no coarser one.
+# A grid of fewer rows or columns has no coarser one, or none of every third of them.
 _LEAST_LINES = 5
 _LEAST_THIRDS = 13
 # Quads that are left across a strip between two lines in which the border turns: a single one bends several times as stiffly as its cloth.

@@ -23,6 +23,7 @@ from warpflat.surface.lines import line_from_curve
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import chain_positions
 from warpflat.surface.topology import (
+    border_of,
     components,
     half_edges_of,
     launch_each,
@@ -123,8 +124,7 @@ def extend_to_border(surface: Surface, line: NDArray[np.int32]) -> tuple[NDArray
 
 
 def _on_border(surface: Surface) -> set[int]:
-    he = half_edges_of(surface)
-    return set(np.unique(he.edges[he.count == 1]).tolist())
+    return set(border_of(surface).tolist())
 
 
 def _ahead(surface: Surface, path: list[int]) -> list[int]:

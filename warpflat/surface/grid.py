@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.kernels.lattice import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
-from warpflat.surface.topology import half_edges_of, twins_of
+from warpflat.surface.topology import border_of, half_edges_of, twins_of
 
 __all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
 
@@ -119,9 +119,9 @@ def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice |
 
 def _bends(surface: Surface) -> BoolArray:
     """#V, where the border turns."""
-    he, count = half_edges_of(surface), len(surface.vertices)
+    count = len(surface.vertices)
     on_border = np.zeros(count, dtype=bool)
-    on_border[he.edges[he.count == 1]] = True
+    on_border[border_of(surface)] = True
     return on_border & (np.bincount(surface.faces.ravel(), minlength=count) != 2)
 
 
