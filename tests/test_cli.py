@@ -506,3 +506,15 @@ def test_a_mannequin_asked_for_in_two_ways_is_one_line_of_options(warpflat: Run,
     assert words in err
     assert err.count("\n") == 1
     assert "[mannequin" not in err
+
+
+# --- the program
+
+
+def test_program_ends_without_a_last_search_of_its_memory():
+    code = (
+        "import gc, sys; from warpflat.__main__ import program; sys.argv = ['warpflat', '--version']\n"
+        "usual = gc.get_threshold()[0]; code = program()\n"
+        "sys.exit(10 + code if gc.get_freeze_count() > 1000 and gc.get_threshold()[0] > usual else 1)"
+    )
+    assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 10
