@@ -1,4 +1,5 @@
-"""Curvature at the vertices of a surface: a paraboloid fitted to the neighbours of each."""
+"""Curvature at the vertices of a surface: a paraboloid fitted to the neighbours of each; and along the threads of a cloth that is worn
+on it."""
 
 import warp as wp
 
@@ -110,3 +111,63 @@ def fit_curvature(
             fitted = solve_scaled(matrix, right)
         normal = wp.normalize(normal + fitted[3] * u + fitted[4] * w)
     tensor[v] = fitted[0] * wp.outer(u, u) + fitted[1] * (wp.outer(u, w) + wp.outer(w, u)) + fitted[2] * wp.outer(w, w)
+
+
+@wp.func
+def unit(of: wp.vec3d):
+    """A vector's direction; of none, none."""
+    return of / wp.max(wp.length(of), wp.float64(1.0e-300))
+
+
+@wp.func
+def worn_along(deformation: wp.mat22d, thread: wp.vec2d, x: wp.vec3d, y: wp.vec3d):
+    """The direction in space of a thread's in the pattern; x, y: axes of the cell in space."""
+    worn = deformation * thread
+    worn = worn / wp.max(wp.length(worn), wp.float64(1.0e-300))
+    return worn[0] * x + worn[1] * y
+
+
+@wp.kernel
+def bend_threads(
+    positions: wp.array(dtype=wp.vec2d),
+    vertices: wp.array(dtype=wp.vec3d),
+    corner: wp.array(dtype=wp.vec3i),
+    laid: wp.array(dtype=wp.vec3d),
+    tensor: wp.array(dtype=wp.mat33d),
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    first: int,
+    # outputs
+    along: wp.array(dtype=wp.vec4d),
+):
+    """How the body bends along the threads of each cell: along the warp, along the weft, the twist between them, and the sum of its
+    principal curvatures [1/m].
+
+    positions: #V, the pattern [m]. vertices: #V, the body [m]. corner, laid: #C, as `cells.Cells` has them. tensor: #V, as
+    `fit_curvature` has it. warp, weft: unit, directions in the pattern. along: #C; the first three are 0 where a cell has no area in the
+    pattern.
+    """
+    c = wp.tid() + first
+    face = corner[c]
+    p = positions[face[0]]
+    d = positions[face[1]] - p
+    e = positions[face[2]] - p
+    det = d[0] * e[1] - d[1] * e[0]
+    deformation = wp.mat22d()
+    if det > wp.float64(0.0):
+        flat = laid[c]
+        deformation = wp.mat22d(
+            (flat[0] * e[1] - flat[1] * d[1]) / det,
+            (flat[1] * d[0] - flat[0] * e[0]) / det,
+            -flat[2] * d[1] / det,
+            flat[2] * d[0] / det,
+        )
+    q = vertices[face[0]]
+    x = unit(vertices[face[1]] - q)
+    b = vertices[face[2]] - q
+    y = unit(b - wp.dot(b, x) * x)
+    bend = (tensor[face[0]] + tensor[face[1]] + tensor[face[2]]) / wp.float64(3.0)
+    one = worn_along(deformation, warp, x, y)
+    other = worn_along(deformation, weft, x, y)
+    across = bend * other
+    along[c] = wp.vec4d(wp.dot(one, bend * one), wp.dot(other, across), wp.dot(one, across), wp.trace(bend))

@@ -77,6 +77,28 @@ def average_normals(
     mean[i] = there / wp.max(wp.length(there), TINY)
 
 
+@wp.kernel
+def measure_triangles(
+    vertices: wp.array(dtype=wp.vec3d),
+    triangles: wp.array(dtype=wp.vec3i),
+    first: int,
+    # outputs
+    area: wp.array(dtype=wp.float64),
+    product: wp.array(dtype=wp.vec3d),
+):
+    """area: #T, of triangles in space [m2]. product: #T, at each corner that of the two edges that leave it [m2]."""
+    i = natural(wp.tid() + first)
+    corner = triangles[i]
+    p = vertices[natural(corner[0])]
+    q = vertices[natural(corner[1])]
+    r = vertices[natural(corner[2])]
+    a = q - p
+    b = r - q
+    c = p - r
+    area[i] = wp.float64(0.5) * wp.length(wp.cross(a, c))
+    product[i] = wp.vec3d(-wp.dot(a, c), -wp.dot(a, b), -wp.dot(b, c))
+
+
 @wp.func
 def turn_along(from_normal: wp.vec3d, to_normal: wp.vec3d, diagonal: wp.vec3d, length: wp.float64):
     """How far the surface turns from one end of a diagonal to the other [rad], for small turns."""

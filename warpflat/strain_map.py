@@ -10,7 +10,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.mesh import Surface
+from warpflat.kernels.surface_cells import measure_triangles
+from warpflat.launching import launch_each
+from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import corner_triangles
 
 __all__ = [
@@ -191,33 +193,30 @@ def smooth_to_vertices(
 def _diffused(
     surface: Surface, area: NDArray[np.float64], energy: NDArray[np.float64], length: float
 ) -> NDArray[np.float64]:
-    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import cg, spsolve
 
     triangles, _, weight = corner_triangles(surface.faces)
-    rows, columns, values = [], [], []
-    for slot in range(3):
-        apex, i, j = (triangles[:, (slot + k) % 3] for k in range(3))
-        u, v = surface.vertices[i] - surface.vertices[apex], surface.vertices[j] - surface.vertices[apex]
-        twice_area = np.linalg.norm(np.cross(u, v), axis=1)
-        # Negative cotangents of obtuse corners could make densities negative, those of slivers are rounding noise:
-        # without them spreading is a little slower there and still conserves energy.
-        product = np.maximum(np.einsum("ij,ij->i", u, v), 0.0)
-        # A corner of less than 0.001 rad counts as one of that: it joins its neighbours as good as rigidly anyway.
-        cotangent = product / np.maximum(twice_area, 1e-3 * product + np.finfo(float).tiny)
-        half = 0.5 * weight * cotangent
-        rows += [i, j, i, j]
-        columns += [i, j, j, i]
-        values += [half, half, -half, -half]
+    triangle_area, product = _measured(surface, triangles)
+    # Negative cotangents of obtuse corners could make densities negative, those of slivers are rounding noise:
+    # without them spreading is a little slower there and still conserves energy.
+    product = np.maximum(product, 0.0)
+    # A corner of less than 0.001 rad counts as one of that: it joins its neighbours as good as rigidly anyway.
+    cotangent = product / np.maximum(2.0 * triangle_area[:, None], 1e-3 * product + np.finfo(float).tiny)
+    half = 0.25 * length**2 * weight[:, None] * cotangent
     count = len(surface.vertices)
-    stiffness = coo_matrix(
-        (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=(count, count)
-    )
+    across = np.roll(triangles, -1, axis=1).ravel(), np.roll(triangles, 1, axis=1).ravel()
+    joined = coo_array((half.ravel(), across), shape=(count, count)).tocsr()
+    joined = joined + joined.T
+    system = (diags_array(area + joined.sum(axis=1)) - joined).tocsr()
     used = np.flatnonzero(area > 0)
-    system = (diags(area) + 0.5 * length**2 * stiffness).tocsr()[used][:, used]
+    if len(used) < count:
+        system = system[used][:, used]
     # Heat does not come far in one step: a few dozen iterations, where a factor would grow faster than the mesh.
     first = energy[used] / area[used]
-    solved, left = cg(system, energy[used], x0=first, rtol=_EXACT, maxiter=_PATIENCE, M=diags(1.0 / system.diagonal()))
+    solved, left = cg(
+        system, energy[used], x0=first, rtol=_EXACT, maxiter=_PATIENCE, M=diags_array(1.0 / system.diagonal())
+    )
     smooth = np.zeros(count)
     smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
     return smooth
@@ -370,12 +369,21 @@ def _nearest_on_line(points: NDArray[np.float64], target: NDArray[np.float64]) -
     return nearest[int(np.argmin(np.linalg.norm(nearest - target, axis=1)))]
 
 
+@once_per_surface
 def _face_areas(surface: Surface) -> NDArray[np.float64]:
     """#F [m2]; a quad's is the mean of both ways of splitting it."""
     triangles, face, weight = corner_triangles(surface.faces)
-    a, b, c = (surface.vertices[triangles[:, slot]] for slot in range(3))
-    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
-    return np.bincount(face, weights=weight * area, minlength=len(surface.faces)).astype(np.float64)
+    area, _ = _measured(surface, triangles)
+    total = np.bincount(face, weights=weight * area, minlength=len(surface.faces)).astype(np.float64)
+    total.flags.writeable = False
+    return total
+
+
+def _measured(surface: Surface, triangles: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Of triangles (#T by 3 vertices): areas, and at each corner the product of the edges that leave it [m2]."""
+    area, product = np.empty(len(triangles)), np.empty((len(triangles), 3))
+    launch_each(measure_triangles, len(triangles), [surface.vertices, triangles], [area, product])
+    return area, product
 
 
 def _checked_density(values: ArrayLike, count: int, what: str) -> NDArray[np.float64]:

@@ -16,7 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError, is_number
 from warpflat.fabric import Fabric, grain_axes
+from warpflat.kernels.curvature import bend_threads
 from warpflat.kernels.membrane import compute_membrane_strain
+from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork
 from warpflat.strain_map import smooth_to_vertices
@@ -151,9 +153,11 @@ class WornFit:
 
 
 def _spread(values: FloatArray, area: FloatArray) -> dict[str, float]:
-    from warpflat.export.colours import weighted_percentile
+    from warpflat.export.colours import weighted_percentiles
 
-    spread = {f"p{percent:02d}": weighted_percentile(values, area, percent / 100) for percent in (5, 50, 95)}
+    percents = (5, 50, 95)
+    at = weighted_percentiles(values, area, [percent / 100 for percent in percents])
+    spread = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
     mean = float(values @ area) / max(float(area.sum()), 1e-300)
     return {"min": float(values.min()), **spread, "max": float(values.max()), "mean": mean}
 
@@ -230,11 +234,11 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArr
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     strain, stress = (wp.empty(count, dtype=wp.vec3d, device=device) for _ in range(2))
     energy, area = (wp.empty(count, dtype=wp.float64, device=device) for _ in range(2))
-    wp.launch(
+    launch_each(
         compute_membrane_strain,
-        dim=network.face_count,
-        inputs=[at, network.cells, cloth_of(network.fabric, grain_axes(network.grain_angle), device), 0],
-        outputs=[strain, stress, energy, area],
+        network.face_count,
+        [at, network.cells, cloth_of(network.fabric, grain_axes(network.grain_angle), device)],
+        [strain, stress, energy, area],
         device=device,
     )
     return np.array(strain.numpy()), np.array(stress.numpy()), np.maximum(np.array(area.numpy()), 0.0)
@@ -243,36 +247,14 @@ def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArr
 def _curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     """#C each: curvature of the body along the worn warp, along the worn weft, and the twist between them [1/m]."""
     cells, surface = network.cell_arrays, network.surface
-    corner = cells.corner
-    p = positions[corner]
-    D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-    det = D[:, 0, 0] * D[:, 1, 1] - D[:, 0, 1] * D[:, 1, 0]
-    inverse = (
-        np.stack([np.stack([D[:, 1, 1], -D[:, 0, 1]], -1), np.stack([-D[:, 1, 0], D[:, 0, 0]], -1)], -2)
-        / np.where(det > 0.0, det, 1.0)[:, None, None]
-    )
-    deformation = np.where((det > 0.0)[:, None, None], cells.edges @ inverse, 0.0)
-    q = surface.vertices[corner]
-    a, b = q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]
-    x = a / np.maximum(np.linalg.norm(a, axis=1), 1e-300)[:, None]
-    across = b - np.einsum("ij,ij->i", b, x)[:, None] * x
-    y = across / np.maximum(np.linalg.norm(across, axis=1), 1e-300)[:, None]
-    bend = curvature_tensors(surface)[corner].mean(axis=1)
-    trace = float((np.einsum("ijj->i", bend) * cells.area).sum())
-    if trace < 0.0:
+    warp, weft = (wp.vec2d(*axis) for axis in grain_axes(network.grain_angle))
+    along = np.empty((len(cells.laid), 4))
+    body = [surface.vertices, cells.corner, cells.laid, curvature_tensors(surface)]
+    launch_each(bend_threads, len(along), [np.asarray(positions, dtype=np.float64), *body, warp, weft], [along])
+    if float(along[:, 3] @ cells.area) < 0.0:
         # Wound the other way round: a body is convex on the whole.
-        bend = -bend
-    threads = []
-    for axis in grain_axes(network.grain_angle):
-        worn = deformation @ axis
-        worn = worn / np.maximum(np.linalg.norm(worn, axis=1), 1e-300)[:, None]
-        threads.append(worn[:, :1] * x + worn[:, 1:] * y)
-    warp, weft = threads
-    return (
-        np.einsum("ij,ijk,ik->i", warp, bend, warp),
-        np.einsum("ij,ijk,ik->i", weft, bend, weft),
-        np.einsum("ij,ijk,ik->i", warp, bend, weft),
-    )
+        along = -along
+    return along[:, 0], along[:, 1], along[:, 2]
 
 
 def _smoothed(surface: Surface, values: FloatArray, length: float) -> FloatArray:

@@ -100,11 +100,11 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
     from warpflat.surface import line_between
-    from warpflat.surface.topology import border_edges
+    from warpflat.surface.topology import border_of
 
     surface = result.surface
     worst = int(result.vertex_origin[misfit.vertex])
-    border = np.unique(border_edges(surface.faces))
+    border = border_of(surface)
     points = surface.vertices
     for name, line in surface.lines.items():
         row = np.asarray(line)

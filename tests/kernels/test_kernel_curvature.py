@@ -1,10 +1,11 @@
-"""Curvature of a vertex, against NumPy's least squares over the same neighbours."""
+"""Curvature of a vertex, against NumPy's least squares over the same neighbours; along threads, against the cells' deformations."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-from warpflat.kernels.curvature import fit_curvature
+import warp as wp
+from warpflat.kernels.curvature import bend_threads, fit_curvature
 
 from warpflat.launching import launch_each
 
@@ -49,3 +50,34 @@ def test_curvature_is_that_of_least_squares(begin: int) -> None:
     assert np.abs(tensors[begin]).max() > 0.1
     np.testing.assert_array_equal(tensors[begin + 1], 0.0)
     assert np.isnan(tensors[begin + len(lists) :]).all()
+
+
+def test_threads_bend_as_the_body_does_along_them() -> None:
+    rng = np.random.default_rng(1)
+    count = 40
+    body, pattern = rng.normal(size=(12, 3)), rng.normal(size=(12, 2))
+    corner = np.array([rng.choice(12, 3, replace=False) for _ in range(count)], dtype=np.int32)
+    tensor = rng.normal(size=(12, 3, 3))
+    tensor += tensor.transpose(0, 2, 1)
+    a, b = body[corner[:, 1]] - body[corner[:, 0]], body[corner[:, 2]] - body[corner[:, 0]]
+    x = a / np.linalg.norm(a, axis=1)[:, None]
+    y = b - (b * x).sum(axis=1)[:, None] * x
+    y /= np.linalg.norm(y, axis=1)[:, None]
+    laid = np.column_stack([(a * x).sum(axis=1), (b * x).sum(axis=1), (b * y).sum(axis=1)])
+    warp, weft = np.array([-0.6, 0.8]), np.array([0.8, 0.6])
+    along = np.empty((count, 4))
+    given = [pattern, body, corner, laid, tensor, wp.vec2d(*warp), wp.vec2d(*weft)]
+    launch_each(bend_threads, count, given, [along])
+    mirrored = 0
+    for c, (p, q, r) in enumerate(corner):
+        bend = (tensor[p] + tensor[q] + tensor[r]) / 3.0
+        edges = np.column_stack([pattern[q] - pattern[p], pattern[r] - pattern[p]])
+        expected = np.zeros(3)
+        if np.linalg.det(edges) > 0.0:
+            deformation = np.column_stack([a[c], b[c]]) @ np.linalg.inv(edges)
+            one, other = (of / np.linalg.norm(of) for of in (deformation @ warp, deformation @ weft))
+            expected = np.array([one @ bend @ one, other @ bend @ other, one @ bend @ other])
+        else:
+            mirrored += 1
+        np.testing.assert_allclose(along[c], [*expected, np.trace(bend)], rtol=1e-9, atol=1e-12)
+    assert 0 < mirrored < count

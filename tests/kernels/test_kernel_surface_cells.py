@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from warpflat.kernels.surface_cells import measure_triangles
 
 from warpflat.cells import cells_of
+from warpflat.launching import launch_each
 from warpflat.shapes import make_shape
 from warpflat.surface import Surface, corner_triangles, make_surface, unfold_quad_diagonals
 from warpflat.surface.topology import places_of
@@ -162,3 +164,16 @@ def test_cells_are_those_of_numpy(name: str):
     np.testing.assert_allclose(cells.area, 0.5 * weight * twice, rtol=1e-13)
     at_vertices = np.bincount(corner.ravel(), np.repeat(cells.area / 3.0, 3), minlength=len(surface.vertices))
     np.testing.assert_allclose(cells.vertex_areas, at_vertices, rtol=1e-12)
+
+
+def test_triangles_are_measured_at_each_corner():
+    rng = np.random.default_rng(0)
+    points = rng.normal(size=(12, 3))
+    triangles = np.array([rng.choice(12, 3, replace=False) for _ in range(30)], dtype=np.int32)
+    triangles[4] = 3
+    area, product = np.empty(30), np.empty((30, 3))
+    launch_each(measure_triangles, 30, [points, triangles], [area, product])
+    p, q, r = points[triangles].transpose(1, 0, 2)
+    np.testing.assert_allclose(area, 0.5 * norm(np.cross(q - p, r - p)), rtol=1e-13)
+    expected = np.column_stack([dot(q - p, r - p), dot(r - q, p - q), dot(p - r, q - r)])
+    np.testing.assert_allclose(product, expected, rtol=1e-12, atol=1e-14)

@@ -2,10 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb", "weighted_percentile"]
+__all__ = [
+    "SMALLEST_SCALE",
+    "energy_colours",
+    "energy_scale",
+    "linear_rgb",
+    "weighted_percentile",
+    "weighted_percentiles",
+]
 
 # Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
 SMALLEST_SCALE = 1e-6  # [J/m2]
@@ -61,9 +70,16 @@ def energy_scale(density: ArrayLike, areas: ArrayLike) -> float:
 
 def weighted_percentile(values: ArrayLike, weights: ArrayLike, fraction: float) -> float:
     """The smallest of `values` (#N) below or at which at least `fraction` of the `weights` (#N) lie; 0 for none."""
+    return weighted_percentiles(values, weights, [fraction])[0]
+
+
+def weighted_percentiles(values: ArrayLike, weights: ArrayLike, fractions: Sequence[float]) -> list[float]:
+    """For each fraction what `weighted_percentile` is."""
     value, weight = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
     if value.size == 0:
-        return 0.0
+        return [0.0] * len(fractions)
     order = np.argsort(value)
     running = np.cumsum(weight[order])
-    return float(value[order[min(np.searchsorted(running, fraction * running[-1]), value.size - 1)]])
+    at = np.searchsorted(running, np.asarray(fractions) * running[-1])
+    found: list[float] = value[order[np.minimum(at, value.size - 1)]].tolist()
+    return found

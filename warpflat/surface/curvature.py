@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from warpflat.kernels.curvature import fit_curvature
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import corner_triangles
+from warpflat.surface.unfold import vertex_normals
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -36,7 +36,8 @@ def curvature_tensors(surface: Surface) -> NDArray[np.float64]:
     Returns:
         #V by 3 by 3 [1/m], symmetric.
     """
-    count, normal = len(surface.vertices), _vertex_normals(surface)
+    count, normal = len(surface.vertices), vertex_normals(surface)
+    normal[~normal.any(axis=1)] = (0.0, 0.0, 1.0)
     ring, tensors = _ring(surface), np.zeros((count, 3, 3))
     for first in range(0, count, _BLOCK):
         pairs = ring[first : first + _BLOCK] @ ring
@@ -55,16 +56,3 @@ def _ring(surface: Surface) -> csr_matrix:
     face = np.broadcast_to(np.arange(len(faces))[:, None], faces.shape)[used]
     incidence = coo_matrix((np.ones(len(face), dtype=np.int32), (face, faces[used])), shape=(len(faces), count)).tocsr()
     return (incidence.T @ incidence).astype(bool).astype(np.int32).tocsr()
-
-
-def _vertex_normals(surface: Surface) -> NDArray[np.float64]:
-    corner, _, weight = corner_triangles(surface.faces)
-    p = surface.vertices[corner]
-    vector = weight[:, None] * np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
-    total = np.stack(
-        [np.bincount(corner.ravel(), np.repeat(vector[:, k], 3), minlength=len(surface.vertices)) for k in range(3)],
-        axis=1,
-    )
-    length = np.linalg.norm(total, axis=1)
-    total[length == 0.0] = (0.0, 0.0, 1.0)
-    return np.asarray(total / np.where(length > 0.0, length, 1.0)[:, None])

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.surface.mesh import Surface
+from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import half_edges_of, mesh_edges
 
 if TYPE_CHECKING:
@@ -44,8 +44,7 @@ class EdgeGraph:
     def __init__(self, surface: Surface) -> None:
         self.edges = half_edges_of(surface).edges
         self.size = len(surface.vertices)
-        ends = surface.vertices[self.edges]
-        self.length = np.linalg.norm(ends[:, 1] - ends[:, 0], axis=1)
+        self.length = _edge_lengths(surface)
 
     def are_joined(self, a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
         """Whether edges a-b exist."""
@@ -64,6 +63,15 @@ class EdgeGraph:
     def path(self, start: int, end: int, weight: NDArray[np.float64] | None = None) -> NDArray[np.int32]:
         """The path of least weight (by default: of least length) from `start` to `end`."""
         return path_in(self.matrix(self.length if weight is None else weight), start, end)
+
+
+@once_per_surface
+def _edge_lengths(surface: Surface) -> NDArray[np.float64]:
+    """#E [m]."""
+    a, b = half_edges_of(surface).edges.T
+    length = np.asarray(np.linalg.norm(surface.vertices[b] - surface.vertices[a], axis=1))
+    length.flags.writeable = False
+    return length
 
 
 def path_in(matrix: csr_matrix, start: int, end: int) -> NDArray[np.int32]:

@@ -19,7 +19,7 @@ from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import order_by, places_of
 
-__all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases"]
+__all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -92,6 +92,17 @@ def corners_of(surface: Surface) -> ByVertex:
     else:
         offset, entry = corners_around(surface.faces, len(surface.vertices))
     return read_only(ByVertex(offset=offset, entry=entry))
+
+
+def vertex_normals(surface: Surface) -> FloatArray:
+    """#V by 3, the mean normal of the faces around each vertex, by area, of length 1; 0 where there are none, or they cancel."""
+    normal, at_vertex = np.empty((len(surface.faces), 3)), np.empty((len(surface.vertices), 3))
+    launch_each(
+        find_bends, len(normal), [surface.vertices, surface.faces], [normal, np.empty(len(normal), dtype=np.int8)]
+    )
+    around = corners_of(surface)
+    launch_each(average_normals, len(at_vertex), [around.offset, around.entry, normal], [at_vertex])
+    return at_vertex
 
 
 def lay_cells(vertices: FloatArray, faces: IntArray, crease: NDArray[np.int8], cell: IntArray) -> FloatArray:
