@@ -14,7 +14,7 @@ from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters
-from warpflat.export.picture_page import DPI, PAGE_WIDTH, Pen
+from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_views import DrawnView, facets_of, surface_view
 
 if TYPE_CHECKING:

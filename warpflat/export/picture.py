@@ -14,7 +14,8 @@ from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
-from warpflat.export.picture_page import DPI, PAGE_WIDTH, TOP_MARGIN, Pen, Row, draw_colour_bar, draw_row, lay_out
+from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out
+from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import facets_of, pattern_view, surface_view
 from warpflat.surface.mesh import Surface

@@ -10,14 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.export.colours import energy_colours
-from warpflat.export.labels import LabelRoom, Spot, along_line, away_from, beyond_ends
-from warpflat.export.picture_views import HALO_LAYER, INK, DrawnView, View
+from warpflat.export.labels import LabelRoom, Spot
+from warpflat.export.picture_lines import draw_lines
+from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, POINT, Pen
+from warpflat.export.picture_views import INK, DrawnView, View
 
-__all__ = ["DPI", "PAGE_WIDTH", "TOP_MARGIN", "Pen", "Row", "draw_colour_bar", "draw_row", "lay_out"]
+__all__ = ["TOP_MARGIN", "Row", "draw_colour_bar", "draw_row", "lay_out"]
 
-DPI = 150
-PAGE_WIDTH = 12.5  # [in], as all that follows
-TOP_MARGIN = 0.30
+TOP_MARGIN = 0.30  # [in], as all that follows
 _LEFT, _RIGHT = 0.55, 1.75  # the colour bar stands in the right margin
 _BETWEEN = 1.35  # from surface to pattern: the height's dimension line, and labels that do not fit inside
 _BESIDE = 0.75  # right of the pattern, for labels
@@ -26,12 +26,8 @@ _SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
 _COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
 _BAR_WIDTH = 0.2
 _BAR_TIP = 0.05  # of its length, for what lies above the scale
-_SHORTEST_GRAIN = 0.28  # half its length
-_GREY = (0.36, 0.38, 0.42)
-_GRAIN = (0.02, 0.27, 0.66)
-_LABEL_SIZE = 8.5  # [pt]
+_SHORTESTGRAIN = 0.28  # half its length
 _TICK_SIZE = 8.5  # [pt]
-_POINT = 1.0 / 72.0  # [in]
 
 
 @dataclass(kw_only=True, eq=False)
@@ -65,69 +61,6 @@ class Row:
     @property
     def height(self) -> float:
         return self.head + self.band + _BELOW
-
-
-class Pen:
-    """Text and lines on the page, measured in inches from its lower left corner."""
-
-    def __init__(self, renderer: Any) -> None:
-        self._renderer = renderer
-        self._measured: dict[tuple[str, float, str], tuple[float, float]] = {}
-        self.axes: Any = None
-        self.page_height = 0.0
-
-    def open_page(self, figure: Any, height: float) -> None:
-        """Lay axes over the whole page whose units are inches."""
-        self.page_height = height
-        self.axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        self.axes.set_axis_off()
-        self.axes.set_xlim(0.0, PAGE_WIDTH)
-        self.axes.set_ylim(0.0, height)
-        self.axes.set_autoscale_on(False)
-
-    def measure(self, text: str, size: float, weight: str = "normal") -> tuple[float, float]:
-        """Width and height of a line of text [in] at a size [pt]."""
-        from matplotlib.font_manager import FontProperties
-
-        key = (text, size, weight)
-        if key not in self._measured:
-            font = FontProperties(size=size, weight=weight)
-            width, height, _ = self._renderer.get_text_width_height_descent(text, font, ismath=False)
-            self._measured[key] = width / DPI, height / DPI
-        return self._measured[key]
-
-    def write(self, x: float, y: float, text: str, size: float, *, halo: bool = False, **options: Any) -> None:
-        """A text; with a halo it stays legible over colours and lines."""
-        from matplotlib.patheffects import withStroke
-
-        options = {"color": INK, "ha": "left", "va": "center", "zorder": 8, "parse_math": False} | options
-        drawn = self.axes.text(x, y, text, fontsize=size, **options)
-        if halo:
-            drawn.set_path_effects([withStroke(linewidth=2.4, foreground=(1.0, 1.0, 1.0, 0.85))])
-
-    def line(
-        self, points: NDArray[np.float64], *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
-    ) -> None:
-        """A polyline (#N by 2); with a halo it stays visible on dark colours."""
-        from matplotlib.lines import Line2D
-
-        x, y = points.T
-        if halo:
-            below: dict[str, Any] = {"color": (1.0, 1.0, 1.0, 0.7), "linewidth": width + 1.6, "zorder": HALO_LAYER}
-            self.axes.add_artist(Line2D(x, y, **below))
-        self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, linestyle=style, zorder=5))
-
-    def arrow(self, ends: NDArray[np.float64], *, width: float, colour: Any, head: float, halo: bool = False) -> None:
-        """A straight line (2 by 2) with a filled head at either end."""
-        from matplotlib.patches import FancyArrowPatch
-        from matplotlib.patheffects import withStroke
-
-        style = f"<|-|>,head_length={head},head_width={0.42 * head}"
-        options = {"arrowstyle": style, "color": colour, "linewidth": width, "shrinkA": 0, "shrinkB": 0, "zorder": 6}
-        patch = FancyArrowPatch(tuple(ends[0]), tuple(ends[1]), **options)
-        if halo:
-            patch.set_path_effects([withStroke(linewidth=width + 1.6, foreground=(1.0, 1.0, 1.0, 0.7))])
-        self.axes.add_patch(patch)
 
 
 def lay_out(pen: Pen, rows: Sequence[Row]) -> float:
@@ -171,7 +104,7 @@ def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
     """Draw a row whose upper edge is at `top` [in], its colours up to `scale` [J/m2]."""
     pen.write(_LEFT, top - 0.14, row.name, 15, fontweight="bold")
     for index, text in enumerate(row.caption_lines):
-        pen.write(_LEFT, top - 0.42 - 0.20 * index, text, 9.5, color=_GREY)
+        pen.write(_LEFT, top - 0.42 - 0.20 * index, text, 9.5, color=GREY)
     middle = top - row.head - 0.5 * row.band
     size = row.inches_per_metre
     body, flat = row.on_body.size * size, row.pattern.size * size
@@ -197,64 +130,19 @@ def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
     unnamed: dict[str, None] = {}
     for drawn, left, right in ((on_body, 0.1, between), (pattern, between, PAGE_WIDTH - _RIGHT + 0.1)):
         page = (left, floor, right, top - row.head + 0.2)
-        unnamed |= dict.fromkeys(_feature_lines(pen, room, drawn, row.datum, page))
+        unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, row.datum, page))
     if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, row.grain_angle, inside=False):
         unnamed["grain"] = None
     if unnamed:
         text = f"not labelled for want of room: {', '.join(unnamed)}"
-        pen.write(_LEFT, floor + 0.06, text, 7.5, color=_GREY)
+        pen.write(_LEFT, floor + 0.06, text, 7.5, color=GREY)
 
 
 def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:
     x = 0.5 * (drawn.box[0] + drawn.box[2])
     width, height = pen.measure(words, 9.5)
-    pen.write(x, y, words, 9.5, color=_GREY, ha="center", fontstyle="italic")
+    pen.write(x, y, words, 9.5, color=GREY, ha="center", fontstyle="italic")
     room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
-
-
-def _feature_lines(
-    pen: Pen, room: LabelRoom, drawn: DrawnView, datum: str | None, page: tuple[float, float, float, float]
-) -> list[str]:
-    """Draw the lines of a view with their names, and return the names for which there was no room."""
-    unnamed = []
-    stretches = {}
-    for name, parts in drawn.view.lines.items():
-        is_datum = name == datum
-        style = (0, (9, 2.5, 2, 2.5)) if is_datum else "-"
-        visible = [drawn.visible_line(part) for part in parts]
-        stretches[name] = max(visible, key=_length_of)
-        for part, points in zip(parts, visible, strict=True):
-            if drawn.view.vectors is None or is_datum:
-                if len(points) > 1:
-                    pen.line(points, width=1.3, colour=_GRAIN if is_datum else INK, style=style, halo=True)
-            else:
-                drawn.draw_segments(pen.axes, np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True, zorder=5)
-    for name, points in stretches.items():
-        if len(points) < 2:
-            continue
-        others = [line for other, line in stretches.items() if other != name and len(line) > 1]
-        width, height = pen.measure(name, _LABEL_SIZE)
-        beside = [*along_line(points, width, 0.62 * height + 0.02), *beyond_ends(points, width, height)]
-        spot = room.place(beside, width, height, page, others)
-        spot = spot or room.place(list(away_from(points, width)), width, height, page, others)
-        if spot is None:
-            unnamed.append(name)
-            continue
-        colour = _GRAIN if name == datum else INK
-        angle = float(np.degrees(spot.angle))
-        options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": colour}
-        pen.write(spot.x, spot.y, name, _LABEL_SIZE, halo=True, **options)
-        if spot.leader is not None:
-            near = spot.x - np.copysign(0.5 * width + 0.04, spot.x - spot.leader[0])
-            leader = np.array([spot.leader, (near, spot.y)])
-            pen.line(leader, width=0.6, colour=colour)
-            room.take_line(leader, 0.03)
-    return unnamed
-
-
-def _length_of(line: NDArray[np.float64]) -> float:
-    """The length of a polyline (#N by 2) [in]."""
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
 
 
 def _grain(
@@ -270,7 +158,7 @@ def _grain(
     along = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]]) @ (along / length)
     along *= 1.0 if along[1] >= 0 else -1.0
     across = np.array([along[1], -along[0]])
-    text_width, text_height = pen.measure("grain", _LABEL_SIZE)
+    text_width, text_height = pen.measure("grain", LABEL_SIZE)
     if inside:
         place = _grain_inside(drawn, 0.5 * (line[0] + line[-1]), along, across, length, text_height)
     else:
@@ -279,12 +167,12 @@ def _grain(
         return False
     centre, half = place
     ends = np.array([centre - half * along, centre + half * along])
-    pen.arrow(ends, width=1.3, colour=_GRAIN, head=5.5, halo=True)
+    pen.arrow(ends, width=1.3, colour=GRAIN, head=5.5, halo=True)
     room.take_line(ends, 0.12)
     middle = centre + across * (0.5 * text_height + 0.07)
     angle = float(np.degrees(np.arctan2(along[1], along[0])))
-    options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": _GRAIN}
-    pen.write(float(middle[0]), float(middle[1]), "grain", _LABEL_SIZE, halo=True, **options)
+    options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": GRAIN}
+    pen.write(float(middle[0]), float(middle[1]), "grain", LABEL_SIZE, halo=True, **options)
     room.take_line(middle + np.array([[-0.5], [0.5]]) * text_width * along, text_height)
     return True
 
@@ -300,14 +188,14 @@ def _grain_inside(
     """The middle of the arrow and half its length [in], where it and its word lie on the cloth."""
     left, bottom, right, top = drawn.box
     width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
-    for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
+    for half in (0.2 * length, 0.12 * length, _SHORTESTGRAIN):
         for shift in (0.0, 0.15, -0.15, 0.3, -0.3):
             for aside in (0.12, -0.12, 0.2, -0.2, 0.3, -0.3, 0.42, -0.42):
                 centre = middle + shift * length * along + aside * width * across
                 run = centre + np.linspace(-half, half, 15)[:, None] * along
                 margin = 0.10
                 edges = np.concatenate([run - margin * across, run + (margin + text_height) * across])
-                if half >= _SHORTEST_GRAIN and drawn.covers(edges).all():
+                if half >= _SHORTESTGRAIN and drawn.covers(edges).all():
                     return centre, half
     return None
 
@@ -334,26 +222,26 @@ def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
     ):
         ends = np.array([start, end])
         if np.ptp(ends, axis=0).max() > 0.3:
-            pen.arrow(ends, width=0.6, colour=_GREY, head=3.5)
+            pen.arrow(ends, width=0.6, colour=GREY, head=3.5)
         else:
-            pen.line(ends, width=0.6, colour=_GREY)
+            pen.line(ends, width=0.6, colour=GREY)
         for tick, _ in ticks:
             mark = [(tick, y + 0.14), (tick, y - 0.06)] if start[1] == end[1] else [(x + 0.18, tick), (x - 0.06, tick)]
-            pen.line(np.array(mark), width=0.6, colour=_GREY)
+            pen.line(np.array(mark), width=0.6, colour=GREY)
         room.take_line(ends, 0.1)
     text = _length(width)
     text_width, text_height = pen.measure(text, 9)
     middle = 0.5 * (left + right)
-    pen.write(middle, y - 0.14, text, 9, ha="center", color=_GREY)
+    pen.write(middle, y - 0.14, text, 9, ha="center", color=GREY)
     room.take_box(middle - 0.5 * text_width, y - 0.14 - 0.5 * text_height, middle + 0.5 * text_width, y - 0.07)
     text = _length(height)
     text_width, text_height = pen.measure(text, 9)
     middle = 0.5 * (bottom + top)
     if top - bottom > text_width + 0.1:
-        pen.write(x - 0.12, middle, text, 9, ha="center", color=_GREY, rotation=90, rotation_mode="anchor")
+        pen.write(x - 0.12, middle, text, 9, ha="center", color=GREY, rotation=90, rotation_mode="anchor")
         room.take_box(x - 0.2, middle - 0.5 * text_width, x - 0.04, middle + 0.5 * text_width)
     else:
-        pen.write(x - 0.10, middle, text, 9, ha="right", color=_GREY)
+        pen.write(x - 0.10, middle, text, 9, ha="right", color=GREY)
         room.take_box(x - 0.10 - text_width, middle - 0.08, x - 0.1, middle + 0.08)
 
 
@@ -371,7 +259,7 @@ def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: fl
             (left + 0.5 * part * wide, y), 0.5 * wide, 0.06, facecolor=fill, edgecolor=INK, linewidth=0.7, zorder=6
         )
         pen.axes.add_patch(box)
-    pen.write(left + 0.5 * wide, y - 0.12, _length(metres, digits=0), 9, ha="center", color=_GREY)
+    pen.write(left + 0.5 * wide, y - 0.12, _length(metres, digits=0), 9, ha="center", color=GREY)
     room.take_box(left - 0.1, y - 0.22, left + wide + 0.1, y + 0.08)
 
 
@@ -409,25 +297,25 @@ def draw_colour_bar(
     pen.axes.add_patch(Polygon(outline, fill=False, edgecolor="black", linewidth=0.6, zorder=6))
     places, words, power = _ticks(scale, end - bottom)
     for place, word in zip(bottom + (end - bottom) * places / scale, words, strict=True):
-        pen.line(np.array([(right, place), (right + 3 * _POINT, place)]), width=0.6, colour="black")
-        pen.write(right + 6.5 * _POINT, place, word, _TICK_SIZE, color="black", va="center_baseline")
+        pen.line(np.array([(right, place), (right + 3 * POINT, place)]), width=0.6, colour="black")
+        pen.write(right + 6.5 * POINT, place, word, _TICK_SIZE, color="black", va="center_baseline")
     if power:
-        pen.write(left, top + 3 * _POINT, power, 8, color="black", va="bottom")
+        pen.write(left, top + 3 * POINT, power, 8, color="black", va="bottom")
     wide = max(pen.measure(word, _TICK_SIZE)[0] for word in words)
     aside: dict[str, Any] = {"rotation": 90, "rotation_mode": "anchor", "ha": "center", "va": "top"}
-    pen.write(right + 12.5 * _POINT + wide, 0.5 * (bottom + end), f"{quantity} [J/m²]", 9.5, **aside)
+    pen.write(right + 12.5 * POINT + wide, 0.5 * (bottom + end), f"{quantity} [J/m²]", 9.5, **aside)
     total = float(areas.sum())
     if above.any() and total > 0.0:
         share = float(areas[above].sum()) / total
         text = f"clipped: {_percent(share)} of the\narea is above, up to\n{density.max():.3g} J/m²"
-        pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=_GREY, va="top", linespacing=1.35)
+        pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=GREY, va="top", linespacing=1.35)
 
 
 def _ticks(scale: float, length: float) -> tuple[NDArray[np.float64], list[str], str]:
     """Round values from 0 to `scale` for a bar of this length [in], as words, and the power of ten that these leave out."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
-    most = int(np.clip(length / (2.0 * _TICK_SIZE * _POINT), 1, 9))
+    most = int(np.clip(length / (2.0 * _TICK_SIZE * POINT), 1, 9))
     values = np.asarray(MaxNLocator(nbins=most, steps=[1, 2, 2.5, 5, 10]).tick_values(0.0, scale))
     values = values[values <= scale * (1.0 + 1e-9)]
     formatter: Any = ScalarFormatter()
