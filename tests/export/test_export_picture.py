@@ -11,8 +11,9 @@ from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 from warpflat.export import PicturePiece, write_picture
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale, weighted_percentile
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
-from warpflat.export.labels import LabelRoom, Spot, along_line, beyond_ends
+from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_ends, leader_of, spread
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
+from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import png_bytes
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.topology import border_edges, triangulate
@@ -345,3 +346,74 @@ def test_a_label_follows_its_line() -> None:
     assert abs(first.x) == pytest.approx(0.1)
     assert first.y == pytest.approx(1.0)
     assert list(along_line(steep[:, ::-1] * 0.2, 0.5, 0.1)) == []
+
+
+def test_a_leader_runs_over_no_text_but_over_passable_lines() -> None:
+    page = (0.0, 0.0, 3.0, 2.0)
+    led = [Spot(x=1.5, y=1.0, angle=0.0, leader=(0.2, 1.0)), Spot(x=1.5, y=1.5, angle=0.0, leader=(0.2, 1.0))]
+    wall = np.array([[0.8, 0.5], [0.8, 1.1]])
+    for passable, expected in ((True, led[0]), (False, led[1])):
+        room = LabelRoom()
+        room.take_line(wall, 0.05, passable=passable)
+        assert room.place(led, 0.5, 0.1, page) == expected
+        # A text stands on neither.
+        assert room.place([Spot(x=0.8, y=0.8, angle=0.0)], 0.5, 0.1, page) is None
+    ends = leader_of(led[0], 0.5)
+    assert ends is not None
+    np.testing.assert_allclose(ends, [[0.2, 1.0], [1.21, 1.0]])
+
+
+def test_spots_beside_a_point_are_led_to_it_unless_they_touch_it() -> None:
+    for side in (1.0, -1.0):
+        spots = list(beside([(1.0, 2.0)], 0.6, [side], level=2.0))
+        assert spots[0].leader is None
+        assert sum(spot.leader is None for spot in spots) == 1
+        assert all(side * (spot.x - 1.0) > 0.379 for spot in spots)
+    assert next(beside([(1.0, 2.0)], 0.6, [1.0], level=2.3)).leader == (1.0, 2.0)
+    points = [(1.0, 2.0), (3.0, 4.0)]
+    spots = list(beside(points, 0.6, [1.0, -1.0]))
+    assert {spot.leader for spot in spots} == set(points)
+    # Of all points in turn, the nearest first.
+    lengths = [np.hypot(spot.x - spot.leader[0], spot.y - spot.leader[1]) for spot in spots if spot.leader is not None]
+    assert lengths[:4] == pytest.approx([0.38] * 4)
+    assert np.mean(lengths[:100]) < np.mean(lengths[-100:])
+
+
+@pytest.mark.parametrize(
+    ("wanted", "places"),
+    [
+        ([5.0, 3.0, 1.0], [5.0, 3.0, 1.0]),
+        ([5.0, 5.0, 1.0], [5.5, 4.5, 1.0]),
+        ([3.0, 3.0, 3.0, 2.9], [4.475, 3.475, 2.475, 1.475]),
+        ([9.8, 9.8, 0.1], [10.0, 9.0, 0.1]),
+        ([0.1, 0.0], [1.0, 0.0]),
+        ([], []),
+    ],
+)
+def test_names_one_below_the_other_stay_as_near_as_they_can(wanted: list[float], places: list[float]) -> None:
+    np.testing.assert_allclose(spread(wanted, 1.0, 0.0, 10.0), places)
+
+
+def test_names_across_a_narrow_piece_stand_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    rows, quads = grid(4, 40)
+    x, y = np.meshgrid(np.linspace(0.0, 0.05, 4), np.linspace(0.0, 0.5, 40))
+    strip = surface(np.stack([x, y, 0.02 * np.cos(40.0 * x)], axis=-1).reshape(-1, 3), quads, "strip")
+    lines = {f"a name as long as this, {k}": rows[at] for k, at in enumerate((4, 12, 13, 14, 30))}
+    written: list[tuple[str, float, float]] = []
+    write = Pen.write
+
+    def told(self, x, y, text, size, **options) -> None:
+        if text in lines and options["rotation"] == 0:
+            written.append((text, x, y))
+        assert "not labelled" not in text or options["color"] != GREY
+        write(self, x, y, text, size, **options)
+
+    monkeypatch.setattr(Pen, "write", told)
+    write_picture(tmp_path / "strip.png", [piece_of(strip, lines=lines, surface_lines=lines)])
+    assert sorted(text for text, _, _ in written) == sorted([*lines, *lines])
+    for view in (written[:5], written[5:]):
+        by_height = sorted(view, key=lambda label: label[2])
+        # In the order of their lines, each on the same side, with room between.
+        assert [text for text, _, _ in by_height] == list(lines)
+        assert np.ptp([x for _, x, _ in view]) < 0.6
+        assert np.diff([y for _, _, y in by_height]).min() > 0.1

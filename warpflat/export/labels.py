@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import islice, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["LabelRoom", "Spot", "along_line", "away_from", "beyond_ends"]
+__all__ = [
+    "LabelRoom",
+    "Spot",
+    "along_line",
+    "at_shares",
+    "away_from",
+    "beside",
+    "beyond_ends",
+    "in_batches",
+    "leader_of",
+    "rectangles",
+    "spread",
+]
+
+# From the end of a leader to its text [in].
+_GAP = 0.04
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -28,6 +43,7 @@ class LabelRoom:
 
     def __init__(self) -> None:
         self._discs = np.empty((0, 3))
+        self._passable = np.empty((0, 3))
 
     def take_box(self, left: float, bottom: float, right: float, top: float) -> None:
         """Keep labels out of a box."""
@@ -36,42 +52,108 @@ class LabelRoom:
         middle = Spot(x=0.5 * (left + right), y=0.5 * (bottom + top), angle=0.0 if flat else 0.5 * math.pi)
         self._add(_discs(middle, max(width, height), min(width, height)))
 
-    def take_line(self, points: NDArray[np.float64], thickness: float) -> None:
-        """Keep labels off a polyline (#N by 2) [in]."""
+    def take_line(self, points: NDArray[np.float64], thickness: float, *, passable: bool = False) -> None:
+        """Keep labels off a polyline (#N by 2) [in], and leaders, unless it is passable."""
         for a, b in pairwise(points):
             length = float(np.linalg.norm(b - a))
             spot = Spot(x=float(a[0] + b[0]) / 2, y=float(a[1] + b[1]) / 2, angle=float(np.arctan2(*(b - a)[::-1])))
-            self._add(_discs(spot, length + thickness, thickness))
+            discs = _discs(spot, length + thickness, thickness)
+            if passable:
+                self._passable = np.concatenate([self._passable, discs])
+            else:
+                self._add(discs)
 
     def place(
         self,
-        spots: Sequence[Spot],
+        spots: Iterable[Spot],
         width: float,
         height: float,
         page: tuple[float, float, float, float],
         avoid: Sequence[NDArray[np.float64]] = (),
+        *,
+        may_cross: bool = True,
     ) -> Spot | None:
-        """Take the first of `spots` at which a text of this size [in] lies free within `page`, or None.
+        """Take the first of `spots` at which a text of this size [in] lies free within `page`, and its leader over no other, or None.
 
-        The lines in `avoid` (#N by 2 each) are crossed only where every other spot is worse.
+        The lines in `avoid` (#N by 2 each) are crossed only where every other spot is worse, and if they may be.
         """
         lines = np.concatenate([_resampled(line, 0.5 * height) for line in avoid]) if avoid else np.empty((0, 2))
         off_lines = np.column_stack([lines, np.zeros(len(lines))])
         left, bottom, right, top = page
-        for obstacles in (np.concatenate([self._discs, off_lines]), self._discs):
-            for spot in spots:
-                discs = _discs(spot, width, height)
-                low, high = (discs[:, :2] - discs[:, 2:]).min(axis=0), (discs[:, :2] + discs[:, 2:]).max(axis=0)
-                if low[0] < left or low[1] < bottom or high[0] > right or high[1] > top:
-                    continue
-                distance = np.hypot(*(discs[:, None, :2] - obstacles[None, :, :2]).transpose(2, 0, 1))
-                if (distance >= discs[:, None, 2] + obstacles[None, :, 2]).all():
-                    self._add(discs)
-                    return spot
+        taken = np.concatenate([self._discs, self._passable])
+        # A few at a time where one look is enough: to make a spot may take longer than to look at it.
+        spots = list(spots) if may_cross else spots
+        for obstacles in (np.concatenate([taken, off_lines]), taken)[: 1 + may_cross]:
+            for some in in_batches(spots):
+                discs = np.array([_discs(spot, width, height) for spot in some])
+                low = (discs[..., :2] - discs[..., 2:]).min(axis=1)
+                high = (discs[..., :2] + discs[..., 2:]).max(axis=1)
+                fits = (low >= (left, bottom)).all(axis=1) & (high <= (right, top)).all(axis=1)
+                for k in np.flatnonzero(fits & _apart(discs, obstacles)).tolist():
+                    if self._lets_pass(some[k], width):
+                        self._add(discs[k])
+                        return some[k]
         return None
+
+    def _lets_pass(self, spot: Spot, width: float) -> bool:
+        """Whether a spot's leader runs over nothing; where it begins a line may have its own."""
+        leader = leader_of(spot, width)
+        if leader is None:
+            return True
+        ink = _resampled(leader, 0.03)[3:]
+        return bool(_apart(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
 
     def _add(self, discs: NDArray[np.float64]) -> None:
         self._discs = np.concatenate([self._discs, discs])
+
+
+def leader_of(spot: Spot, width: float) -> NDArray[np.float64] | None:
+    """2 by 2, the leader from where it begins to a text so wide [in]; None of a spot without one."""
+    if spot.leader is None:
+        return None
+    side = np.copysign(1.0, spot.x - spot.leader[0])
+    return np.array([spot.leader, (spot.x - side * (0.5 * width + _GAP), spot.y)])
+
+
+def rectangles(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.float64]:
+    """#S by #N by 2, points all over a text of this size at each spot [in]."""
+    along = np.linspace(-0.5 * width, 0.5 * width, max(3, math.ceil(width / height)))
+    x, y = (of.ravel() for of in np.meshgrid(along, (-0.5 * height, 0.0, 0.5 * height)))
+    at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
+    left, low, c, s = at.T[:, :, None]
+    return np.stack([left + c * x - s * y, low + s * x + c * y], axis=-1)
+
+
+def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
+    """Places as near as may be to those wanted, which fall, each at least so far below the one before, between the bounds if there is room.
+
+    Those that come too near to each other move together, as far up as down.
+    """
+    groups: list[tuple[float, int]] = []  # the middle of each, and how many
+    for place in wanted:
+        middle, count = place, 1
+        while groups and groups[-1][0] - middle < 0.5 * (groups[-1][1] + count) * apart:
+            above, more = groups.pop()
+            middle, count = (above * more + middle * count) / (more + count), more + count
+        groups.append((middle, count))
+    places = [middle + (0.5 * (count - 1) - k) * apart for middle, count in groups for k in range(count)]
+    for i, least in enumerate(low + apart * np.arange(len(places))[::-1]):
+        places[i] = max(places[i], float(least))
+    return [min(place, high - apart * i) for i, place in enumerate(places)]
+
+
+def in_batches(spots: Iterable[Spot], most: int = 50) -> Iterator[list[Spot]]:
+    """So many at a time."""
+    left = iter(spots)
+    while some := list(islice(left, most)):
+        yield some
+
+
+def _apart(discs: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
+    """#S, of each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
+    away = discs[:, :, None, :2] - others[:, :2]
+    reach = discs[:, :, None, 2] + others[:, 2]
+    return np.asarray((np.einsum("snmk,snmk->snm", away, away) >= reach**2).all(axis=(1, 2)))
 
 
 def _discs(spot: Spot, width: float, height: float) -> NDArray[np.float64]:
@@ -101,7 +183,7 @@ def along_line(line: NDArray[np.float64], width: float, clearance: float) -> Ite
     def at(distance: float) -> NDArray[np.float64]:
         return np.array([np.interp(distance, reached, line[:, axis]) for axis in range(2)])
 
-    for share in (0.5, 0.35, 0.65, 0.22, 0.78, 0.1, 0.9):
+    for share in (0.5, 0.42, 0.58, 0.35, 0.65, 0.28, 0.72, 0.22, 0.78, 0.16, 0.84, 0.1, 0.9):
         centre = min(max(share * total, 0.52 * width), total - 0.52 * width)
         before, after = at(centre - 0.5 * width), at(centre + 0.5 * width)
         direction = (after - before) / max(float(np.linalg.norm(after - before)), 1e-12)
@@ -125,6 +207,40 @@ def beyond_ends(line: NDArray[np.float64], width: float, height: float) -> Itera
         yield Spot(x=float(end[0] + right * (0.5 * width + 0.08)), y=float(end[1]), angle=0.0)
         up = 1.0 if outwards[1] >= 0 else -1.0
         yield Spot(x=float(end[0]), y=float(end[1] + up * (0.5 * height + 0.08)), angle=0.0)
+
+
+# How far out and how much higher a text may stand than the point that it names [in], the nearest first; rather out than up or down.
+_AROUND = sorted(
+    (
+        (0.08 + 0.06 * step, rise)
+        for step in range(24)
+        for rise in (0.0, 0.07, -0.07, 0.15, -0.15, 0.25, -0.25, 0.36, -0.36)
+    ),
+    key=lambda way: math.hypot(*way) + 0.5 * abs(way[1]),
+)
+
+
+def beside(
+    points: Sequence[tuple[float, float]], width: float, sides: Sequence[float], *, level: float | None = None
+) -> Iterator[Spot]:
+    """Level spots to the sides (right 1, left -1) of points [in], the nearest first, each with a leader to its point.
+
+    At a `level`, if one is given; there a text that stands right beside its point has no leader.
+    """
+    for far, rise in _AROUND:
+        for point in points:
+            y = (point[1] if level is None else level) + rise
+            touches = level is not None and far == _AROUND[0][0] and abs(y - point[1]) < 0.05
+            for side in sides:
+                x = point[0] + side * (far + 0.5 * width)
+                yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
+
+
+def at_shares(line: NDArray[np.float64], shares: Sequence[float]) -> NDArray[np.float64]:
+    """Points of a polyline (#N by 2) [in] at these shares of its length, one for each."""
+    reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    places = np.asarray(shares) * reached[-1]
+    return np.column_stack([np.interp(places, reached, line[:, axis]) for axis in range(2)])
 
 
 def away_from(line: NDArray[np.float64], width: float) -> Iterator[Spot]:

@@ -228,7 +228,7 @@ def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
         for tick, _ in ticks:
             mark = [(tick, y + 0.14), (tick, y - 0.06)] if start[1] == end[1] else [(x + 0.18, tick), (x - 0.06, tick)]
             pen.line(np.array(mark), width=0.6, colour=GREY)
-        room.take_line(ends, 0.1)
+        room.take_line(ends, 0.1, passable=True)
     text = _length(width)
     text_width, text_height = pen.measure(text, 9)
     middle = 0.5 * (left + right)
