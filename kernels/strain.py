@@ -1,9 +1,10 @@
-"""Worn strain and strain energy of the cloth, per cell, in the fabric's axes: paper eqs. (1)-(3)."""
+"""Worn strain and strain energy of the cloth, per cell, in the fabric's axes: paper eqs. (1)-(3), and by the membrane's own law."""
 
 import warp as wp
 
-from .cells import Cells, across, cell_corner, cell_weight, count_cells, edge_matrix, flat_edges, on_body
+from .cells import Cells, across, cell_corner, cell_weight, count_cells, edge_matrix, flat_edges, laid_edges, on_body
 from .indices import natural
+from .membrane import Cloth, sheared_threads, stretched_sheet
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
@@ -173,3 +174,47 @@ def average_over_faces(
     face_stress[f] = s
     face_energy[f] = stored
     face_area[f] = total
+
+
+@wp.kernel
+def compute_membrane_strain(
+    position: wp.array(dtype=wp.vec2d),
+    cells: Cells,
+    cloth: Cloth,
+    first: int,
+    # outputs
+    strain: wp.array(dtype=wp.vec3d),
+    stress: wp.array(dtype=wp.vec3d),
+    energy: wp.array(dtype=wp.float64),
+    area: wp.array(dtype=wp.float64),
+):
+    """Worn strain against the unstretched cloth, with the membrane's stresses and energy; as `compute_worn_strain`.
+
+    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
+    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    """
+    f = natural(wp.tid() + first)
+    face = cells.face[f]
+    k = int(0)
+    count = count_cells(face)
+    while k < count:
+        c = natural(cells.first[f] + k)
+        D = flat_edges(position, cell_corner(face, k))
+        det = wp.determinant(D)
+        area[c] = wp.float64(0.5) * det * cell_weight(face)
+        e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+        if det > wp.float64(0.0):
+            F = laid_edges(cells.laid[c]) * wp.inverse(D)
+            worn_warp = F * cloth.warp
+            worn_weft = F * cloth.weft
+            e = wp.vec3d(
+                wp.length(worn_warp) - wp.float64(1.0),
+                wp.length(worn_weft) - wp.float64(1.0),
+                wp.dot(worn_warp, worn_weft),
+            )
+        law = stretched_sheet(wp.vec2d(e[0], e[1]), cloth)
+        across = sheared_threads(e[2], cloth)
+        strain[c] = e
+        stress[c] = wp.vec3d(law[0], law[1], across[0])
+        energy[c] = (law[2] + across[1]) * area[c]
+        k += 1

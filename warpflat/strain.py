@@ -13,8 +13,13 @@ import warp as wp
 from numpy.typing import NDArray
 
 from warpflat.fabric import Fabric, grain_axes
-from warpflat.kernels.membrane import compute_membrane_strain
-from warpflat.kernels.strain import Membrane, average_over_faces, compute_strain_energy, compute_worn_strain
+from warpflat.kernels.strain import (
+    Membrane,
+    average_over_faces,
+    compute_membrane_strain,
+    compute_strain_energy,
+    compute_worn_strain,
+)
 from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork

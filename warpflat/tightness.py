@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError, is_number
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.curvature import bend_threads
-from warpflat.kernels.membrane import compute_membrane_strain
+from warpflat.kernels.strain import compute_membrane_strain
 from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork

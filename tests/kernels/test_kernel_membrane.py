@@ -10,7 +10,8 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import corner_vertices
-from warpflat.kernels.membrane import compute_membrane_energy, compute_membrane_strain, evaluate_membrane
+from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane
+from warpflat.kernels.strain import compute_membrane_strain
 
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.membrane import cloth_of
