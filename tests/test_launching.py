@@ -11,10 +11,11 @@ import pytest
 import warp as wp
 from warpflat.kernels.cells import compute_guard_energy
 
+from warpflat.cores import thread_count
 from warpflat.develop import develop
 from warpflat.errors import InputError
 from warpflat.fabric import find_fabric
-from warpflat.launching import Launch, Sequence, record, split_range, thread_count
+from warpflat.launching import Launch, Sequence, record, split_range
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation, RelaxOptions
 from warpflat.shapes import bodice

@@ -26,8 +26,9 @@ from scipy.sparse import csr_array
 
 from warpflat.carry import GridCarry, LatticeCarry
 from warpflat.cells import cells_of, creases_of
+from warpflat.cores import thread_count
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
-from warpflat.launching import record, thread_count
+from warpflat.launching import record
 from warpflat.springs import unweighed_springs
 from warpflat.sums import begins
 from warpflat.surface.grid import rows_and_columns

@@ -18,16 +18,16 @@ import contextlib
 import os
 import threading
 from collections.abc import Sequence as SequenceOf
-from functools import lru_cache, partial
+from functools import partial
 from typing import Any
 
 import numpy as np
 import warp as wp
 
-from warpflat.errors import InputError
+from warpflat.cores import thread_count
 from warpflat.packing import Command, commands_of
 
-__all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range", "thread_count"]
+__all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range"]
 
 # A range shorter than this is not worth waking a thread for (benchmarks/threads.py measures it).
 _LEAST_RANGE = 2048
@@ -35,24 +35,6 @@ _LEAST_RANGE = 2048
 _ALIGNMENT = 64
 # Runs after which a sequence on a CUDA device becomes a graph, which takes as long as several of them.
 _GRAPH_AFTER = 2
-
-
-def thread_count() -> int:
-    """Threads used if nothing else is asked for: ``WARPFLAT_THREADS``, or the cores this process may use.
-
-    Raises:
-        InputError: the variable is not a whole number of at least 1.
-    """
-    return _thread_count(os.environ.get("WARPFLAT_THREADS", "").strip())
-
-
-@lru_cache
-def _thread_count(wished: str) -> int:
-    if not wished:
-        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
-    if not wished.isdecimal() or int(wished) < 1:
-        raise InputError(f"WARPFLAT_THREADS = {wished!r}; must be a whole number of threads, 1 or more")
-    return int(wished)
 
 
 def split_range(size: int, parts: int, *, least: int | None = None) -> list[tuple[int, int]]:

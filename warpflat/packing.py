@@ -18,6 +18,8 @@ from typing import Any
 import numpy as np
 import warp as wp
 
+from warpflat.compiling import compile_usual
+
 __all__ = ["Command", "commands_of"]
 
 Command = Callable[[], None]
@@ -53,6 +55,8 @@ def commands_of(
             # Of two threads that load a module at once one has its code unloaded by the other.
             with _loading:
                 form = _forms.get((kernel, device.alias))
+                if form is None:
+                    compile_usual(kernel.module, device)
                 form = form or _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
                 if form.fits:
                     _forms[kernel, device.alias] = form
