@@ -517,7 +517,7 @@ def cuts(
       warpflat cuts scenes/bodice.toml
       warpflat cuts scenes/bodice.toml --apply 1 --out cut
     """
-    from warpflat.console import ledger_table
+    from warpflat.console import ProgressBar, ledger_table
     from warpflat.export import output_folder, write_json
     from warpflat.ledger_picture import write_ledger_picture
     from warpflat.scene import load_scene, scene_ledger
@@ -525,7 +525,8 @@ def cuts(
 
     loaded = load_scene(scene)
     _start_warp()
-    with output_folder(out if out is not None else Path("out") / loaded.name) as folder:
+    target = out if out is not None else Path("out") / loaded.name
+    with ProgressBar(loaded.name, hidden=quiet or as_json), output_folder(target) as folder:
         ledger = scene_ledger(loaded, by=by, device=device)
         story = None if apply is None else story_of_entry(ledger, apply)
         write_json(folder / "ledger.json", ledger.as_dict())

@@ -10,6 +10,7 @@ from pathlib import Path
 
 import warp as wp
 
+from warpflat.activity import doing
 from warpflat.cores import thread_count
 
 __all__ = ["compile_usual"]
@@ -47,6 +48,7 @@ def compile_usual(module: wp.Module, device: wp.Device) -> None:
     threads = min(thread_count(), _MOST_THREADS)
     if device.is_cuda or threads == 1 or name not in _USUAL or _is_compiled(module):
         return
+    doing("compiling kernels, once on this machine")
     for each in _USUAL:
         import_module(f"{package}.{each}")
     missing = [own for own in (wp.get_module(f"{package}.{each}") for each in _USUAL) if not _is_compiled(own)]

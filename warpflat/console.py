@@ -5,10 +5,12 @@ from __future__ import annotations
 import math
 import sys
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import asdict, fields
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
+from warpflat.activity import listening
 from warpflat.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -28,11 +30,13 @@ __all__ = [
 ]
 
 _REFRESH = 0.1  # [s]
+_STEPS = "{desc}: {n_fmt} steps [{elapsed}{postfix}]"
+_DOING = "{desc} [{elapsed}]"
 _AMISS = 0.2  # [mm] of a seam or constraint that is told
 
 
 class ProgressBar:
-    """Steps, energy and residual on stderr while a run goes on; nothing where stderr is no terminal or `hidden`."""
+    """Steps, energy and residual on stderr while a run goes on, or what else it does; nothing where stderr is no terminal or `hidden`."""
 
     def __init__(self, name: str, *, hidden: bool = False) -> None:
         """Show nothing yet: `name` is what is being flattened."""
@@ -40,6 +44,7 @@ class ProgressBar:
         self._hidden = hidden or not sys.stderr.isatty()
         self._bar: Any = None
         self._stage = ""
+        self._listening = ExitStack()
 
     def __enter__(self) -> ProgressBar:
         if not self._hidden:
@@ -50,15 +55,23 @@ class ProgressBar:
                 file=sys.stderr,
                 leave=False,
                 mininterval=_REFRESH,
-                bar_format="{desc}: {n_fmt} steps [{elapsed}{postfix}]",
+                bar_format=_DOING,
             )
+            self._listening.enter_context(listening(self.say))
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._listening.close()
         if self._bar is not None:
             self._bar.close()
+
+    def say(self, words: str) -> None:
+        """Show what is being done."""
+        if self._bar is not None:
+            self._bar.bar_format = _DOING
+            self._bar.set_description_str(f"{self._name}: {words}", refresh=True)
 
     def __call__(self, progress: Progress) -> None:
         """Show where the run stands."""
@@ -67,6 +80,7 @@ class ProgressBar:
         if progress.stage != self._stage and progress.step == 0:
             self._bar.reset()
         self._stage = progress.stage
+        self._bar.bar_format = _STEPS
         self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
         told = f"{progress.spring_energy * 1e3:.4g} mJ"
         if math.isfinite(progress.residual):

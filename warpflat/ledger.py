@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from warpflat.activity import doing
 from warpflat.candidates import Candidate, Peaks, find_candidates, find_peaks
 from warpflat.cutting import CutPlan, cut, refine_along
 from warpflat.darts import seam_kind
@@ -156,7 +157,8 @@ def make_ledger(
     peaks = find_peaks(result)
     chosen = find_candidates(result, peaks) if candidates is None else candidates
     entries, refused = [], []
-    for candidate in chosen:
+    for number, candidate in enumerate(chosen, 1):
+        doing(f"cut {number} of {len(chosen)}, {candidate.name}")
         if on_candidate is not None:
             on_candidate(candidate)
         try:

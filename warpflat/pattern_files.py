@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from warpflat.activity import doing
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.from_garment import EdgeRules
 from warpflat.words import counted
@@ -185,6 +186,7 @@ def _drawn(
     if not options.formats and options.cloth is None:
         return WrittenPattern()
     folder = prepare_folder(to)
+    doing("drafting the pattern")
     try:
         pattern, notes = make()
         drafted, told = _drafted(pattern, options.tolerance)
@@ -259,6 +261,7 @@ def _write(
     from warpflat.export.svg import write_svg
 
     file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
+    doing(f"writing {file.name}")
     if kind == "dxf":
         write_dxf(drafted, file, dialect=dialect, sizes=sizes)
     elif kind == "svg":
@@ -278,6 +281,7 @@ def _marker(
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern import make_marker
 
+    doing(f"laying the marker, {seconds} s at most")
     try:
         marker = make_marker(drafted, cloth, seconds=seconds)
     except InputError as error:

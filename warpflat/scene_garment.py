@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from warpflat.activity import doing
 from warpflat.constraints import Constraint
 from warpflat.flattening import Progress
 from warpflat.garment import Garment, flatten_form
@@ -104,6 +105,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     """
     settings = scene.settings
     relax, fabric = scene_relax_options(scene), scene_fabric(scene)
+    doing("building the mannequin")
     mannequin, form = scene_form(scene)
     with told_by(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
@@ -180,6 +182,7 @@ def run_garment(
         }
         if writer is not None:
             _last_frames(writer, garment)
+    doing("measuring how it fits")
     files = garment.save(out, picture=settings.output.picture)
     if settings.wear is not None and settings.output.picture:
         from warpflat.wear_picture import write_wear_sheet

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.activity import doing
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
@@ -99,6 +101,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     from matplotlib.figure import Figure
 
     require_writable(path)
+    doing(f"drawing {Path(path).name}")
     span = np.ptp(result.positions, axis=0)
     width = 3.4
     height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
@@ -139,6 +142,7 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
     from matplotlib.figure import Figure
 
     require_writable(path)
+    doing(f"drawing {Path(path).name}")
     spans = np.array([np.ptp(result.positions, axis=0) for result in results])
     inches = min(_COLUMN / max(float(spans[:, 0].max()), 1e-9), _TALLEST / max(float(spans[:, 1].max()), 1e-9))
     column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25

@@ -5,11 +5,13 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.activity import doing
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
@@ -78,6 +80,7 @@ def write_picture(
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     require_writable(path)
+    doing(f"drawing {Path(path).name}")
     called = titles([piece.name for piece in pieces], is_drawn)
     rows = [_prepared(piece, called[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
