@@ -8,6 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.pattern.spline_lengths import with_lengths
+
 __all__ = ["Curve", "arc_lengths", "chords", "fit_curve", "turning_angles"]
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
@@ -20,15 +22,11 @@ TOLERANCE = 1e-4
 LENGTH = 6e-5
 #: What an error of length [m] weighs against one of place, which counts in tolerances.
 LENGTH_WEIGHT = 8e-6
-#: A control point's way from where the fit put it weighs as much as this share of the same error in a point's place.
-HELD = 20.0
 #: A curve of another length than its points' chords may lie this many tolerances from them.
 OTHER_LENGTHS = 3.0
 #: A curve that is to keep near its points is given the lengths of one that runs inside them by these shares of the
 #: tolerance, until it does keep near; and its lengths then count by so much less.
 INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
-#: Steps in which a fit is brought to its lengths, and points of its quadrature between two points of the border.
-GAUSS_NEWTON, GAUSS = 8, 6
 #: The chords by which a curve is drawn or cut stay this close [m] to it.
 CHORD = 2e-5
 
@@ -257,7 +255,7 @@ def _length_keeping_spline(
     control[[0, -1]] = points[[0, -1]]
     if not np.isfinite(control).all():
         return None
-    control, off = _with_lengths(knots, control, points, arc, tolerance, weighed)
+    control, off = with_lengths(knots, control, points, arc, tolerance, weighed)
     spline = BSpline(knots, control, 3)
     breaks = np.unique(knots)
     place, slope = spline(breaks), spline(breaks, 1)
@@ -275,63 +273,6 @@ def _elevated(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArra
     """A parabola as a cubic: knots and control points."""
     a, b, c = control
     return np.repeat([0.0, 1.0], 4), np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
-
-
-def _with_lengths(
-    knots: NDArray[np.float64],
-    control: NDArray[np.float64],
-    points: NDArray[np.float64],
-    arc: NDArray[np.float64],
-    tolerance: float,
-    weighed: float,
-) -> tuple[NDArray[np.float64], float]:
-    """Control points moved as little as gives the curve, up to each of the points, the length `arc`.
-
-    Gauss-Newton on places, lengths and, softly, the control points themselves. The second value is by how much [m] the
-    length is still off, at worst.
-    """
-    from scipy.interpolate import BSpline
-
-    at = arc / arc[-1]
-    node, weight = np.polynomial.legendre.leggauss(GAUSS)
-    span = np.diff(at)
-    quadrature = (at[:-1, None] + span[:, None] * (node + 1) / 2).ravel()
-    weights = (span[:, None] * weight / 2).ravel()
-    basis = BSpline(knots, np.eye(len(control)), 3)
-    value, slope = basis(at), basis(quadrature, 1)
-    free = slice(1, len(control) - 1)
-    inner = control[free].shape[0]
-    fit = np.kron(value[1:-1, free], np.eye(2)) / tolerance
-    # Few points leave control points free to wander along the curve: they are held, softly, where the fit put them.
-    start, hold = control[free].copy(), np.eye(2 * inner) / (HELD * tolerance)
-
-    def residual(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
-        tangent = slope @ control
-        speed = np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)
-        short = np.cumsum((weights * speed).reshape(-1, GAUSS).sum(axis=1)) - arc[1:]
-        away = (value @ control - points)[1:-1] / tolerance
-        moved = (control[free] - start) / (HELD * tolerance)
-        return np.concatenate([away.ravel(), short / weighed, moved.ravel()]), tangent, speed
-
-    now, tangent, speed = residual(control)
-    for _ in range(GAUSS_NEWTON):
-        rate = (weights / speed)[:, None, None] * slope[:, free, None] * tangent[:, None, :]
-        rate = np.cumsum(rate.reshape(-1, GAUSS, 2 * inner).sum(axis=1), axis=0)
-        jacobian = np.concatenate([fit, rate / weighed, hold])
-        # The normal equations are well enough conditioned by the hold, and ten times as quick as least squares.
-        move = -np.linalg.solve(jacobian.T @ jacobian, jacobian.T @ now).reshape(-1, 2)
-        for share in (1.0, 0.5, 0.25, 0.1):
-            tried = control.copy()
-            tried[free] += share * move
-            then, tangent, speed = residual(tried)
-            if then @ then < now @ now:
-                break
-        else:
-            break
-        control, now = tried, then
-        if np.abs(move).max() < 1e-8:
-            break
-    return control, float(np.abs(now[fit.shape[0] :][: len(arc) - 1]).max() * weighed)
 
 
 def chords(points: NDArray[np.float64]) -> Curve:
