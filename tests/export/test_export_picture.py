@@ -11,7 +11,7 @@ from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 from warpflat.export import PicturePiece, write_picture
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale, weighted_percentile
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
-from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_ends, leader_of, spread
+from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_ends, leader_of, points_on, spread
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import png_bytes
@@ -331,12 +331,12 @@ def test_labels_do_not_overlap() -> None:
 
 
 def test_labels_avoid_other_lines_where_they_can() -> None:
-    crossing = np.array([[1.0, 0.0], [1.0, 2.0]])
+    crossing = points_on(np.array([[1.0, 0.0], [1.0, 2.0]]), 0.1)
     spots = [Spot(x=1.0, y=1.0, angle=0.0), Spot(x=2.0, y=1.0, angle=0.0)]
     room = LabelRoom()
-    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), [crossing]) == spots[1]
-    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), [crossing]) == spots[0]
-    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), [crossing]) is None
+    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), crossing) == spots[1]
+    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), crossing) == spots[0]
+    assert room.place(spots, 0.5, 0.1, (0, 0, 3, 2), crossing) is None
 
 
 def test_a_label_follows_its_line() -> None:

@@ -20,6 +20,7 @@ __all__ = [
     "beyond_ends",
     "in_batches",
     "leader_of",
+    "points_on",
     "rectangles",
     "spread",
 ]
@@ -50,14 +51,14 @@ class LabelRoom:
         width, height = max(right - left, 1e-6), max(top - bottom, 1e-6)
         flat = width >= height
         middle = Spot(x=0.5 * (left + right), y=0.5 * (bottom + top), angle=0.0 if flat else 0.5 * math.pi)
-        self._add(_discs(middle, max(width, height), min(width, height)))
+        self._add(_discs([middle], max(width, height), min(width, height))[0])
 
     def take_line(self, points: NDArray[np.float64], thickness: float, *, passable: bool = False) -> None:
         """Keep labels off a polyline (#N by 2) [in], and leaders, unless it is passable."""
         for a, b in pairwise(points):
             length = float(np.linalg.norm(b - a))
             spot = Spot(x=float(a[0] + b[0]) / 2, y=float(a[1] + b[1]) / 2, angle=float(np.arctan2(*(b - a)[::-1])))
-            discs = _discs(spot, length + thickness, thickness)
+            discs = _discs([spot], length + thickness, thickness)[0]
             if passable:
                 self._passable = np.concatenate([self._passable, discs])
             else:
@@ -69,27 +70,27 @@ class LabelRoom:
         width: float,
         height: float,
         page: tuple[float, float, float, float],
-        avoid: Sequence[NDArray[np.float64]] = (),
+        avoid: NDArray[np.float64] | None = None,
         *,
         may_cross: bool = True,
     ) -> Spot | None:
         """Take the first of `spots` at which a text of this size [in] lies free within `page`, and its leader over no other, or None.
 
-        The lines in `avoid` (#N by 2 each) are crossed only where every other spot is worse, and if they may be.
+        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if they may be.
         """
-        lines = np.concatenate([_resampled(line, 0.5 * height) for line in avoid]) if avoid else np.empty((0, 2))
-        off_lines = np.column_stack([lines, np.zeros(len(lines))])
+        lines = np.empty((0, 2)) if avoid is None else avoid
         left, bottom, right, top = page
         taken = np.concatenate([self._discs, self._passable])
+        off_lines = np.concatenate([taken, np.column_stack([lines, np.zeros(len(lines))])])
         # A few at a time where one look is enough: to make a spot may take longer than to look at it.
         spots = list(spots) if may_cross else spots
-        for obstacles in (np.concatenate([taken, off_lines]), taken)[: 1 + may_cross]:
+        for obstacles in (off_lines, taken)[: 1 + may_cross]:
             for some in in_batches(spots):
-                discs = np.array([_discs(spot, width, height) for spot in some])
+                discs = _discs(some, width, height)
                 low = (discs[..., :2] - discs[..., 2:]).min(axis=1)
                 high = (discs[..., :2] + discs[..., 2:]).max(axis=1)
-                fits = (low >= (left, bottom)).all(axis=1) & (high <= (right, top)).all(axis=1)
-                for k in np.flatnonzero(fits & _apart(discs, obstacles)).tolist():
+                fits = np.flatnonzero((low >= (left, bottom)).all(axis=1) & (high <= (right, top)).all(axis=1))
+                for k in fits[_apart(discs[fits], obstacles)].tolist():
                     if self._lets_pass(some[k], width):
                         self._add(discs[k])
                         return some[k]
@@ -142,11 +143,12 @@ def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> li
     return [min(place, high - apart * i) for i, place in enumerate(places)]
 
 
-def in_batches(spots: Iterable[Spot], most: int = 50) -> Iterator[list[Spot]]:
-    """So many at a time."""
-    left = iter(spots)
-    while some := list(islice(left, most)):
+def in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
+    """A few at first, since one of these will often do, then more at a time."""
+    left, count = iter(spots), 4
+    while some := list(islice(left, count)):
         yield some
+        count = min(2 * count, 64)
 
 
 def _apart(discs: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -156,14 +158,19 @@ def _apart(discs: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[n
     return np.asarray((np.einsum("snmk,snmk->snm", away, away) >= reach**2).all(axis=(1, 2)))
 
 
-def _discs(spot: Spot, width: float, height: float) -> NDArray[np.float64]:
-    """#N by 3: middles and radius of discs that cover a turned rectangle along its length."""
+def _discs(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.float64]:
+    """#S by #N by 3: middles and radius of discs that cover a turned rectangle along its length, at each spot."""
     count = max(1, math.ceil(width / height))
     places = ((np.arange(count) + 0.5) / count - 0.5) * width
     radius = 0.5 * math.hypot(height, width / count) * 0.95
-    return np.column_stack(
-        [spot.x + places * math.cos(spot.angle), spot.y + places * math.sin(spot.angle), np.full(count, radius)]
-    )
+    at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
+    x, y, c, s = at.T[:, :, None]
+    return np.stack([x + places * c, y + places * s, np.full((len(spots), count), radius)], axis=-1)
+
+
+def points_on(line: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+    """#N by 2, points on a polyline (#M by 2) [in] between which no text so high passes unseen."""
+    return _resampled(line, 0.5 * height)
 
 
 def _resampled(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:

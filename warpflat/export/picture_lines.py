@@ -21,6 +21,7 @@ from warpflat.export.labels import (
     beyond_ends,
     in_batches,
     leader_of,
+    points_on,
     rectangles,
     spread,
 )
@@ -69,6 +70,8 @@ class _Names:
         self._pen, self._room, self._drawn, self._datum, self._page = pen, room, drawn, datum, page
         stretches = {name: _draw(pen, drawn, parts, is_datum=name == datum) for name, parts in drawn.view.lines.items()}
         self._lines = {name: points for name, points in stretches.items() if len(points) > 1}
+        _, height = pen.measure("x", LABEL_SIZE)
+        self._ink = {name: points_on(line, height) for name, line in self._lines.items()}
         self.left = list(self._lines)
 
     def on_border(self) -> list[str]:
@@ -171,7 +174,7 @@ class _Names:
     def _put(self, name: str, spots: Iterable[Spot], *, may_cross: bool = True) -> bool:
         """Write a name at the first spot where there is room for it."""
         pen, (width, height) = self._pen, self._size(name)
-        others = [line for other, line in self._lines.items() if other != name]
+        others = np.concatenate([np.empty((0, 2)), *(ink for other, ink in self._ink.items() if other != name)])
         spot = self._room.place(spots, width, height, self._page, others, may_cross=may_cross)
         if spot is None:
             return False
