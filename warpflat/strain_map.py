@@ -24,6 +24,7 @@ __all__ = [
     "energy_report",
     "integrate_along",
     "integrate_faces",
+    "place_in_words",
     "smooth_to_vertices",
 ]
 
@@ -296,19 +297,31 @@ def energy_peak(
     if len(density) == 0:
         raise InputError("the surface has no vertices, so no peak")
     vertex = int(np.argmax(density))
+    return _place(surface, vertex, float(density[vertex]), landmarks or {}, up)
+
+
+def place_in_words(surface: Surface, vertex: int) -> str:
+    """Where a vertex is, as a sentence for a pattern maker."""
+    return _place(surface, vertex, 0.0, {}, (0.0, 1.0, 0.0)).words
+
+
+def _place(
+    surface: Surface, vertex: int, density: float, landmarks: Mapping[str, ArrayLike | int], up: ArrayLike
+) -> EnergyPeak:
+    """Where a vertex of this density lies."""
     here = surface.vertices[vertex]
     upwards = np.asarray(up, dtype=float)
     norm = np.linalg.norm(upwards)
     if upwards.shape != (3,) or not np.isfinite(norm) or norm <= 0:
         raise InputError(f"up is a direction, three finite numbers, not all zero, got {up!r}")
     offsets = {name: _nearest_on_line(surface.vertices[line], here) - here for name, line in surface.lines.items()}
-    marks = {name: _landmark(surface, name, place) for name, place in (landmarks or {}).items()}
+    marks = {name: _landmark(surface, name, place) for name, place in landmarks.items()}
     to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
     to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
     return EnergyPeak(
         vertex=vertex,
         position=here.copy(),
-        density=float(density[vertex]),
+        density=density,
         lines=to_lines,
         landmarks=to_marks,
         words=_in_words(vertex, here, offsets, to_lines, to_marks, upwards / norm),

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from warpflat.kernels.strain import compute_membrane_strain
 from warpflat.launching import launch_each
 from warpflat.membrane import cloth_of, plane_stress
 from warpflat.network import SpringNetwork
-from warpflat.strain_map import smooth_to_vertices
+from warpflat.strain_map import place_in_words, smooth_to_vertices
 from warpflat.surface import Surface
 from warpflat.surface.curvature import curvature_tensors
 
@@ -84,25 +85,35 @@ class Wear:
         return self.stretch_warp > 0.0 or self.stretch_weft > 0.0 or bool(self.pressure)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Misfit:
     """A connected region of cloth that is strained beyond the fabric's limit.
 
     Attributes:
-        faces: of it.
+        surface: whose cloth.
+        faces: of the region.
         area: flat [m2].
-        worst: the strain furthest beyond the limit.
+        worst: the strain furthest beyond the limit. limit: the fabric's.
         thread: "warp" or "weft".
-        vertex: the corner of the worst face nearest to the middle of the region.
-        words: what is wrong and where, for a pattern maker.
+        vertex: a corner of the worst face.
     """
 
+    surface: Surface = field(repr=False)
     faces: IntArray
     area: float
     worst: float
+    limit: float
     thread: str
     vertex: int
-    words: str
+
+    @cached_property
+    def words(self) -> str:
+        """What is wrong and where, for a pattern maker. Seldom asked for: a rough mesh has thousands of regions."""
+        state = "stretched" if self.worst > 0 else "slack"
+        return (
+            f"{state} {100 * abs(self.worst):.1f} % along {self.thread} (limit {100 * self.limit:.3g} %), "
+            f"{place_in_words(self.surface, self.vertex)}; {1e4 * self.area:.3g} cm2 beyond the limit"
+        )
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -267,37 +278,26 @@ def _smoothed(surface: Surface, values: FloatArray, length: float) -> FloatArray
 def _misfits(
     surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
 ) -> tuple[Misfit, ...]:
-    from warpflat.strain_map import energy_peak
-    from warpflat.surface.topology import components
+    from warpflat.surface.topology import components, order_by
 
     outside = np.flatnonzero(excess > 1e-9)
     if len(outside) == 0:
         return ()
     part = components(surface.faces[outside])
+    order, begin = order_by(part.astype(np.int32), int(part.max()) + 1)
     found = []
-    for number in range(int(part.max()) + 1):
-        faces = outside[part == number]
+    for faces in np.split(outside[order], begin[1:-1]):
         worst = faces[np.argmax(excess[faces])]
         on_warp = abs(warp[worst]) >= abs(weft[worst])
-        strain = float(warp[worst] if on_warp else weft[worst])
-        corner = surface.faces[worst]
-        bump = np.zeros(len(surface.vertices))
-        bump[corner[corner >= 0][0]] = 1.0
-        peak = energy_peak(surface, bump)
-        thread = "warp" if on_warp else "weft"
-        state = "stretched" if strain > 0 else "slack"
-        words = (
-            f"{state} {100 * abs(strain):.1f} % along {thread} (limit {100 * limit:.3g} %), {peak.words}; "
-            f"{1e4 * float(area[faces].sum()):.3g} cm2 beyond the limit"
-        )
         found.append(
             Misfit(
+                surface=surface,
                 faces=faces.astype(np.int32),
                 area=float(area[faces].sum()),
-                worst=strain,
-                thread=thread,
-                vertex=peak.vertex,
-                words=words,
+                worst=float(warp[worst] if on_warp else weft[worst]),
+                limit=limit,
+                thread="warp" if on_warp else "weft",
+                vertex=int(surface.faces[worst, 0]),
             )
         )
     return tuple(sorted(found, key=lambda misfit: -misfit.area))
