@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass, replace
+from itertools import islice
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -37,6 +38,8 @@ _NEARBY = 0.03
 # The share that is beyond the limit settles long before the energy does.
 _TRIAL_TOLERANCE = 20.0
 _MOST_TRIALS = 8
+# So many are told.
+_TOLD = 3
 # Nobody sews a dart shorter than this [m].
 _LEAST_CUT = 0.025
 
@@ -85,17 +88,23 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
     alone = result.alone or result
     if fit.fits or alone.fit.fits:
         return []
+    found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _TOLD))
+    if not trial:
+        return found
+    tried = [_tried(alone, remedy) for remedy in found]
+    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * alone.fit.outside]
+    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:_TOLD]
+
+
+def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
+    """For the largest places, each once; made as they are asked for, since a path over a large mesh takes a while."""
     found: list[Remedy] = []
     for misfit in fit.misfits[:4]:
         for remedy in _candidates(result, misfit):
             known = any(np.array_equal(remedy.path, other.path) for other in found)
             if not known and remedy.length >= _LEAST_CUT:
                 found.append(remedy)
-    if not trial:
-        return found[:3]
-    tried = [_tried(alone, remedy) for remedy in found[:_MOST_TRIALS]]
-    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * alone.fit.outside]
-    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:3]
+                yield remedy
 
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
