@@ -88,6 +88,10 @@ class FarPieces:
     def measured(self) -> tuple[FloatArray, FloatArray]:
         return self.of_vertices(), self._of_faces.sums(self._buffers.face_energy)
 
+    def moves(self) -> bool:
+        """Whether a velocity may be other than zero: to look would take as long as to measure the motion."""
+        return True
+
     def of_vertices(self) -> FloatArray:
         return self._of_vertices.sums(self._buffers.vertex_energy)
 

@@ -71,6 +71,10 @@ class NearPieces:
         """#P, sums of what has been measured last at the vertices: energies of the motion [J], or pulls [N]."""
         return _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
 
+    def moves(self) -> bool:
+        """Whether a velocity may be other than zero."""
+        return bool(self._buffers.velocity.numpy().any())
+
     def force_sizes(self) -> FloatArray:
         """#P, the norm of all forces on the vertices at the last evaluated state [N]."""
         force = self._buffers.force.numpy()

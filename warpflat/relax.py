@@ -319,8 +319,10 @@ class Relaxation:
     def piece_energies(self) -> FloatArray:
         """#P by 3, the same of each piece."""
         spring, cells = self.potentials().T
-        self._buffers.measure_motion.launch()
-        kinetic = self.pieces.of_vertices()
+        kinetic = np.zeros_like(spring)
+        if self.pieces.moves():
+            self._buffers.measure_motion.launch()
+            kinetic = self.pieces.of_vertices()
         if self.network.model == "springs":
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
