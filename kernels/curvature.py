@@ -114,16 +114,9 @@ def fit_curvature(
 
 
 @wp.func
-def unit(of: wp.vec3d):
-    """A vector's direction; of none, none."""
-    return of / wp.max(wp.length(of), wp.float64(1.0e-300))
-
-
-@wp.func
 def worn_along(deformation: wp.mat22d, thread: wp.vec2d, x: wp.vec3d, y: wp.vec3d):
     """The direction in space of a thread's in the pattern; x, y: axes of the cell in space."""
-    worn = deformation * thread
-    worn = worn / wp.max(wp.length(worn), wp.float64(1.0e-300))
+    worn = wp.normalize(deformation * thread)
     return worn[0] * x + worn[1] * y
 
 
@@ -163,9 +156,9 @@ def bend_threads(
             flat[2] * d[0] / det,
         )
     q = vertices[face[0]]
-    x = unit(vertices[face[1]] - q)
+    x = wp.normalize(vertices[face[1]] - q)
     b = vertices[face[2]] - q
-    y = unit(b - wp.dot(b, x) * x)
+    y = wp.normalize(b - wp.dot(b, x) * x)
     bend = (tensor[face[0]] + tensor[face[1]] + tensor[face[2]]) / wp.float64(3.0)
     one = worn_along(deformation, warp, x, y)
     other = worn_along(deformation, weft, x, y)

@@ -15,7 +15,6 @@ from types import SimpleNamespace
 import pytest
 
 from warpflat._version import __version__
-from warpflat.activity import doing, listening
 from warpflat.cli import main
 from warpflat.console import ProgressBar, warnings_of
 
@@ -519,60 +518,3 @@ def test_program_ends_without_a_last_search_of_its_memory():
         "sys.exit(10 + code if gc.get_freeze_count() > 1000 and gc.get_threshold()[0] > usual else 1)"
     )
     assert subprocess.run([sys.executable, "-c", code], check=False, capture_output=True).returncode == 10
-
-
-# --- what is being done
-
-
-def test_only_who_listens_is_told_what_is_being_done():
-    heard: list[str] = []
-    doing("nothing that is heard")
-    with listening(heard.append):
-        doing("sewing")
-        with listening(lambda words: heard.append(words.upper())):
-            doing("sewing")
-        doing("drafting")
-    doing("nothing that is heard")
-    assert heard == ["sewing", "SEWING", "drafting"]
-
-
-def test_a_run_tells_what_it_does_besides_steps(warpflat: Run):
-    Path("block.toml").write_text(
-        "form = 'a_line_skirt'\n[mannequin]\nsize = 'EU 38'\n[marker]\nwidth = 1.5\nseconds = 1\n[output]\nframes = 0\n"
-    )
-    heard: list[str] = []
-    with listening(heard.append):
-        assert warpflat("run", "block.toml")[0] == 0
-    kinds = [words.partition(",")[0] for words in heard]
-    assert list(dict.fromkeys(kinds)) == [
-        "building the mannequin",
-        "sewing",
-        "measuring how it fits",
-        "drawing picture.png",
-        "drafting the pattern",
-        *(f"writing {name}" for name in ("block.dxf", "block.svg", "pattern.pdf", "pattern.json")),
-        "laying the marker",
-    ]
-    missed = [float(words.split(", ")[2].split()[0]) for words in heard if "mm amiss" in words]
-    assert missed[-1] < missed[0]
-
-
-def test_the_bar_shows_what_is_being_done_and_then_steps_again(monkeypatch: pytest.MonkeyPatch):
-    class Terminal(io.StringIO):
-        def isatty(self) -> bool:
-            return True
-
-    stream = Terminal()
-    look = SimpleNamespace(stage="relax", step=7, max_steps=100, spring_energy=0.0021, residual=0.5)
-    monkeypatch.setattr("sys.stderr", stream)
-    monkeypatch.setattr("warpflat.console._REFRESH", 0.0)
-    with ProgressBar("cap") as bar:
-        doing("compiling kernels")
-        assert re.search(r"\rcap: compiling kernels \[00:\d\d\]", stream.getvalue())
-        bar(look)  # type: ignore[arg-type]
-        assert "cap: relax: 7 steps" in stream.getvalue()
-        doing("sewing")
-        assert re.search(r"\rcap: sewing \[00:\d\d\]", stream.getvalue())
-    before = stream.getvalue()
-    doing("nothing that is shown")
-    assert stream.getvalue() == before

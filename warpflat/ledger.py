@@ -140,7 +140,6 @@ def make_ledger(
     relax: RelaxOptions | None = None,
     by: RankedBy = "per_cm",
     candidates: Sequence[Candidate] | None = None,
-    on_candidate: Callable[[Candidate], None] | None = None,
 ) -> Ledger:
     """Try all candidates on a flattened piece, each coarsely, and rank them.
 
@@ -149,7 +148,6 @@ def make_ledger(
         relax: options of the full relaxation, from which the coarse ones follow.
         by: what the order goes by: energy released per centimetre cut, or in all.
         candidates: to compare; those of :func:`warpflat.candidates.find_candidates` if not given.
-        on_candidate: called before each trial.
 
     Raises:
         InputError: there is nothing to cut for, or no candidate can be made.
@@ -159,8 +157,6 @@ def make_ledger(
     entries, refused = [], []
     for number, candidate in enumerate(chosen, 1):
         doing(f"cut {number} of {len(chosen)}, {candidate.name}")
-        if on_candidate is not None:
-            on_candidate(candidate)
         try:
             entries.append(evaluate(result, candidate, relax=coarse(relax)))
         except InputError as reason:

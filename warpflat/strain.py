@@ -21,7 +21,7 @@ from warpflat.kernels.strain import (
     compute_worn_strain,
 )
 from warpflat.launching import launch_each
-from warpflat.membrane import cloth_of, plane_stress
+from warpflat.membrane import Model, cloth_of, plane_stress
 from warpflat.network import SpringNetwork
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges_of
@@ -35,6 +35,7 @@ __all__ = [
     "membrane_of",
     "signed_cell_areas",
     "strain_energy",
+    "worn_cells",
     "worn_strain",
 ]
 
@@ -79,7 +80,10 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
     Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
     """
     offset, device = network.cell_arrays.of_face, network.device
-    cells = [wp.array(offset, dtype=wp.int32, device=device, copy=False), *_worn_cells(network, positions)]
+    cells = [
+        wp.array(offset, dtype=wp.int32, device=device, copy=False),
+        *worn_cells(network, positions, network.model),
+    ]
     strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
     launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
     return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
@@ -88,7 +92,7 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
     """Strain energy [J] of a layout (#V by 2 [m]), the sum of what `worn_strain` gives per face."""
     if network.model == "membrane":
-        return float(_worn_cells(network, positions)[2].numpy().sum())
+        return float(worn_cells(network, positions, network.model)[2].numpy().sum())
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     energy = wp.empty(network.face_count, dtype=wp.float64, device=device)
@@ -97,13 +101,14 @@ def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
     return float(energy.numpy().sum())
 
 
-def _worn_cells(network: SpringNetwork, positions: FloatArray) -> list[wp.array]:
-    """Strain and stress (#C by 3), energy [J] and area [m2] (#C), see `kernels.strain`."""
+def worn_cells(network: SpringNetwork, positions: FloatArray, law: Model) -> list[wp.array]:
+    """Strain and stress (#C by 3), energy [J] and area [m2] (#C), see `kernels.strain`; stress and energy by plane stress, or by the
+    membrane's law with the fabric's curves."""
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     cells = _worn_arrays(network.cell_count, device)
     kernel, cloth = compute_worn_strain, membrane_of(network.fabric, network.grain_angle)
-    if network.model == "membrane":
+    if law == "membrane":
         kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
     inputs = [at, network.cells, cloth]
     launch_each(kernel, network.face_count, inputs, cells, device=device)

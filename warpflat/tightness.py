@@ -18,10 +18,10 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.errors import InputError, is_number
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.curvature import bend_threads
-from warpflat.kernels.strain import compute_membrane_strain
 from warpflat.launching import launch_each
-from warpflat.membrane import cloth_of, plane_stress
+from warpflat.membrane import plane_stress
 from warpflat.network import SpringNetwork
+from warpflat.strain import worn_cells
 from warpflat.strain_map import place_in_words, smooth_to_vertices
 from warpflat.surface import Surface
 from warpflat.surface.curvature import curvature_tensors
@@ -200,7 +200,9 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         smoothing_length: over which the pressure is averaged [m].
     """
     fabric, surface = network.fabric, network.surface
-    strain, stress, area = _worn_cells(network, positions)
+    # By the fabric's own law with its curves, whatever the model.
+    strain, stress, _, area = (np.array(of.numpy()) for of in worn_cells(network, positions, "membrane"))
+    area = np.maximum(area, 0.0)
     along_warp, along_weft, crossed = _curvature_along(network, positions)
     lengths = 1.0 + strain[:, :2]
     # sigma = P F^T / J: force per worn width, and per worn area times curvature.
@@ -237,22 +239,6 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         outside=float(weight[excess > 1e-9].sum()) / total_area,
         hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
     )
-
-
-def _worn_cells(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """#C by 3 strains, #C by 3 stresses [N/m], #C flat areas [m2], by the fabric's own law with its curves."""
-    count, device = network.cell_count, network.device
-    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
-    strain, stress = (wp.empty(count, dtype=wp.vec3d, device=device) for _ in range(2))
-    energy, area = (wp.empty(count, dtype=wp.float64, device=device) for _ in range(2))
-    launch_each(
-        compute_membrane_strain,
-        network.face_count,
-        [at, network.cells, cloth_of(network.fabric, grain_axes(network.grain_angle), device)],
-        [strain, stress, energy, area],
-        device=device,
-    )
-    return np.array(strain.numpy()), np.array(stress.numpy()), np.maximum(np.array(area.numpy()), 0.0)
 
 
 def _curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

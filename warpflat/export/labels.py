@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "LabelRoom",
@@ -101,7 +101,7 @@ class LabelRoom:
         leader = leader_of(spot, width)
         if leader is None:
             return True
-        ink = _resampled(leader, 0.03)[3:]
+        ink = points_on(leader, 0.03)[3:]
         return bool(_apart(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
 
     def _add(self, discs: NDArray[np.float64]) -> None:
@@ -120,9 +120,16 @@ def rectangles(spots: Sequence[Spot], width: float, height: float) -> NDArray[np
     """#S by #N by 2, points all over a text of this size at each spot [in]."""
     along = np.linspace(-0.5 * width, 0.5 * width, max(3, math.ceil(width / height)))
     x, y = (of.ravel() for of in np.meshgrid(along, (-0.5 * height, 0.0, 0.5 * height)))
+    return np.stack(_turned(spots, x, y), axis=-1)
+
+
+def _turned(
+    spots: Sequence[Spot], x: NDArray[np.float64], y: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """#S by #N each, where points along and across a text (#N) come to at each spot."""
     at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
     left, low, c, s = at.T[:, :, None]
-    return np.stack([left + c * x - s * y, low + s * x + c * y], axis=-1)
+    return left + c * x - s * y, low + s * x + c * y
 
 
 def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
@@ -163,20 +170,14 @@ def _discs(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.flo
     count = max(1, math.ceil(width / height))
     places = ((np.arange(count) + 0.5) / count - 0.5) * width
     radius = 0.5 * math.hypot(height, width / count) * 0.95
-    at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
-    x, y, c, s = at.T[:, :, None]
-    return np.stack([x + places * c, y + places * s, np.full((len(spots), count), radius)], axis=-1)
+    x, y = _turned(spots, places, np.zeros(count))
+    return np.stack([x, y, np.full_like(x, radius)], axis=-1)
 
 
-def points_on(line: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-    """#N by 2, points on a polyline (#M by 2) [in] between which no text so high passes unseen."""
-    return _resampled(line, 0.5 * height)
-
-
-def _resampled(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:
-    reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    places = np.linspace(0.0, reached[-1], max(2, math.ceil(reached[-1] / max(step, 1e-3)) + 1))
-    return np.column_stack([np.interp(places, reached, line[:, axis]) for axis in range(2)])
+def points_on(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+    """#N by 2, points on a polyline (#M by 2) [in], no farther apart along it than a step, its ends among them."""
+    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return at_shares(line, np.linspace(0.0, 1.0, max(2, math.ceil(length / max(step, 1e-3)) + 1)))
 
 
 def along_line(line: NDArray[np.float64], width: float, clearance: float) -> Iterator[Spot]:
@@ -243,7 +244,7 @@ def beside(
                 yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
 
 
-def at_shares(line: NDArray[np.float64], shares: Sequence[float]) -> NDArray[np.float64]:
+def at_shares(line: NDArray[np.float64], shares: ArrayLike) -> NDArray[np.float64]:
     """Points of a polyline (#N by 2) [in] at these shares of its length, one for each."""
     reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     places = np.asarray(shares) * reached[-1]

@@ -71,7 +71,7 @@ class _Names:
         stretches = {name: _draw(pen, drawn, parts, is_datum=name == datum) for name, parts in drawn.view.lines.items()}
         self._lines = {name: points for name, points in stretches.items() if len(points) > 1}
         _, height = pen.measure("x", LABEL_SIZE)
-        self._ink = {name: points_on(line, height) for name, line in self._lines.items()}
+        self._ink = {name: points_on(line, 0.5 * height) for name, line in self._lines.items()}
         self.left = list(self._lines)
 
     def on_border(self) -> list[str]:

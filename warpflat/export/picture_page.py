@@ -26,7 +26,7 @@ _SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
 _COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
 _BAR_WIDTH = 0.2
 _BAR_TIP = 0.05  # of its length, for what lies above the scale
-_SHORTESTGRAIN = 0.28  # half its length
+_SHORTEST_GRAIN = 0.28  # half its length
 _TICK_SIZE = 8.5  # [pt]
 
 
@@ -188,14 +188,14 @@ def _grain_inside(
     """The middle of the arrow and half its length [in], where it and its word lie on the cloth."""
     left, bottom, right, top = drawn.box
     width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
-    for half in (0.2 * length, 0.12 * length, _SHORTESTGRAIN):
+    for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
         for shift in (0.0, 0.15, -0.15, 0.3, -0.3):
             for aside in (0.12, -0.12, 0.2, -0.2, 0.3, -0.3, 0.42, -0.42):
                 centre = middle + shift * length * along + aside * width * across
                 run = centre + np.linspace(-half, half, 15)[:, None] * along
                 margin = 0.10
                 edges = np.concatenate([run - margin * across, run + (margin + text_height) * across])
-                if half >= _SHORTESTGRAIN and drawn.covers(edges).all():
+                if half >= _SHORTEST_GRAIN and drawn.covers(edges).all():
                     return centre, half
     return None
 
