@@ -23,8 +23,7 @@ from warpflat.errors import InputError
 from warpflat.words import plain_letters
 
 if TYPE_CHECKING:
-    from warpflat.scene import Scene
-    from warpflat.scene_cuts import CutStory
+    from warpflat.scene import Scene, SceneResult
 
 __all__ = ["cli", "main"]
 
@@ -347,7 +346,9 @@ def mannequin(
       warpflat mannequin --scan body.obj --units m --out body
     """
     from warpflat.console import mannequin_table
+    from warpflat.export import output_folder
     from warpflat.mannequin import write_mannequin
+    from warpflat.mannequin.output import MANNEQUIN_FILES
     from warpflat.mannequin.table import MannequinTable, mannequin_from_table
     from warpflat.toml_file import check_table
 
@@ -361,9 +362,10 @@ def mannequin(
         tables["landmarks"] = _lengths(landmarks, "--landmark")
     if resolution is not None:
         tables["resolution_mm"] = resolution
-    body = mannequin_from_table(check_table(MannequinTable, tables, "command line"), path_of=Path)
-    folder = out if out is not None else Path("out") / "mannequin"
-    files = write_mannequin(body, folder)
+    table = check_table(MannequinTable, tables, "command line")
+    with output_folder(out if out is not None else Path("out") / "mannequin", MANNEQUIN_FILES.values()) as folder:
+        body = mannequin_from_table(table, path_of=Path)
+        files = write_mannequin(body, folder)
     if as_json:
         click.echo(files["metrics"].read_text(encoding="utf-8"), nl=False)
     elif not quiet:
@@ -433,16 +435,20 @@ def compare(
     Examples:
       warpflat compare scenes/bodice.toml --fabric denim --fabric jersey --fabric power-net
     """
-    from warpflat.compare import compare_fabrics, comparison_table, save_comparison
+    from warpflat.compare import COMPARED_FILES, compare_fabrics, comparison_table, save_comparison
     from warpflat.console import ProgressBar, warnings_of
+    from warpflat.export import output_folder
     from warpflat.scene import load_scene
 
     job = load_scene(scene)
     _start_warp()
-    with ProgressBar(job.name, hidden=quiet or as_json) as bar:
+    target = out if out is not None else Path("out") / f"{job.name}-compared"
+    with (
+        ProgressBar(job.name, hidden=quiet or as_json) as bar,
+        output_folder(target, COMPARED_FILES, sources=job.sources) as folder,
+    ):
         comparison = compare_fabrics(job, fabrics, on_progress=lambda _, progress: bar(progress), device=device)
-    folder = out if out is not None else Path("out") / f"{job.name}-compared"
-    files = save_comparison(comparison, folder)
+        files = save_comparison(comparison, folder)
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
@@ -520,26 +526,31 @@ def cuts(
     from warpflat.console import ProgressBar, ledger_table
     from warpflat.export import output_folder, write_json
     from warpflat.ledger_picture import write_ledger_picture
-    from warpflat.scene import load_scene, scene_ledger
+    from warpflat.scene import files_of_run, load_scene, run_scene, scene_ledger
     from warpflat.scene_cuts import story_of_entry
 
     loaded = load_scene(scene)
     _start_warp()
     target = out if out is not None else Path("out") / loaded.name
-    with ProgressBar(loaded.name, hidden=quiet or as_json), output_folder(target) as folder:
+    files = ["ledger.json", "ledger.png", *(files_of_run(loaded) if apply is not None else [])]
+    result = None
+    with (
+        ProgressBar(loaded.name, hidden=quiet or as_json) as bar,
+        output_folder(target, files, sources=loaded.sources) as folder,
+    ):
         ledger = scene_ledger(loaded, by=by, device=device)
-        story = None if apply is None else story_of_entry(ledger, apply)
         write_json(folder / "ledger.json", ledger.as_dict())
         write_ledger_picture(folder / "ledger.png", ledger)
-    if as_json and story is None:
+        if apply is not None:
+            story = story_of_entry(ledger, apply)
+            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=story)
+    if as_json and result is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):
         for note in ledger.notes:
             click.echo(f"warpflat: note: {note}", err=True)
         click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
-    if story is None:
-        return DONE
-    return _run(loaded, folder, quiet=quiet, as_json=as_json, device=device, cuts=story)
+    return DONE if result is None else _tell_of_run(result, folder, quiet=quiet, as_json=as_json)
 
 
 @cli.command()
@@ -561,11 +572,11 @@ def export(
       warpflat export out/dress --format dxf --dialect astm
       warpflat export out/dress --format pdf --paper Letter --size "EU 38"
     """
-    from warpflat.pattern_files import export_pattern
+    from warpflat.pattern_files import export_patterns
 
     if folder.name == "pattern.json" and folder.is_file():
         folder = folder.parent
-    files = [export_pattern(folder, kind, dialect=dialect, paper=paper, sizes=sizes or None) for kind in formats]
+    files = export_patterns(folder, formats, dialect=dialect, paper=paper, sizes=sizes or None)
     if not quiet:
         click.echo(f"{folder}: {', '.join(files)}")
     return DONE
@@ -595,17 +606,22 @@ def _start_warp() -> None:
                 click.echo(line, err=True)
 
 
-def _run(
-    scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None, cuts: CutStory | None = None
-) -> int:
-    from warpflat.console import ProgressBar, run_summary, warnings_of
+def _run(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:
+    from warpflat.console import ProgressBar
     from warpflat.scene import run_scene
-    from warpflat.wear_report import fit_lines
 
     _start_warp()
     folder = out if out is not None else Path("out") / scene.name
     with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
-        result = run_scene(scene, folder, on_progress=bar, device=device, cuts=cuts)
+        result = run_scene(scene, folder, on_progress=bar, device=device)
+    return _tell_of_run(result, folder, quiet=quiet, as_json=as_json)
+
+
+def _tell_of_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool) -> int:
+    """Print what a run has come to, and return the exit code."""
+    from warpflat.console import run_summary, warnings_of
+    from warpflat.wear_report import fit_lines
+
     warnings = warnings_of(result.metrics)
     if not (quiet or as_json):
         for note in result.notes:

@@ -18,7 +18,17 @@ from warpflat.scene import Scene, flatten_scene, scene_cuts, scene_fabric
 from warpflat.scene_cuts import CutStory
 from warpflat.surface.topology import border_loops
 
-__all__ = ["Comparison", "compare_fabrics", "comparison_table", "laid_upon", "outline", "save_comparison"]
+__all__ = [
+    "COMPARED_FILES",
+    "Comparison",
+    "compare_fabrics",
+    "comparison_table",
+    "laid_upon",
+    "outline",
+    "save_comparison",
+]
+
+COMPARED_FILES = ("compare.json", "compare.png", "compare.svg")
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]
@@ -192,19 +202,22 @@ def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
 
 
 def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
-    """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), each atomically.
+    """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), all of them or none.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
     """
     from warpflat.compare_sheet import write_overlay_picture, write_overlay_svg
-    from warpflat.export import prepare_folder, write_json
+    from warpflat.export import output_folder, write_json
 
-    to = prepare_folder(folder)
-    write_overlay_svg(to / "compare.svg", comparison)
-    write_overlay_picture(to / "compare.png", comparison)
-    write_json(to / "compare.json", comparison.as_dict())
-    return ["compare.json", "compare.png", "compare.svg"]
+    sources = [
+        file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
+    ]
+    with output_folder(folder, COMPARED_FILES, sources=sources) as to:
+        write_overlay_svg(to / "compare.svg", comparison)
+        write_overlay_picture(to / "compare.png", comparison)
+        write_json(to / "compare.json", comparison.as_dict())
+    return list(COMPARED_FILES)
 
 
 def comparison_table(comparison: Comparison) -> str:

@@ -166,7 +166,7 @@ class Flattening:
         return metrics_of([self])
 
     def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
-        """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), each atomically.
+        """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), all of them or none.
 
         Args:
             folder: made if need be.
@@ -177,7 +177,7 @@ class Flattening:
             The names of the files.
 
         Raises:
-            InputError: the folder cannot be written.
+            InputError: the folder cannot be written, or the surface was read from a file there that would be replaced.
         """
         from warpflat.result_files import write_results
 

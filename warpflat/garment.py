@@ -156,22 +156,21 @@ class Garment:
         }
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
-        """Write `metrics.json`, an OBJ per piece and `picture.png`, each atomically; returns their names.
+        """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none; returns their names.
 
         Raises:
-            InputError: the folder cannot be written.
+            InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
-        from warpflat.export import prepare_folder, write_picture
+        from warpflat.export import output_folder, write_picture
         from warpflat.leftovers import write_metrics
 
-        to = prepare_folder(folder)
-        files = [piece.write_obj(to) for piece in self.pieces.values()]
-        if picture:
-            files.append("picture.png")
-            write_picture(to / files[-1], [piece.picture_piece() for piece in self.pieces.values()])
-        files.append("metrics.json")
-        write_metrics(to, self.metrics())
-        return files
+        others = [*(["picture.png"] if picture else []), "metrics.json"]
+        with output_folder(folder, others, sources=self.mannequin.sources) as to:
+            files = [piece.write_obj(to) for piece in self.pieces.values()]
+            if picture:
+                write_picture(to / "picture.png", [piece.picture_piece() for piece in self.pieces.values()])
+            write_metrics(to, self.metrics())
+        return [*files, *others]
 
 
 def flatten_form(

@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from warpflat.export.atomic import current, is_input, remove_file
 from warpflat.export.metrics import write_json
 
 __all__ = ["note_file", "settle", "write_metrics"]
@@ -33,19 +34,19 @@ def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
 
 
 def settle(
-    folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str], sources: Iterable[Path] = ()
+    folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write `metrics.json` at the end of a run, and remove what earlier ones have left and would be taken for its own.
 
     That is what a run of the same name has written and this one has not, and of other runs those files that bear no name,
-    such as `pattern.json`. All are listed until they are gone, so that a run which is killed leaves none that is not known.
+    such as `pattern.json`; never a file from which this run was made. In an :func:`warpflat.export.output_folder` they go when the new
+    files are there.
 
     Args:
         folder: in which the run has written all else.
         metrics: all of `metrics.json` but `files`.
         name: of the run.
         files: that it has written, by name.
-        sources: files from which it was made; they stay.
 
     Returns:
         What `metrics.json` holds, and what was removed or left, one sentence each.
@@ -54,7 +55,7 @@ def settle(
         InputError: `metrics.json` cannot be written.
     """
     record = _record(_read(folder))
-    mine = {file: _digest(folder / file) for file in files if file != "metrics.json"}
+    mine = {file: _digest(current(folder / file)) for file in files if file != "metrics.json"}
     earlier = {run: {file: was for file, was in known.items() if file not in mine} for run, known in record.items()}
     stale = {
         (run, file): was
@@ -63,12 +64,9 @@ def settle(
         if run == name or file in _NAMELESS
     }
     earlier[name] = {**mine, **earlier.get(name, {})}
-    if stale:
-        write_json(folder / "metrics.json", {**metrics, "files": earlier})
-    kept = {source.resolve() for source in sources}
     removed, notes = [], []
     for (run, file), was in stale.items():
-        if reason := _take_away(folder / file, was, kept):
+        if reason := _take_away(folder / file, was):
             notes.append(f"{file} was not made by this run, and stays: {reason}")
         else:
             removed.append(file)
@@ -89,20 +87,20 @@ def note_file(folder: Path, name: str, file: str) -> None:
     metrics = _read(folder)
     record = _record(metrics)
     if name in record:
-        record[name][file] = _digest(folder / file)
+        record[name][file] = _digest(current(folder / file))
         write_json(folder / "metrics.json", {**metrics, "files": record})
 
 
-def _take_away(path: Path, was: str, kept: set[Path]) -> str:
+def _take_away(path: Path, was: str) -> str:
     """Remove a file that is still as a run wrote it, or say why it stays."""
-    if path.resolve() in kept:
+    if is_input(path):
         return "this run was made from it"
     if path.is_symlink() or (path.exists() and not path.is_file()):
         return "it is not as an earlier run left it"
     try:
         if path.exists() and _digest(path) != was:
             return "it is not as an earlier run left it"
-        path.unlink(missing_ok=True)
+        remove_file(path)
     except OSError as error:
         return f"it cannot be removed ({(error.strerror or str(error)).lower()})"
     return ""
@@ -111,7 +109,7 @@ def _take_away(path: Path, was: str, kept: set[Path]) -> str:
 def _read(folder: Path) -> dict[str, Any]:
     """What a folder's `metrics.json` holds; nothing where there is none, or something else by that name."""
     try:
-        data = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        data = json.loads(current(folder / "metrics.json").read_text(encoding="utf-8"))
     except (OSError, ValueError):
         return {}
     return data if isinstance(data, dict) else {}

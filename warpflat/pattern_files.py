@@ -25,6 +25,7 @@ __all__ = [
     "PatternOptions",
     "WrittenPattern",
     "export_pattern",
+    "export_patterns",
     "garment_files",
     "pattern_options",
     "surface_files",
@@ -148,11 +149,23 @@ def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternO
 def export_pattern(
     folder: Path, format: str, *, dialect: str = "aama", paper: str = "A4", sizes: Sequence[str] | None = None
 ) -> str:
-    """Write one file of a run's pattern again, from its `pattern.json`, and return its name.
+    """Write one file of a run's pattern again; as :func:`export_patterns`, of which it returns the only name."""
+    return export_patterns(folder, [format], dialect=dialect, paper=paper, sizes=sizes)[0]
+
+
+def export_patterns(
+    folder: Path,
+    formats: Sequence[str],
+    *,
+    dialect: str = "aama",
+    paper: str = "A4",
+    sizes: Sequence[str] | None = None,
+) -> list[str]:
+    """Write files of a run's pattern again, all or none, from its `pattern.json`, and return their names.
 
     Args:
         folder: of the run.
-        format: "dxf", "svg", "pdf" or "json".
+        formats: some of "dxf", "svg", "pdf" and "json".
         dialect: of a DXF.
         paper: of a PDF.
         sizes: only these; None takes all. Not of "json", which is what the others are made from.
@@ -160,19 +173,28 @@ def export_pattern(
     Raises:
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be written.
     """
+    from warpflat.export import output_folder
     from warpflat.leftovers import note_file
     from warpflat.pattern.read_json import read_pattern_json
 
-    if format not in FORMATS:
-        raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
-    if format == "json" and sizes is not None:
+    for format in formats:
+        if format not in FORMATS:
+            raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+    if "json" in formats and sizes is not None:
         raise InputError(
             "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
         )
-    drafted = read_pattern_json(folder / "pattern.json")
-    file = _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
-    note_file(folder, drafted.name, file)
-    return file
+    source = folder / "pattern.json"
+    drafted = read_pattern_json(source)
+    # As JSON it may be written over itself: that is what was asked for.
+    with output_folder(folder, sources=[] if "json" in formats else [source]):
+        files = [
+            _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+            for format in formats
+        ]
+        for file in files:
+            note_file(folder, drafted.name, file)
+    return files
 
 
 def _drawn(
@@ -181,11 +203,10 @@ def _drawn(
     """Make, draft and write a pattern; geometry that defeats it becomes a note, and in `metrics.json` `not_drawn` of `pattern`."""
     from shapely.errors import ShapelyError
 
-    from warpflat.export import prepare_folder
+    from warpflat.export import output_folder
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
-    folder = prepare_folder(to)
     doing("drafting the pattern")
     try:
         pattern, notes = make()
@@ -194,21 +215,22 @@ def _drawn(
         why = " ".join(str(error).split())
         return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
     notes = (*notes, *told)
-    files = [
-        _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
-        for kind in FORMATS
-        if kind in options.formats
-    ]
     notes = (
         *notes,
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
     metrics: dict[str, Any] = {"pattern": _measures(drafted)}
-    if options.cloth is not None:
-        marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
-        files += marked
-        notes = (*notes, *told)
-        metrics["marker"] = plan
+    with output_folder(to) as folder:
+        files = [
+            _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+            for kind in FORMATS
+            if kind in options.formats
+        ]
+        if options.cloth is not None:
+            marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+            files += marked
+            notes = (*notes, *told)
+            metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
 
 

@@ -40,7 +40,7 @@ def write_results(
     frames: bool = True,
     more: Mapping[str, Any] | None = None,
 ) -> list[str]:
-    """Write the files of all pieces, each atomically, and return their names.
+    """Write the files of all pieces, together or not at all, and return their names.
 
     Args:
         results: the pieces, of different names.
@@ -50,26 +50,21 @@ def write_results(
         more: entries of `metrics.json` besides the pieces.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: the folder cannot be written, or a piece was read from a file that would be replaced.
     """
-    from warpflat.export import prepare_folder, write_picture
+    from warpflat.export import output_folder, write_picture
     from warpflat.leftovers import write_metrics
 
-    to = prepare_folder(
-        folder, ["metrics.json", *(["frames.usdc"] if frames else []), *(["picture.png"] if picture else [])]
-    )
-    files = []
-    for result in results:
-        files.append(result.write_obj(to))
-    if frames:
-        files.append("frames.usdc")
-        _write_frames(to / files[-1], results)
-    if picture:
-        files.append("picture.png")
-        write_picture(to / files[-1], [result.picture_piece() for result in results])
-    files.append("metrics.json")
-    write_metrics(to, metrics_of(results, more))
-    return files
+    others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
+    sources = [source for result in results for source in result.surface.sources]
+    with output_folder(folder, others, sources=sources) as to:
+        files = [result.write_obj(to) for result in results]
+        if frames:
+            _write_frames(to / "frames.usdc", results)
+        if picture:
+            write_picture(to / "picture.png", [result.picture_piece() for result in results])
+        write_metrics(to, metrics_of(results, more))
+    return [*files, *others]
 
 
 def picture_piece(result: Flattening) -> PicturePiece:

@@ -67,6 +67,7 @@ __all__ = [
     "SceneResult",
     "SceneTable",
     "ShapeSurface",
+    "files_of_run",
     "flatten_scene",
     "load_scene",
     "make_scene",
@@ -162,12 +163,14 @@ class Scene:
         settings: what the file says.
         folder: from where relative paths are taken.
         where: what messages begin with: the file.
+        sources: the files from which it was read.
     """
 
     name: str
     settings: SceneTable
     folder: Path
     where: str
+    sources: tuple[Path, ...] = ()
 
 
 def load_scene(path: str | Path) -> Scene:
@@ -183,7 +186,8 @@ def load_scene(path: str | Path) -> Scene:
         raise InputError(
             f'{path}: is empty; a scene needs at least a [surface] table with file = ... or shape = "dome"'
         )
-    return make_scene(data, name=path.stem, folder=path.parent, where=str(path))
+    scene = make_scene(data, name=path.stem, folder=path.parent, where=str(path))
+    return replace(scene, sources=(path.absolute(),))
 
 
 def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Scene:
@@ -216,21 +220,24 @@ def run_scene(
     """Flatten the scene's surface, or the pieces of its form, and write the result.
 
     Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see `warpflat.pattern_files`). What an
-    earlier run has left there and this one does not make is removed at the end (see `warpflat.leftovers`).
+    earlier run has left there and this one does not make is removed at the end (see `warpflat.leftovers`). All of that happens together;
+    a run that fails leaves the folder as it was, and no run replaces a file that it has read.
 
     Args:
         scene: what to do.
-        out: folder for the files, made if need be; no folder is left where the run ends with an error and no file.
+        out: folder for the files, made if need be.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
         cuts: to be made instead of the scene's own (see `warpflat.scene_cuts.story_of_entry`).
 
     Raises:
-        InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
+        InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
+            is made from would be replaced.
     """
     from warpflat.export import output_folder
 
-    with output_folder(out, _files_for_all(scene.settings)) as folder:
+    sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
+    with output_folder(out, files_of_run(scene), sources=sources) as folder:
         if scene.settings.mannequin is not None:
             from warpflat.scene_garment import run_garment
 
@@ -279,17 +286,28 @@ def _run_surface(
         seams=seams,
         more={} if sewn is None else sewn.metrics(),
         frames=wanted,
-        sources=scene_sources(scene),
         notes=(*result.told, *story.notes),
     )
 
 
-def _files_for_all(settings: SceneTable) -> list[str]:
-    """The files of a run that do not bear a piece's name."""
-    output, formats = settings.output, settings.pattern.formats
-    pattern = [f"pattern.{ending}" for ending in ("pdf", "json") if ending in formats]
-    frames = ["frames.usdc"] if FrameSchedule(output).wanted else []
-    return ["metrics.json", *frames, *(["picture.png"] if output.picture else []), *pattern]
+def files_of_run(scene: Scene) -> list[str]:
+    """The files that a run will write, as far as they are known before it: not those with the name of a form's or a cut's piece."""
+    settings, name = scene.settings, scene.name
+    output, formats, garment = settings.output, settings.pattern.formats, settings.mannequin is not None
+    worn = output.picture and settings.wear is not None
+    asked = {
+        "metrics.json": True,
+        f"{name}.obj": not garment,
+        "frames.usdc": FrameSchedule(output).wanted,
+        "picture.png": output.picture,
+        "wear.png": worn and garment,
+        f"{name}.wear.png": worn and not garment,
+        **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},
+        **{f"pattern.{ending}": ending in formats for ending in ("pdf", "json")},
+        f"{name}.marker.svg": settings.marker is not None,
+        f"{name}.marker.json": settings.marker is not None,
+    }
+    return [file for file, wanted in asked.items() if wanted]
 
 
 def flatten_scene(
@@ -544,15 +562,6 @@ def expand_variables(text: str) -> str:
         return os.environ[name]
 
     return _VARIABLE.sub(value, text)
-
-
-def scene_sources(scene: Scene) -> list[Path]:
-    """The mesh files from which a scene is made."""
-    surface, mannequin = scene.settings.surface, scene.settings.mannequin
-    named = [surface.file] if isinstance(surface, FileSurface) else []
-    if mannequin is not None and mannequin.scan is not None:
-        named.append(mannequin.scan)
-    return [scene.folder / expand_variables(file) for file in named]
 
 
 @contextmanager

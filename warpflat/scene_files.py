@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -72,7 +72,6 @@ def write_surface(
     seams: Sequence[NamedSeam],
     more: Mapping[str, Any],
     frames: bool,
-    sources: Iterable[Path],
     notes: Sequence[str],
 ) -> SceneResult:
     """Write all files of a flattened surface but its film, and remove what earlier runs have left.
@@ -85,7 +84,6 @@ def write_surface(
         seams: those of the surface's border that were named.
         more: entries of `metrics.json` besides the pieces.
         frames: whether the folder has got `frames.usdc`.
-        sources: files from which the surface was made.
         notes: what was mended or chosen until now.
 
     Raises:
@@ -114,7 +112,6 @@ def write_surface(
         {**metrics_of(pieces, more), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
-        sources=sources,
     )
     unnamed = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
     told = (*notes, *pattern.notes, *unnamed, *settled)

@@ -24,7 +24,6 @@ from warpflat.scene import (
     expand_variables,
     scene_fabric,
     scene_relax_options,
-    scene_sources,
     scene_wear,
     told_by,
 )
@@ -147,12 +146,13 @@ def run_garment(
     device: str | None = None,
 ) -> SceneResult:
     """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
-    from warpflat.export import FrameWriter
+    from warpflat.export import FrameWriter, expect_files
     from warpflat.export.letters import note_on_names
 
     settings = scene.settings
     plan = plan_garment(scene, device=device)
     form, drawing = plan.form, plan.drawing
+    expect_files(out, [f"{name}.obj" for name in form.pieces])
     others = _other_sizes(scene)
     schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
     wanted = next(iter(schedules.values())).wanted
@@ -205,7 +205,6 @@ def run_garment(
         {**garment.metrics(), **_of_sizes(graded), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
-        sources=scene_sources(scene),
     )
     unnamed = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *pattern.notes, *unnamed, *settled)

@@ -12,6 +12,7 @@ from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic_core import ErrorDetails
 
 from warpflat.errors import InputError, nearest
+from warpflat.inputs import note_read
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -35,6 +36,7 @@ def read_toml(path: Path) -> dict[str, Any]:
     Raises:
         InputError: no such file, a directory, unreadable, or not TOML (with the line).
     """
+    note_read(path)
     try:
         text = path.read_text(encoding="utf-8-sig")  # as some editors save it, with a byte order mark
     except FileNotFoundError:

@@ -6,7 +6,14 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from warpflat.export.atomic import atomic_path, file_in, output_folder, prepare_folder, require_writable
+    from warpflat.export.atomic import (
+        atomic_path,
+        expect_files,
+        file_in,
+        output_folder,
+        prepare_folder,
+        require_writable,
+    )
     from warpflat.export.metrics import write_json
     from warpflat.export.obj import write_obj
     from warpflat.export.picture import PicturePiece, write_picture
@@ -17,6 +24,7 @@ __all__ = [
     "FrameWriter",
     "PicturePiece",
     "atomic_path",
+    "expect_files",
     "file_in",
     "output_folder",
     "prepare_folder",
@@ -31,6 +39,7 @@ _HOME = {
     "FrameWriter": "usd",
     "PicturePiece": "picture",
     "atomic_path": "atomic",
+    "expect_files": "atomic",
     "file_in": "atomic",
     "output_folder": "atomic",
     "prepare_folder": "atomic",

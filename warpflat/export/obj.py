@@ -38,7 +38,7 @@ def write_obj(
         pattern_to_surface: #P, for each pattern vertex its vertex on the surface; each its own if not given.
 
     Raises:
-        InputError: the file cannot be written.
+        InputError: the file cannot be written, or the surface was read from it.
         ValueError: the arrays do not fit together.
     """
     flat = np.asarray(positions, dtype=np.float64)
@@ -46,7 +46,10 @@ def write_obj(
     origin = np.arange(len(flat)) if pattern_to_surface is None else np.asarray(pattern_to_surface, dtype=np.int64)
     _check(surface, flat, corners, origin)
     in_input = np.asarray(surface.input_index, dtype=np.int64)[origin]
-    with atomic_path(path) as temporary, temporary.open("w", encoding="utf-8", newline="\n") as file:
+    with (
+        atomic_path(path, sources=surface.sources) as temporary,
+        temporary.open("w", encoding="utf-8", newline="\n") as file,
+    ):
         name = " ".join(surface.name.split())
         file.write(f"# warpflat: v = surface [m], vt = pattern [m], not normalised\no {name}\n")
         _write_rows(file, "v %r %r %r\n", np.asarray(surface.input_vertices, dtype=np.float64))

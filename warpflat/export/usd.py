@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping
-from contextlib import suppress
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
@@ -21,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
-from warpflat.export.atomic import atomic_path, hidden_beside, require_writable
+from warpflat.export.atomic import hidden_file, require_writable
 from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
 from warpflat.export.geometry import (
     Polylines,
@@ -36,7 +36,9 @@ from warpflat.export.usd_prims import (
     SampledLines,
     define_group,
     define_mesh,
+    export_stage,
     extent_of,
+    usd_errors,
     valid_name,
 )
 from warpflat.export.usd_validation import validate_usd
@@ -113,7 +115,7 @@ class FrameWriter:
         self._taken: set[str] = set()
         self._unsaved = 0
         self._stage: Any = None
-        self._working = hidden_beside(self._final)
+        self._hidden = ExitStack()
 
     def __enter__(self) -> FrameWriter:
         """Open the hidden working file.
@@ -121,18 +123,26 @@ class FrameWriter:
         Raises:
             InputError: the place cannot be written.
         """
-        from pxr import Kind, Tf, Usd, UsdGeom
+        from pxr import Usd
 
         require_writable(self._final)
         if self._final.suffix not in (".usdc", ".usd", ".usda"):
             raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc, .usd or .usda")
         try:
             # Crate files are the only ones that can be saved bit by bit, whatever the final format.
-            self._working = self._working.with_suffix(".usdc")
-            self._stage = Usd.Stage.CreateNew(str(self._working))
-        except Tf.ErrorException as error:
-            raise self._cannot_write(error) from error
-        stage = self._stage
+            working = self._hidden.enter_context(hidden_file(self._final.with_suffix(".usdc")))
+            with usd_errors(self._final):
+                self._stage = Usd.Stage.CreateNew(str(working))
+            self._begin(self._stage)
+        except BaseException:
+            self._hidden.close()
+            raise
+        return self
+
+    def _begin(self, stage: Any) -> None:
+        """Author what holds for the whole file."""
+        from pxr import Kind, UsdGeom
+
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         stage.SetTimeCodesPerSecond(self._rate)
@@ -141,29 +151,20 @@ class FrameWriter:
         stage.SetEndTimeCode(_FIRST_FRAME)
         stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Colour, place and export when the block ended well; remove the working file in any case."""
-        from pxr import Tf
-
-        try:
+        """Colour, place and export when the block ended well; the working file goes in any case."""
+        with self._hidden:
             if kind is None:
-                try:
+                with usd_errors(self._final):
                     self._place()
                     self._colour()
                     self._author_defaults()
                     self._save()
-                    with atomic_path(self._final) as temporary:
-                        self._stage.GetRootLayer().Export(str(temporary))
-                except Tf.ErrorException as failed:
-                    raise self._cannot_write(failed) from failed
-        finally:
+                export_stage(self._stage, self._final)
             self._stage = None
-            with suppress(OSError):
-                self._working.unlink()
 
     def add_piece(self, name: str, surface: Surface) -> None:
         """Author the surface of a piece with its feature lines, and prepare its pattern.
@@ -318,14 +319,10 @@ class FrameWriter:
             attribute.Set(float(value), time)
 
     def _saved_now_and_then(self) -> None:
-        from pxr import Tf
-
         self._unsaved += 1
         if self._unsaved >= self._save_every:
-            try:
+            with usd_errors(self._final):
                 self._save()
-            except Tf.ErrorException as error:
-                raise self._cannot_write(error) from error
 
     def _save(self) -> None:
         self._stage.Save()
@@ -381,10 +378,6 @@ class FrameWriter:
             for attribute in prim.GetAuthoredAttributes():
                 if attribute.GetNumTimeSamples():
                     attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
-
-    def _cannot_write(self, error: Exception) -> InputError:
-        reason = " ".join(str(error).split())[:200]
-        return InputError(f"cannot write {self._final}: {reason or 'USD failed'} (folder still there? disk full?)")
 
 
 class _Brush:

@@ -8,17 +8,60 @@ the lengths would agree, the last point is stored twice. No face uses the second
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+import os
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.errors import InputError
+from warpflat.export.atomic import atomic_path
 from warpflat.export.geometry import Polylines
 
-__all__ = ["MeshSamples", "SampledLines", "define_group", "define_mesh", "extent_of", "valid_name"]
+__all__ = [
+    "MeshSamples",
+    "SampledLines",
+    "define_group",
+    "define_mesh",
+    "export_stage",
+    "extent_of",
+    "usd_errors",
+    "valid_name",
+]
 
 _CONSTANT = "constant"
+
+
+@contextmanager
+def usd_errors(path: str | os.PathLike[str]) -> Iterator[None]:
+    """Tell in one line, as that a file cannot be written, what USD raises in the body, which names places in its own source.
+
+    Raises:
+        InputError: instead of USD's.
+    """
+    from pxr import Tf
+
+    try:
+        yield
+    except Tf.ErrorException as error:
+        told = next((" ".join(one.commentary.split())[:200] for one in error.args), "USD failed")
+        raise InputError(f"cannot write {path}: {told} (folder still there? disk full?)") from error
+
+
+def export_stage(stage: Any, path: str | os.PathLike[str]) -> None:
+    """Write a stage's root layer, whole or not at all; what has been written is opened once, since USD may fail without a word.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from pxr import Sdf
+
+    with atomic_path(path) as temporary, usd_errors(path):
+        written = stage.GetRootLayer().Export(str(temporary))
+        if not (written and Sdf.Layer.FindOrOpen(str(temporary))):
+            raise InputError(f"cannot write {path}: USD has left it incomplete (folder still there? disk full?)")
 
 
 def valid_name(name: str, taken: set[str]) -> str:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -54,6 +55,7 @@ class Mannequin:
         source: where the body comes from: a size, measurements, or a scan.
         notes: what was completed or mended, one sentence each.
         sections: for a scan, the length [m] of the body's own section at each level.
+        sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
 
     layout: Layout
@@ -61,6 +63,7 @@ class Mannequin:
     source: str
     notes: tuple[str, ...] = ()
     sections: Mapping[str, float] = field(default_factory=dict)
+    sources: tuple[Path, ...] = ()
 
     @classmethod
     def from_size(cls, size: str, *, resolution_mm: float = 10.0, **lengths: float) -> Mannequin:

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.export.atomic import atomic_path, prepare_folder
+from warpflat.export.atomic import atomic_path, output_folder
 from warpflat.leftovers import write_metrics
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
@@ -15,11 +15,18 @@ from warpflat.mannequin.usd import write_mannequin_usd
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["write_mannequin", "write_mannequin_obj"]
+__all__ = ["MANNEQUIN_FILES", "write_mannequin", "write_mannequin_obj"]
+
+MANNEQUIN_FILES = {
+    "usd": "mannequin.usdc",
+    "obj": "mannequin.obj",
+    "picture": "picture.png",
+    "metrics": "metrics.json",
+}
 
 
 def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dict[str, Path]:
-    """Write a mannequin's files into a folder, each of them whole or not at all.
+    """Write a mannequin's files into a folder, all of them or none.
 
     Args:
         mannequin: the body.
@@ -29,17 +36,14 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         the files by kind: ``usd``, ``obj``, ``picture``, ``metrics``; metrics come last, so where they are the rest is.
 
     Raises:
-        InputError: if a file cannot be written.
+        InputError: if a file cannot be written, or the body was read from one that would be replaced.
     """
-    place = prepare_folder(folder)
-    files = {
-        "usd": place / "mannequin.usdc", "obj": place / "mannequin.obj", "picture": place / "picture.png",
-        "metrics": place / "metrics.json",
-    }  # fmt: skip
-    write_mannequin_usd(mannequin, files["usd"])
-    write_mannequin_obj(mannequin, files["obj"])
-    write_mannequin_picture(mannequin, files["picture"])
-    write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
+    with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
+        files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
+        write_mannequin_usd(mannequin, files["usd"])
+        write_mannequin_obj(mannequin, files["obj"])
+        write_mannequin_picture(mannequin, files["picture"])
+        write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
     return files
 
 

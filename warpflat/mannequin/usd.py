@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.export.atomic import atomic_path
-from warpflat.export.usd_prims import extent_of, valid_name
+from warpflat.export.atomic import require_writable
+from warpflat.export.usd_prims import export_stage, extent_of, usd_errors, valid_name
 from warpflat.mannequin.normals import vertex_normals
 
 if TYPE_CHECKING:
@@ -31,7 +31,8 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
     """
     from pxr import Kind, Usd, UsdGeom
 
-    with atomic_path(path) as temporary:
+    require_writable(path)
+    with usd_errors(path):
         stage = Usd.Stage.CreateInMemory()
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -43,7 +44,7 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
         group.SetDocumentation(mannequin.source)
         _body(stage, mannequin)
         _lines(stage, mannequin)
-        stage.GetRootLayer().Export(str(temporary))
+    export_stage(stage, path)
 
 
 def _body(stage: Any, mannequin: Mannequin) -> None:

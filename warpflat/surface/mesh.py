@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import wraps
+from pathlib import Path
 from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
@@ -32,6 +33,7 @@ class Surface:
         input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it.
         input_index: #V, for each vertex its row in `input_vertices`.
         notes: what was mended on the way in, one sentence each.
+        sources: files from which it was read; none of them is ever replaced by its own results.
         of_faces: what has been worked out of the faces (see `once_per_faces`).
     """
 
@@ -42,6 +44,7 @@ class Surface:
     input_vertices: NDArray[np.float64]
     input_index: NDArray[np.int32]
     notes: tuple[str, ...] = ()
+    sources: tuple[Path, ...] = ()
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, expect, nearest
+from warpflat.inputs import listening_to_reads, note_read, noting_resolver
 from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import make_surface
@@ -78,13 +79,16 @@ def read_surface(
     """
     expect(path, (str, PathLike), "path", "that of a mesh file")
     file = Path(path)
+    note_read(file)
+    sources = [file.absolute()]
     try:
         if name:
             checked_name(name)
         if units is not None and units not in METRES_PER_UNIT:
             raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
         _check_file(file)
-        raw = _read(file, units, prim)
+        with listening_to_reads(sources.append):
+            raw = _read(file, units, prim)
         if raw.scale is None:
             raise InputError(_ask_for_units(raw))
     except InputError as error:
@@ -103,7 +107,7 @@ def read_surface(
     )
     _check_size(surface, file, raw.scale)
     surface = _snap_curves(surface, {key: curve * raw.scale for key, curve in raw.curves.items()})
-    return replace(surface, notes=(*raw.notes, *surface.notes))
+    return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
 def _check_file(file: Path) -> None:
@@ -175,7 +179,9 @@ def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
     suffix = file.suffix.lower()
     options = {"fix_texture": False} if suffix == ".ply" else {}
     try:
-        scene = trimesh.load_scene(str(file), process=False, **options)
+        scene = trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
+    except InputError:
+        raise
     # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
     except Exception as error:
         raise InputError(

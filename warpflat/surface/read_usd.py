@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.inputs import note_read
 
 __all__ = ["UsdMesh", "read_usd"]
 
@@ -53,6 +54,9 @@ def read_usd(path: Path, *, prim: str | None = None, metres_per_unit: float | No
         raise InputError("not a readable USD file") from error
     if not stage:
         raise InputError("not a readable USD file")
+    for layer in stage.GetUsedLayers():
+        if layer.realPath:
+            note_read(layer.realPath)
     chosen = _choose(stage, prim)
     mesh = UsdGeom.Mesh(chosen)
     notes: list[str] = []
