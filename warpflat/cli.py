@@ -99,10 +99,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.stderr.close()
         return DONE
     except OSError as error:
-        if error.filename is not None:
-            raise  # of a file, which whoever opens it answers for
-        _drop_output()
-        return _fail(f"cannot write to standard output: {(error.strerror or str(error)).lower()}")
+        reason = (error.strerror or str(error)).lower()
+        if error.filename is None and _output_fails():
+            _drop_output()
+            return _fail(f"cannot write to standard output: {reason}")
+        return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
 
 
 def _open_stderr() -> None:
@@ -122,6 +123,15 @@ def _is_open(stream: TextIO | None) -> bool:
     except OSError:
         return False
     return True
+
+
+def _output_fails() -> bool:
+    """Whether standard output cannot be written: what is left in its buffer is tried again."""
+    try:
+        sys.stdout.flush()
+    except (OSError, ValueError):
+        return True
+    return False
 
 
 def _drop_output() -> None:

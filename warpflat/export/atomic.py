@@ -90,8 +90,11 @@ def _clear(path: Path) -> None:
             shutil.rmtree(path)
         else:
             path.unlink(missing_ok=True)
-        for each in _unfinished.pop(path, ()):
-            each.rmdir()
+    if not os.path.lexists(path):
+        for each in _unfinished.get(path, ()):
+            with suppress(OSError):  # it holds files, or could not be made
+                each.rmdir()
+        _unfinished.pop(path, None)
 
 
 @atexit.register
@@ -280,7 +283,9 @@ _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 
 def _run_into(folder: Path) -> _Run | None:
     """The run that is writing into a folder, if there is one."""
-    return next((run for run in _runs.get() if run.folder == folder or is_among(folder, [run.folder])), None)
+    # One that has ended may still be listed, where it was interrupted at its very end.
+    going_on = (run for run in _runs.get() if run.hidden in _unfinished)
+    return next((run for run in going_on if run.folder == folder or is_among(folder, [run.folder])), None)
 
 
 def _keep_aside(final: Path, aside: Path) -> None:
@@ -350,8 +355,10 @@ def output_folder(
             yield folder
         run.commit()
     finally:
-        _runs.set(before)
-        _clear(run.hidden)
+        try:
+            _runs.set(before)
+        finally:
+            _clear(run.hidden)
 
 
 def expect_files(folder: Path, files: Iterable[str]) -> None:
