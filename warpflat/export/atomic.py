@@ -283,9 +283,12 @@ _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 
 def _run_into(folder: Path) -> _Run | None:
     """The run that is writing into a folder, if there is one."""
-    # One that has ended may still be listed, where it was interrupted at its very end.
-    going_on = (run for run in _runs.get() if run.hidden in _unfinished)
-    return next((run for run in going_on if run.folder == folder or is_among(folder, [run.folder])), None)
+    return next((run for run in _going_on() if run.folder == folder or is_among(folder, [run.folder])), None)
+
+
+def _going_on() -> tuple[_Run, ...]:
+    """The runs that write at present; one that was interrupted at its very end may still be listed."""
+    return tuple(run for run in _runs.get() if run.hidden in _unfinished)
 
 
 def _keep_aside(final: Path, aside: Path) -> None:
@@ -327,7 +330,7 @@ def output_folder(
         sources: files that were read before.
 
     Raises:
-        InputError: as :func:`prepare_folder`, a file cannot be written, or it would replace one that was read.
+        InputError: as :func:`prepare_folder`, nothing can be written into the folder, or it would replace one that was read.
     """
     expect(path, (str, os.PathLike), "folder", "the path of one")
     folder = Path(path)
@@ -340,7 +343,7 @@ def output_folder(
         return
     made = _missing(folder)
     run = _Run(folder, _hidden(folder / "run", made))
-    before = _runs.get()
+    before = _going_on()
     try:
         prepare_folder(folder)
         for source in sources:
@@ -393,12 +396,12 @@ def remove_file(path: Path) -> None:
 
 
 def prepare_folder(path: str | os.PathLike[str]) -> Path:
-    """Create the output folder, parents included, and make sure that files can be written into it.
+    """Create the output folder, parents included.
 
     What killed runs have left half-written there is removed (see `remove_unfinished`).
 
     Raises:
-        InputError: it is a file, lies below a file, or cannot be created or written, or its name is no text.
+        InputError: it is a file, lies below a file, or cannot be created, or its name is no text.
     """
     expect(path, (str, os.PathLike), "folder", "the path of one")
     folder = Path(path)
@@ -407,8 +410,6 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
         if folder.exists() and not folder.is_dir():
             raise InputError(f"output folder {folder} is a file; give a folder, or a name that is not taken")
         folder.mkdir(parents=True, exist_ok=True)
-        with hidden_file(folder / "probe") as probe:
-            probe.touch(exist_ok=False)
     except UnicodeEncodeError:
         raise InputError(
             f"output folder {str(folder)!a} has bytes in its name that are no UTF-8; choose another one"
