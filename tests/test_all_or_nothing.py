@@ -256,6 +256,32 @@ def test_the_next_run_puts_back_what_a_killed_one_was_about_to_change(tmp_path: 
     assert set(os.listdir(tmp_path)) == set(BEFORE)
 
 
+def test_a_folder_that_takes_the_place_of_a_file_meanwhile_stays(tmp_path: Path):
+    def change() -> None:
+        with output_folder(_filled(tmp_path)):
+            write(tmp_path, "a.txt", "b.txt", "new.txt", text="after")
+            (tmp_path / "new.txt").mkdir()
+            (tmp_path / "new.txt" / "mine").write_text("mine")
+
+    with pytest.raises(InputError, match="is a directory"):
+        change()
+    assert files(tmp_path) == {**BEFORE, os.path.join("new.txt", "mine"): b"mine"}
+
+
+@pytest.mark.skipif(os.name != "posix", reason="other systems tell nothing of a process by its number")
+@pytest.mark.parametrize(
+    "listed", ['["../users.txt", "/etc/hostname", "..", 3]', '{"users.txt": 1}', "[" * 100_000, "3"]
+)
+def test_what_a_hidden_folder_lists_of_other_places_is_left_alone(tmp_path: Path, listed: str):
+    out = _filled(tmp_path / "out")
+    (tmp_path / "users.txt").write_text("mine")
+    left = out / f".run-warpflat-{atomic._machine()}-4194999-01234567"
+    (left / "aside").mkdir(parents=True)
+    (left / "fresh.json").write_text(listed)
+    prepare_folder(out)
+    assert files(tmp_path) == {"users.txt": b"mine", **{os.path.join("out", k): v for k, v in BEFORE.items()}}
+
+
 # --- an interruption at every line
 
 

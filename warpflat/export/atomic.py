@@ -9,6 +9,7 @@ This is also the one place that sees to it that no file is replaced from which a
 from __future__ import annotations
 
 import atexit
+import errno
 import functools
 import hashlib
 import json
@@ -295,6 +296,8 @@ def _keep_aside(final: Path, aside: Path) -> None:
     """Give a file a second name, where there is one; where the file system has no links, its only one until the new file is there."""
     if not os.path.lexists(final):
         return
+    if final.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(final))
     try:
         os.link(final, aside, follow_symlinks=False)
     except (OSError, NotImplementedError):
@@ -305,14 +308,18 @@ def _put_back(hidden: Path) -> None:
     """Undo a change of the files that was begun and not ended; done twice it does no more than once."""
     try:
         fresh = json.loads((hidden / _FRESH).read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+    except (FileNotFoundError, ValueError, RecursionError):
         return  # it was not begun, or is complete
     folder = hidden.parent
-    for name in fresh:
-        if not (hidden / _NEW / name).exists():
+    # Only plain names are followed: the list may have been put there by anybody.
+    listed = [name for name in fresh if isinstance(name, str)] if isinstance(fresh, list) else []
+    for name in listed:
+        plain = Path(name).name == name and name not in ("", "..")
+        if plain and not (hidden / _NEW / name).exists():
             (folder / name).unlink(missing_ok=True)
     for path in (hidden / _ASIDE).iterdir():
         os.replace(path, folder / path.name)
+    (hidden / _FRESH).unlink()
 
 
 @contextmanager
