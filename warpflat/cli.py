@@ -11,6 +11,7 @@ import signal
 import sys
 import tempfile
 import threading
+import traceback
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
@@ -100,7 +101,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         return DONE
     except OSError as error:
         reason = (error.strerror or str(error)).lower()
-        if error.filename is None and _output_fails():
+        if error.filename is None and _was_printing(error):
             _drop_output()
             return _fail(f"cannot write to standard output: {reason}")
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
@@ -125,13 +126,9 @@ def _is_open(stream: TextIO | None) -> bool:
     return True
 
 
-def _output_fails() -> bool:
-    """Whether standard output cannot be written: what is left in its buffer is tried again."""
-    try:
-        sys.stdout.flush()
-    except (OSError, ValueError):
-        return True
-    return False
+def _was_printing(error: OSError) -> bool:
+    """Whether an error came out of what prints results, and not of a file without a name."""
+    return any(frame.f_code is click.echo.__code__ for frame, _ in traceback.walk_tb(error.__traceback__))
 
 
 def _drop_output() -> None:
