@@ -7,12 +7,10 @@ import json
 import math
 import os
 import re
-import signal
 import sys
 import tempfile
-import threading
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
@@ -20,6 +18,7 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
+from warpflat.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
 from warpflat.words import plain_letters
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["cli", "main"]
 
-DONE, NOT_CONVERGED, BAD_INPUT, HUNG_UP, INTERRUPTED, TERMINATED = 0, 1, 2, 129, 130, 143
+DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 
 _EXIT_CODES = """\b
 Exit codes:
@@ -61,10 +60,6 @@ class _Interrupted(Exception):
     pass
 
 
-class _Terminated(BaseException):
-    """With the signal's number."""
-
-
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
@@ -78,7 +73,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
     _open_stderr()
     try:
-        with _stopped_by_signals():
+        with raised_by_signals():
             code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
@@ -88,13 +83,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hint = f"; see {context.command_path} --help" if context is not None else ""
         return _fail(error.format_message().rstrip(".") + hint)
     except (KeyboardInterrupt, click.Abort, _Interrupted):
-        click.echo("warpflat: interrupted", err=True)
-        return INTERRUPTED
-    except _Terminated as ended:
-        if ended.args[0] != signal.SIGTERM:
-            return HUNG_UP  # nobody is there to be told
-        click.echo("warpflat: terminated", err=True)
-        return TERMINATED
+        return _stopped(INTERRUPTED)
+    except Stopped as stopped:
+        return _stopped(stopped.code)
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
@@ -131,26 +122,11 @@ def _drop_output() -> None:
         os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
-@contextmanager
-def _stopped_by_signals() -> Iterator[None]:
-    """Let SIGTERM, and SIGHUP as a terminal that closes, end what is going on by an exception, as SIGINT does, so that no temporary file
-    stays; a second one ends it at once."""
-
-    def stop(number: int, _: object) -> None:
-        signal.signal(number, signal.SIG_DFL)
-        raise _Terminated(number)
-
-    # Elsewhere it is ignored, as by nohup, or the business of whoever has called; only a process's main thread may ask for it.
-    main_thread = threading.current_thread() is threading.main_thread()
-    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    ours = [number for number in known if main_thread and signal.getsignal(number) is signal.SIG_DFL]
-    for number in ours:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number in ours:
-            signal.signal(number, signal.SIG_DFL)
+def _stopped(code: int) -> int:
+    words = words_of(code)
+    if words is not None:
+        click.echo(words, err=True)
+    return code
 
 
 def _fail(message: str) -> int:

@@ -1,0 +1,116 @@
+"""Signals that end the program: Ctrl-C, SIGTERM, and SIGHUP of a terminal that closes.
+
+While nothing is open they end the process where it stands. While files are open they raise an exception, so that no temporary file stays.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+
+__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "words_of"]
+
+HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
+_WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
+_AGAIN = 0.01  # [s] after which a signal is raised again whose exception was lost
+
+
+class Stopped(BaseException):
+    """A signal has asked the program to end.
+
+    Attributes:
+        code: the exit code for it.
+    """
+
+    def __init__(self, number: int) -> None:
+        """By the signal of this number."""
+        super().__init__(number)
+        self.code = 128 + number
+
+
+def words_of(code: int) -> str | None:
+    """What is told at the exit code of a signal; None where the terminal is closed and nobody can be told."""
+    return _WORDS.get(code)
+
+
+def end_at_once(code: int | None = None) -> None:
+    """Let signals end the process without a traceback, while nothing is open that must be removed.
+
+    Args:
+        code: the exit code that the process has already earned, and has told why; by default that of the signal.
+    """
+
+    def end(number: int, _: object) -> None:
+        words = words_of(128 + number) if code is None else None
+        if words is not None:
+            os.write(2, f"{words}\n".encode())
+        os._exit(128 + number if code is None else code)
+
+    for number in _ours():
+        signal.signal(number, end)
+
+
+@contextmanager
+def raised_by_signals() -> Iterator[None]:
+    """Let the first signal raise `Stopped` in the body, and a second one end the process at once."""
+    before = {number: signal.getsignal(number) for number in _ours()}
+    came = list[int]()
+
+    def stop(number: int, _: object) -> None:
+        came.append(number)
+        for each in before:
+            signal.signal(each, signal.SIG_DFL)
+        raise Stopped(number)
+
+    def ready() -> None:
+        for number in before:
+            signal.signal(number, stop)
+
+    told_before, sys.unraisablehook = sys.unraisablehook, _raising_again(ready, sys.unraisablehook)
+    ready()
+    try:
+        yield
+    except Exception:
+        # Native code and imports may make an exception of their own of it.
+        if came:
+            raise Stopped(came[0]) from None
+        raise
+    finally:
+        sys.unraisablehook = told_before
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _ours() -> list[int]:
+    """Signals that end a process unless somebody has decided otherwise: they may be ignored, as by nohup, or the caller's business."""
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        return []  # only the main thread may handle signals
+    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    return [number for number in known if _is_usual(signal.getsignal(number))]
+
+
+def _is_usual(handler: object) -> bool:
+    usual = handler in (signal.SIG_DFL, signal.default_int_handler)
+    return usual or getattr(handler, "__module__", None) == __name__
+
+
+def _raising_again(ready: Callable[[], None], other: Callable[[sys.UnraisableHookArgs], object]) -> Callable[..., None]:
+    """A hook for exceptions that Python cannot raise where they happen, in a destructor say: the signal is raised once more."""
+
+    def hook(lost: sys.UnraisableHookArgs) -> None:
+        import threading
+
+        if not isinstance(lost.exc_value, Stopped):
+            other(lost)
+            return
+        ready()
+        again = threading.Timer(_AGAIN, signal.raise_signal, [lost.exc_value.args[0]])
+        again.daemon = True
+        again.start()
+
+    return hook
