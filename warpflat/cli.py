@@ -8,7 +8,6 @@ import math
 import os
 import re
 import sys
-import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -18,6 +17,7 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
+from warpflat.memory import is_out_of_memory, memory_limit, require_memory_for_libraries
 from warpflat.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
 from warpflat.words import plain_letters
 
@@ -57,24 +57,24 @@ What comes out, in DIR:
 
 
 class _Interrupted(Exception):
-    pass
+    """With the exit code."""
 
 
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
+            with raised_by_signals():
+                return super().invoke(ctx)
+        except KeyboardInterrupt as error:
             # Click would print an empty line of its own.
-            raise _Interrupted from None
+            raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
     _open_stderr()
     try:
-        with raised_by_signals():
-            code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
+        code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
         return _fail(str(error))
@@ -82,16 +82,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context = getattr(error, "ctx", None)
         hint = f"; see {context.command_path} --help" if context is not None else ""
         return _fail(error.format_message().rstrip(".") + hint)
-    except (KeyboardInterrupt, click.Abort, _Interrupted):
+    except _Interrupted as stopped:
+        return _stopped(stopped.args[0])
+    except (KeyboardInterrupt, click.Abort):
         return _stopped(INTERRUPTED)
-    except Stopped as stopped:
-        return _stopped(stopped.code)
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
-    except OSError as error:
-        if error.filename is not None:
+    except (MemoryError, RuntimeError, ImportError, OSError) as error:
+        if is_out_of_memory(error):
+            return _fail(f"not enough memory: {_end_of_memory(error)}; use a coarser mesh, or give it more memory")
+        if not isinstance(error, OSError) or error.filename is not None:
             raise  # of a file, which whoever opens it answers for
         _drop_output()
         return _fail(f"cannot write to standard output: {(error.strerror or str(error)).lower()}")
@@ -129,9 +131,24 @@ def _stopped(code: int) -> int:
     return code
 
 
+def _end_of_memory(error: BaseException) -> str:
+    told = [str(error) or "no more is to be had", memory_limit()]
+    return ", ".join(filter(None, told))
+
+
 def _fail(message: str) -> int:
     click.echo(f"warpflat: {' '.join(message.split())}", err=True)
     return BAD_INPUT
+
+
+class _Command(click.Command):
+    def invoke(self, ctx: click.Context) -> Any:
+        if self.name != "fabrics":  # it prints a table, and needs hardly a library
+            require_memory_for_libraries()
+        return super().invoke(ctx)
+
+
+_Group.command_class = _Command
 
 
 @click.group(
@@ -555,20 +572,15 @@ def _start_warp() -> None:
     """
     import warp
 
+    from warpflat.compiling import start_warp
+    from warpflat.native_output import native_errors
+
     warp.config.log_level = warp.LOG_ERROR
-    sys.stderr.flush()
-    with tempfile.TemporaryFile() as heard:
-        stderr = os.dup(2)
-        try:
-            os.dup2(heard.fileno(), 2)
-            warp.init()
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
-        heard.seek(0)
-        for line in heard.read().decode(errors="replace").splitlines():
-            if "Could not find or load the NVIDIA CUDA driver" not in line:
-                click.echo(line, err=True)
+    with native_errors() as lines:
+        start_warp()
+    for line in lines:
+        if "Could not find or load the NVIDIA CUDA driver" not in line:
+            click.echo(line, err=True)
 
 
 def _run(

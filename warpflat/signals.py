@@ -18,8 +18,10 @@ _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminate
 _AGAIN = 0.01  # [s] after which a signal is raised again whose exception was lost
 
 
-class Stopped(BaseException):
+class Stopped(KeyboardInterrupt):
     """A signal has asked the program to end.
+
+    It is a KeyboardInterrupt whatever the signal: Python's own compiler swallows every other exception of a signal handler.
 
     Attributes:
         code: the exit code for it.
