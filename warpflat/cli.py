@@ -17,7 +17,7 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
-from warpflat.memory import is_out_of_memory, memory_limit, require_memory_for_libraries
+from warpflat.memory import is_out_of_memory, memory_limit, require_memory_for_libraries, require_memory_for_usd
 from warpflat.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
 from warpflat.words import plain_letters
 
@@ -344,6 +344,7 @@ def mannequin(
     from warpflat.mannequin.table import MannequinTable, mannequin_from_table
     from warpflat.toml_file import check_table
 
+    require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
     _check_body(tables, size=size, measures=measures, landmarks=landmarks)
     if size is not None:
