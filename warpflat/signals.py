@@ -8,14 +8,16 @@ from __future__ import annotations
 import os
 import signal
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
+from types import FrameType
+from typing import Any
 
 __all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "words_of"]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
-_AGAIN = 0.01  # [s] after which a signal is raised again whose exception was lost
+_LATER = 0.01  # [s]
 
 
 class Stopped(KeyboardInterrupt):
@@ -57,33 +59,68 @@ def end_at_once(code: int | None = None) -> None:
 
 @contextmanager
 def raised_by_signals() -> Iterator[None]:
-    """Let the first signal raise `Stopped` in the body, and a second one end the process at once."""
-    before = {number: signal.getsignal(number) for number in _ours()}
-    came = list[int]()
+    """Let the first signal raise `Stopped` in the body, and a second one end the process at once.
 
-    def stop(number: int, _: object) -> None:
+    Where Python or a library would swallow the exception, in a destructor or while a module is imported, it is raised a little later.
+    """
+    before = {number: signal.getsignal(number) for number in _ours()}
+    imports = _imports(sys._getframe())
+    came, waiting = list[int](), list[Any]()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if _imports(frame) > imports:
+            later(number)
+            return
         came.append(number)
         for each in before:
             signal.signal(each, signal.SIG_DFL)
         raise Stopped(number)
 
-    def ready() -> None:
+    def later(number: int) -> None:
+        import threading
+
+        def again() -> None:
+            waiting.clear()
+            signal.raise_signal(number)
+
+        if not waiting:
+            waiting.append(threading.Timer(_LATER, again))
+            waiting[0].daemon = True
+            waiting[0].start()
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if not isinstance(what.exc_value, Stopped):
+            hook(what)
+            return
         for number in before:
             signal.signal(number, stop)
+        later(what.exc_value.args[0])
 
-    told_before, sys.unraisablehook = sys.unraisablehook, _raising_again(ready, sys.unraisablehook)
-    ready()
+    hook, sys.unraisablehook = sys.unraisablehook, lost
+    for number in before:
+        signal.signal(number, stop)
     try:
         yield
     except Exception:
-        # Native code and imports may make an exception of their own of it.
+        # Native code may make an exception of its own of it.
         if came:
             raise Stopped(came[0]) from None
         raise
     finally:
-        sys.unraisablehook = told_before
+        for timer in waiting:
+            timer.cancel()
+        sys.unraisablehook = hook
         for number, handler in before.items():
             signal.signal(number, handler)
+
+
+def _imports(frame: FrameType | None) -> int:
+    """How many of the frames, this one and those that called it, are of Python's import."""
+    count = 0
+    while frame is not None:
+        count += frame.f_globals.get("__name__") == "importlib._bootstrap"
+        frame = frame.f_back
+    return count
 
 
 def _ours() -> list[int]:
@@ -99,20 +136,3 @@ def _ours() -> list[int]:
 def _is_usual(handler: object) -> bool:
     usual = handler in (signal.SIG_DFL, signal.default_int_handler)
     return usual or getattr(handler, "__module__", None) == __name__
-
-
-def _raising_again(ready: Callable[[], None], other: Callable[[sys.UnraisableHookArgs], object]) -> Callable[..., None]:
-    """A hook for exceptions that Python cannot raise where they happen, in a destructor say: the signal is raised once more."""
-
-    def hook(lost: sys.UnraisableHookArgs) -> None:
-        import threading
-
-        if not isinstance(lost.exc_value, Stopped):
-            other(lost)
-            return
-        ready()
-        again = threading.Timer(_AGAIN, signal.raise_signal, [lost.exc_value.args[0]])
-        again.daemon = True
-        again.start()
-
-    return hook

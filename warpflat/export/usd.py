@@ -9,6 +9,7 @@ comes from the last frame. Then the file is exported once, which compacts it, an
 from __future__ import annotations
 
 import os
+import sys
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
@@ -121,11 +122,19 @@ class FrameWriter:
         Raises:
             InputError: the place cannot be written.
         """
-        from pxr import Kind, Tf, Usd, UsdGeom
-
         require_writable(self._final)
         if self._final.suffix not in (".usdc", ".usd", ".usda"):
             raise InputError(f"cannot write {self._final}: USD frames need the suffix .usdc, .usd or .usda")
+        try:
+            self._open()
+        except BaseException:  # a signal, say: without a body nobody calls `__exit__`
+            self.__exit__(*sys.exc_info())
+            raise
+        return self
+
+    def _open(self) -> None:
+        from pxr import Kind, Tf, Usd, UsdGeom
+
         try:
             # Crate files are the only ones that can be saved bit by bit, whatever the final format.
             self._working = self._working.with_suffix(".usdc")
@@ -141,7 +150,6 @@ class FrameWriter:
         stage.SetEndTimeCode(_FIRST_FRAME)
         stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
-        return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
