@@ -71,6 +71,18 @@ def test_a_signal_in_a_destructor_is_not_lost(tmp_path: Path):
     assert ended(code, tmp_path) == (143, "")
 
 
+def test_a_signal_in_a_module_that_swallows_all_exceptions_is_not_lost(tmp_path: Path):
+    (tmp_path / "swallowing.py").write_text(
+        "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGTERM)\nexcept BaseException:\n    pass\n"
+    )
+    code = (
+        "import sys, time; from warpflat.signals import Stopped, raised_by_signals; sys.path.insert(0, '.')\n"
+        "try:\n    with raised_by_signals():\n        import swallowing\n        time.sleep(30)\n"
+        "except Stopped as stopped: sys.exit(stopped.code)"
+    )
+    assert ended(code, tmp_path) == (143, "")
+
+
 def test_an_ignored_signal_stays_ignored(tmp_path: Path):
     code = AT_IMPORT.format(module="click", number=int(signal.SIGINT)).replace("flatten", "fabrics", 1)
     code = code.replace(', "cloth.obj", "--units", "m", "--no-picture"', "")

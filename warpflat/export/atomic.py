@@ -96,11 +96,17 @@ def require_writable(final: str | os.PathLike[str]) -> None:
     try:
         if final.is_dir():
             raise InputError(f"cannot write {final}: it is a folder; give the name of a file")
-        probe = hidden_beside(final)
-        probe.touch(exist_ok=False)
-        probe.unlink()
+        _probe(hidden_beside(final))
     except OSError as error:
         raise _cannot_write(final, error) from error
+
+
+def _probe(path: Path) -> None:
+    """See that a file can be made, and remove it, also where a signal comes between."""
+    try:
+        path.touch(exist_ok=False)
+    finally:
+        path.unlink(missing_ok=True)
 
 
 @contextmanager
@@ -144,9 +150,7 @@ def prepare_folder(path: str | os.PathLike[str], files: Iterable[str] = ()) -> P
         raise InputError(f"output folder {folder} is a file; give a folder, or a name that is not taken")
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        probe = hidden_beside(folder / "probe")
-        probe.touch(exist_ok=False)
-        probe.unlink()
+        _probe(hidden_beside(folder / "probe"))
     except OSError as error:
         raise InputError(f"output folder {folder} cannot be written: {_reason(error)}; choose another one") from error
     for file in files:
