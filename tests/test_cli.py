@@ -13,6 +13,7 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+import warp as wp
 
 from warpflat._version import __version__
 from warpflat.cli import main
@@ -439,6 +440,23 @@ def test_a_mistake_found_late_is_one_line_in_a_fresh_process_too(tmp_path: Path)
         capture_output=True, text=True, check=False, cwd=tmp_path,
     )  # fmt: skip
     assert mistake((result.returncode, result.stdout, result.stderr)).startswith("command line: device 'cuda:99'")
+
+
+@pytest.mark.skipif(wp.is_cuda_available(), reason="this machine has a CUDA device")
+def test_a_machine_without_cuda_is_told_in_one_line(warpflat: Run):
+    Path("cloth.obj").write_text(SQUARE)
+    told = mistake(warpflat("flatten", "cloth.obj", "--units", "m", "--device", "cuda"))
+    assert told == "command line: device 'cuda' is not available; did you mean 'cpu'? valid: cpu"
+
+
+def test_memory_that_runs_out_is_one_line(warpflat: Run, monkeypatch: pytest.MonkeyPatch):
+    def short(*_: object, **__: object) -> None:
+        raise RuntimeError("Failed to allocate 9586176 bytes on device 'cpu'")
+
+    monkeypatch.setattr("warpflat.console.ProgressBar.__call__", short)
+    Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
+    assert mistake(warpflat("run", "cap.toml")).startswith("not enough memory: Failed to allocate 9586176 bytes")
+    assert not Path("out").exists()
 
 
 def test_a_run_that_fails_leaves_no_folder(warpflat: Run, tmp_path: Path):

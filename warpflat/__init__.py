@@ -7,12 +7,15 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-from typing import TYPE_CHECKING, Any
+import os
 
 from warpflat._version import __version__
 
+TYPE_CHECKING = False  # that of typing, whose import would take longer than this whole file
+
 if TYPE_CHECKING:
+    from typing import Any
+
     from warpflat.batch import flatten_all
     from warpflat.edits import change_fabric, change_surface
     from warpflat.errors import InputError
@@ -21,10 +24,11 @@ if TYPE_CHECKING:
     from warpflat.relax import RelaxOptions
     from warpflat.surface import Surface, make_surface, read_surface
 
-_here = Path(__file__).parent
-if not (_here / "kernels").is_dir() and (_here.parent / "kernels").is_dir():
+_here = os.path.dirname(os.path.abspath(__file__))
+_root = os.path.dirname(_here)
+if not os.path.isdir(os.path.join(_here, "kernels")) and os.path.isdir(os.path.join(_root, "kernels")):
     # Imported from a checkout's root, where the kernels lie beside this folder and not in it.
-    __path__.append(str(_here.parent))
+    __path__.append(_root)
 
 _HOME = {
     "Fabric": "fabric",

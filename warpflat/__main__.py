@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 
-from warpflat.cli import main
+from warpflat.signals import end_at_once
 
 __all__ = ["program"]
 
@@ -16,12 +16,29 @@ _SELDOM = 50_000, 20, 100
 
 def program() -> int:
     """Run the command line on the arguments of this process, and return its exit code."""
+    end_at_once()  # before anything is imported that takes a while
     gc.set_threshold(*_SELDOM)
+    _silence_libraries()
+    from warpflat.cli import main
+
+    code: int | None = None
     try:
-        return main()
+        code = main()
+        return code
     finally:
+        end_at_once(code)
         # All files are closed; to look for what is unreachable once more before the process ends takes half a second.
         gc.freeze()
+
+
+def _silence_libraries() -> None:
+    """Keep warnings and logs of libraries off standard error: they are for programmers, and a mistake is one line."""
+    import logging
+    import warnings
+
+    if not sys.warnoptions:  # python -W and PYTHONWARNINGS ask for them
+        warnings.simplefilter("ignore")
+    logging.getLogger().addHandler(logging.NullHandler())
 
 
 if __name__ == "__main__":

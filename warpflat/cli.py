@@ -7,13 +7,10 @@ import json
 import math
 import os
 import re
-import signal
 import sys
-import tempfile
-import threading
 import traceback
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, TextIO
 
@@ -21,6 +18,8 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
+from warpflat.memory import is_out_of_memory, memory_limit, require_memory_for_libraries, require_memory_for_usd
+from warpflat.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
 from warpflat.words import plain_letters
 
 if TYPE_CHECKING:
@@ -28,7 +27,7 @@ if TYPE_CHECKING:
 
 __all__ = ["cli", "main"]
 
-DONE, NOT_CONVERGED, BAD_INPUT, HUNG_UP, INTERRUPTED, TERMINATED = 0, 1, 2, 129, 130, 143
+DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 
 _EXIT_CODES = """\b
 Exit codes:
@@ -58,28 +57,24 @@ What comes out, in DIR:
 
 
 class _Interrupted(Exception):
-    pass
-
-
-class _Terminated(BaseException):
-    """With the signal's number."""
+    """With the exit code."""
 
 
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            return super().invoke(ctx)
-        except KeyboardInterrupt:
+            with raised_by_signals():
+                return super().invoke(ctx)
+        except KeyboardInterrupt as error:
             # Click would print an empty line of its own.
-            raise _Interrupted from None
+            raise _Interrupted(error.code if isinstance(error, Stopped) else INTERRUPTED) from None
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code; a user's mistake is one line on stderr, never a traceback."""
     _open_stderr()
     try:
-        with _stopped_by_signals():
-            code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
+        code = cli.main(args=arguments, prog_name="warpflat", standalone_mode=False)
         return code if isinstance(code, int) else DONE
     except InputError as error:
         return _fail(str(error))
@@ -87,19 +82,19 @@ def main(arguments: Sequence[str] | None = None) -> int:
         context = getattr(error, "ctx", None)
         hint = f"; see {context.command_path} --help" if context is not None else ""
         return _fail(error.format_message().rstrip(".") + hint)
-    except (KeyboardInterrupt, click.Abort, _Interrupted):
-        click.echo("warpflat: interrupted", err=True)
-        return INTERRUPTED
-    except _Terminated as ended:
-        if ended.args[0] != signal.SIGTERM:
-            return HUNG_UP  # nobody is there to be told
-        click.echo("warpflat: terminated", err=True)
-        return TERMINATED
+    except _Interrupted as stopped:
+        return _stopped(stopped.args[0])
+    except (KeyboardInterrupt, click.Abort):
+        return _stopped(INTERRUPTED)
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
-    except OSError as error:
+    except (MemoryError, RuntimeError, ImportError, OSError) as error:
+        if is_out_of_memory(error):
+            return _fail(f"not enough memory: {_end_of_memory(error)}; use a coarser mesh, or give it more memory")
+        if not isinstance(error, OSError):
+            raise
         reason = (error.strerror or str(error)).lower()
         if error.filename is None and _was_printing(error):
             _drop_output()
@@ -137,31 +132,31 @@ def _drop_output() -> None:
         os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
-@contextmanager
-def _stopped_by_signals() -> Iterator[None]:
-    """Let SIGTERM, and SIGHUP as a terminal that closes, end what is going on by an exception, as SIGINT does, so that no temporary file
-    stays; a second one ends it at once."""
+def _stopped(code: int) -> int:
+    words = words_of(code)
+    if words is not None:
+        click.echo(words, err=True)
+    return code
 
-    def stop(number: int, _: object) -> None:
-        signal.signal(number, signal.SIG_DFL)
-        raise _Terminated(number)
 
-    # Elsewhere it is ignored, as by nohup, or the business of whoever has called; only a process's main thread may ask for it.
-    main_thread = threading.current_thread() is threading.main_thread()
-    known = [getattr(signal, name) for name in ("SIGTERM", "SIGHUP") if hasattr(signal, name)]
-    ours = [number for number in known if main_thread and signal.getsignal(number) is signal.SIG_DFL]
-    for number in ours:
-        signal.signal(number, stop)
-    try:
-        yield
-    finally:
-        for number in ours:
-            signal.signal(number, signal.SIG_DFL)
+def _end_of_memory(error: BaseException) -> str:
+    told = [str(error) or "no more is to be had", memory_limit()]
+    return ", ".join(filter(None, told))
 
 
 def _fail(message: str) -> int:
     click.echo(f"warpflat: {' '.join(message.split())}", err=True)
     return BAD_INPUT
+
+
+class _Command(click.Command):
+    def invoke(self, ctx: click.Context) -> Any:
+        if self.name != "fabrics":  # it prints a table, and needs hardly a library
+            require_memory_for_libraries()
+        return super().invoke(ctx)
+
+
+_Group.command_class = _Command
 
 
 @click.group(
@@ -359,6 +354,7 @@ def mannequin(
     from warpflat.mannequin.table import MannequinTable, mannequin_from_table
     from warpflat.toml_file import check_table
 
+    require_memory_for_usd()  # mannequin.usdc is always written
     tables: dict[str, Any] = {key: value for key, value in source.items() if value not in (None, False)}
     _check_body(tables, size=size, measures=measures, landmarks=landmarks)
     if size is not None:
@@ -597,20 +593,15 @@ def _start_warp() -> None:
     """
     import warp
 
+    from warpflat.compiling import start_warp
+    from warpflat.native_output import native_errors
+
     warp.config.log_level = warp.LOG_ERROR
-    sys.stderr.flush()
-    with tempfile.TemporaryFile() as heard:
-        stderr = os.dup(2)
-        try:
-            os.dup2(heard.fileno(), 2)
-            warp.init()
-        finally:
-            os.dup2(stderr, 2)
-            os.close(stderr)
-        heard.seek(0)
-        for line in heard.read().decode(errors="replace").splitlines():
-            if "Could not find or load the NVIDIA CUDA driver" not in line:
-                click.echo(line, err=True)
+    with native_errors() as lines:
+        start_warp()
+    for line in lines:
+        if "Could not find or load the NVIDIA CUDA driver" not in line:
+            click.echo(line, err=True)
 
 
 def _run(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:

@@ -16,6 +16,7 @@ import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.coarsen import levels_meanwhile
+from warpflat.compiling import start_warp
 from warpflat.darts import AppliedCut, measure_cut
 from warpflat.develop import Development, chosen_datum, develop
 from warpflat.errors import InputError, expect, expect_callback, nearest
@@ -447,7 +448,10 @@ def datum_extent(surface: Surface, line: IntArray) -> str:
 
 
 def _device(name: str | None) -> wp.Device:
+    start_warp()
     try:
+        if name == "cuda" and not wp.get_cuda_devices():
+            raise ValueError("no CUDA device")  # Warp would look for one, and print why there is none
         return wp.get_device(name)
     except Exception as error:
         devices: Sequence[str] = [d.alias for d in wp.get_devices()]

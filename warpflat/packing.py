@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpflat.compiling import compile_usual
+from warpflat.compiling import compile_usual, writing_kernels
 
 __all__ = ["Command", "commands_of"]
 
@@ -70,9 +70,10 @@ def _recorded(
     kernel: wp.Kernel, over: tuple[int, int], given: Sequence[Any], outputs: Sequence[Any], device: wp.Device
 ) -> wp.Launch:
     begin, end = over
-    return wp.launch(
-        kernel, dim=end - begin, inputs=[*given, begin], outputs=list(outputs), device=device, record_cmd=True
-    )
+    with writing_kernels():  # nothing runs yet, but a module that is new is compiled
+        return wp.launch(
+            kernel, dim=end - begin, inputs=[*given, begin], outputs=list(outputs), device=device, record_cmd=True
+        )
 
 
 class _Misfit(Exception):

@@ -18,6 +18,7 @@ from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
 from warpflat.mannequin.table import MannequinTable
+from warpflat.memory import require_memory_for_run
 from warpflat.names import checked_name, fitted_name, plain_name
 from warpflat.relax import RelaxOptions
 from warpflat.scene_cuts import AutoCutTable, CutStory, CutTable
@@ -267,6 +268,7 @@ def _run_surface(
     story = cuts or scene_cuts(scene, device=device)
     _check_edges(scene, story, drawing.rules)
     wanted = FrameSchedule(settings.output).wanted
+    require_memory_for_run(len(story.surface.vertices), frames=wanted)
     with ExitStack() as stack:
         writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
         film = Film(writer, story.surface, lambda: FrameSchedule(settings.output))

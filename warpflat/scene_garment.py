@@ -15,6 +15,7 @@ from warpflat.garment import Garment, flatten_form
 from warpflat.leftovers import settle
 from warpflat.mannequin import FormResult, Mannequin, form_from_mapping, shipped_form
 from warpflat.mannequin.table import mannequin_from_table
+from warpflat.memory import require_memory_for_run
 from warpflat.pattern.from_garment import check_fold_grain, folds_of, plan_form
 from warpflat.pattern_files import PatternOptions, garment_files, pattern_options
 from warpflat.scene import (
@@ -156,6 +157,7 @@ def run_garment(
     others = _other_sizes(scene)
     schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
     wanted = next(iter(schedules.values())).wanted
+    require_memory_for_run(sum(len(piece.surface.vertices) for piece in form.pieces.values()), frames=wanted)
     with ExitStack() as stack:
         writer: FrameWriter | None = None
         if wanted:

@@ -5,6 +5,7 @@ import os
 import stat
 import subprocess
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
@@ -128,6 +129,33 @@ def test_read_only_folder_is_refused(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="cannot write"):
         write_json(tmp_path / "a.json", {})
     tmp_path.chmod(0o700)
+
+
+@pytest.mark.parametrize("prepare", [prepare_folder, lambda folder: FrameWriter(folder / "frames.usdc").__enter__()])
+def test_a_signal_while_a_place_is_tried_leaves_no_file(
+    prepare: Callable[[Path], object], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    touch = Path.touch
+
+    def interrupted(path: Path, **options: bool) -> None:
+        touch(path, **options)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(Path, "touch", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        prepare(tmp_path)
+    assert os.listdir(tmp_path) == []
+
+
+def test_a_signal_while_a_film_is_opened_leaves_no_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def interrupted(*_: object, **__: object) -> None:
+        assert len(os.listdir(tmp_path)) == 1
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr("warpflat.export.usd.define_group", interrupted)
+    with pytest.raises(KeyboardInterrupt), FrameWriter(tmp_path / "frames.usdc"):
+        pass
+    assert os.listdir(tmp_path) == []
 
 
 def test_prepare_folder_creates_it_and_leaves_it_empty(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.inputs import note_read
+from warpflat.memory import require_memory_for_usd
 
 __all__ = ["UsdMesh", "read_usd"]
 
@@ -46,6 +47,7 @@ def read_usd(path: Path, *, prim: str | None = None, metres_per_unit: float | No
     Raises:
         InputError: without the file's name: if the file is no stage, or there is no such mesh.
     """
+    require_memory_for_usd()
     from pxr import Tf, Usd, UsdGeom
 
     try:

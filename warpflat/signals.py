@@ -1,0 +1,138 @@
+"""Signals that end the program: Ctrl-C, SIGTERM, and SIGHUP of a terminal that closes.
+
+While nothing is open they end the process where it stands. While files are open they raise an exception, so that no temporary file stays.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import Any
+
+__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "words_of"]
+
+HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
+_WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
+_LATER = 0.01  # [s]
+
+
+class Stopped(KeyboardInterrupt):
+    """A signal has asked the program to end.
+
+    It is a KeyboardInterrupt whatever the signal: Python's own compiler swallows every other exception of a signal handler.
+
+    Attributes:
+        code: the exit code for it.
+    """
+
+    def __init__(self, number: int) -> None:
+        """By the signal of this number."""
+        super().__init__(number)
+        self.code = 128 + number
+
+
+def words_of(code: int) -> str | None:
+    """What is told at the exit code of a signal; None where the terminal is closed and nobody can be told."""
+    return _WORDS.get(code)
+
+
+def end_at_once(code: int | None = None) -> None:
+    """Let signals end the process without a traceback, while nothing is open that must be removed.
+
+    Args:
+        code: the exit code that the process has already earned, and has told why; by default that of the signal.
+    """
+
+    def end(number: int, _: object) -> None:
+        words = words_of(128 + number) if code is None else None
+        if words is not None:
+            os.write(2, f"{words}\n".encode())
+        os._exit(128 + number if code is None else code)
+
+    for number in _ours():
+        signal.signal(number, end)
+
+
+@contextmanager
+def raised_by_signals() -> Iterator[None]:
+    """Let the first signal raise `Stopped` in the body, and a second one end the process at once.
+
+    Where Python or a library would swallow the exception, in a destructor or while a module is imported, it is raised a little later.
+    """
+    before = {number: signal.getsignal(number) for number in _ours()}
+    imports = _imports(sys._getframe())
+    came, waiting = list[int](), list[Any]()
+
+    def stop(number: int, frame: FrameType | None) -> None:
+        if _imports(frame) > imports:
+            later(number)
+            return
+        came.append(number)
+        for each in before:
+            signal.signal(each, signal.SIG_DFL)
+        raise Stopped(number)
+
+    def later(number: int) -> None:
+        import threading
+
+        def again() -> None:
+            waiting.clear()
+            signal.raise_signal(number)
+
+        if not waiting:
+            waiting.append(threading.Timer(_LATER, again))
+            waiting[0].daemon = True
+            waiting[0].start()
+
+    def lost(what: sys.UnraisableHookArgs) -> None:
+        if not isinstance(what.exc_value, Stopped):
+            hook(what)
+            return
+        for number in before:
+            signal.signal(number, stop)
+        later(what.exc_value.args[0])
+
+    hook, sys.unraisablehook = sys.unraisablehook, lost
+    for number in before:
+        signal.signal(number, stop)
+    try:
+        yield
+    except Exception:
+        # Native code may make an exception of its own of it.
+        if came:
+            raise Stopped(came[0]) from None
+        raise
+    finally:
+        for timer in waiting:
+            timer.cancel()
+        sys.unraisablehook = hook
+        for number, handler in before.items():
+            signal.signal(number, handler)
+
+
+def _imports(frame: FrameType | None) -> int:
+    """How many of the frames, this one and those that called it, are of Python's import."""
+    count = 0
+    while frame is not None:
+        count += frame.f_globals.get("__name__") == "importlib._bootstrap"
+        frame = frame.f_back
+    return count
+
+
+def _ours() -> list[int]:
+    """Signals that end a process unless somebody has decided otherwise: they may be ignored, as by nohup, or the caller's business."""
+    import threading
+
+    if threading.current_thread() is not threading.main_thread():
+        return []  # only the main thread may handle signals
+    known = [getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name)]
+    return [number for number in known if _is_usual(signal.getsignal(number))]
+
+
+def _is_usual(handler: object) -> bool:
+    usual = handler in (signal.SIG_DFL, signal.default_int_handler)
+    return usual or getattr(handler, "__module__", None) == __name__
