@@ -16,6 +16,7 @@ from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import make_surface
 from warpflat.surface.mesh import Surface
+from warpflat.surface.polygons import filled_up
 from warpflat.surface.read_obj import read_obj
 from warpflat.surface.read_usd import read_usd
 
@@ -126,7 +127,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
         mesh = read_usd(file, prim=prim, metres_per_unit=scale)
         return _Raw(
             vertices=mesh.vertices,
-            polygons=mesh.polygons,
+            polygons=filled_up(mesh.corners, mesh.sizes),
             scale=1.0,
             name=mesh.name,
             curves=mesh.curves,

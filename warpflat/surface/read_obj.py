@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
+from warpflat.surface.polygons import filled_up
 
 __all__ = ["ObjMesh", "chain_lines", "read_obj"]
 
@@ -145,9 +146,7 @@ def _polygons(found: _Statements, total: int) -> NDArray[np.int64]:
         raise InputError(
             _face_message(found, face, f"refers to vertex {flat[wrong[0]]}, but the file has {total:,} (1 to {total})")
         )
-    polygons = np.full((len(count), max(int(count.max()), 4)), -1, dtype=np.int64)
-    polygons[np.arange(polygons.shape[1]) < count[:, None]] = index
-    return polygons
+    return filled_up(index, count)
 
 
 def _face_message(found: _Statements, face: int, what: str) -> str:
