@@ -40,6 +40,9 @@ from warpflat.words import counted
 
 __all__ = ["checked_positions", "make_surface"]
 
+# Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
+_SMALLEST, _LARGEST = 1e-20, 1e20
+
 
 @dataclass
 class _Mesh:
@@ -134,7 +137,7 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
     """Vertices as #V by 3 numbers.
 
     Raises:
-        InputError: of another shape, or not finite; names the vertex.
+        InputError: of another shape, not finite, or out of all bounds; names the vertex.
     """
     try:
         given = np.asarray(vertices)
@@ -154,6 +157,12 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
         raise InputError(
             f"vertex {bad[0]} (counted from 0) is not finite: ({x:g}, {y:g}, {z:g}){more}; coordinates must be numbers"
         )
+    far = int(np.argmax(np.abs(positions).max(axis=1)))
+    if np.abs(positions[far]).max() > _LARGEST:
+        x, y, z = positions[far].tolist()
+        raise InputError(
+            f"vertex {far} (counted from 0) lies at ({x:.3g}, {y:.3g}, {z:.3g}) m, too far to compute with; positions are in metres"
+        )
     return positions
 
 
@@ -171,6 +180,9 @@ def _checked_faces(positions: NDArray[np.float64], polygons: ArrayLike | Sequenc
             f"face {row} (counted from 0) refers to vertex {padded[row].max()}, but there are {len(positions):,} "
             f"vertices (0 to {len(positions) - 1})"
         )
+    size = float(np.ptp(positions[padded[real]], axis=0).max())
+    if size < _SMALLEST:
+        raise InputError(f"all vertices of faces lie within {size:.3g} m of each other; positions are in metres")
     notes: list[str] = []
     distinct, keep, lost = distinct_corners(padded)
     _note_repeated(notes, np.flatnonzero(~keep), np.flatnonzero(lost))

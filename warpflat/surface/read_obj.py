@@ -61,7 +61,9 @@ def read_obj(path: Path) -> ObjMesh:
     raw = path.read_bytes()
     if b"\0" in raw:
         raise InputError("not an OBJ file: it holds binary data")
-    statements = _collect(raw.decode("utf-8-sig", errors="replace"))
+    text = raw.decode("utf-8-sig", errors="replace")
+    _check_last_line(text)
+    statements = _collect(text)
     if not statements.vertices:
         raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
     vertices = _numbers(statements)
@@ -74,6 +76,13 @@ def read_obj(path: Path) -> ObjMesh:
         lines=_line_elements(statements, len(vertices)),
         split_corners=_split_per_texture(statements, len(vertices)),
     )
+
+
+def _check_last_line(text: str) -> None:
+    """See that a file does not break off within a face's corner: nothing else in it tells how long it should be."""
+    _, _, last = text.rpartition("\n")
+    if last.startswith("f ") and last.rstrip() == last and len({word.count("/") for word in last.split()[1:]}) > 1:
+        raise InputError(f"is cut short: its last line is 'f {last[2:42]}', whose corners are not alike")
 
 
 def _collect(text: str) -> _Statements:
