@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.words import shown
 
 __all__ = ["UNREADABLE", "UsdMesh", "answer", "read_stage"]
 
@@ -176,8 +177,8 @@ def _choose(stage: Any, prim: str | None) -> Any:
         raise InputError("holds no mesh prim")
     if prim is None:
         if len(meshes) > 1:
-            shown = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
-            raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {shown}")
+            some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+            raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
         return meshes[0]
     found = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
     if len(found) != 1:
@@ -240,10 +241,10 @@ def _add_curves(out: UsdMesh, curves: Any, to_metres: Any) -> None:
     name = curves.GetPrim().GetName()
     points, counts = _value(curves.GetPointsAttr()), _value(curves.GetCurveVertexCountsAttr())
     if points is None or counts is None or len(points) != sum(counts):
-        out.notes.append(f"curves {name!r} have no points and were left out")
+        out.notes.append(f"curves {shown(name)} have no points and were left out")
         return
     if _value(curves.GetTypeAttr()) != UsdGeom.Tokens.linear:
-        out.notes.append(f"curves {name!r} are not linear and were left out: convert them to polylines")
+        out.notes.append(f"curves {shown(name)} are not linear and were left out: convert them to polylines")
         return
     periodic = _value(curves.GetWrapAttr()) == UsdGeom.Tokens.periodic
     place, _ = to_metres(points, curves.GetPrim())

@@ -36,7 +36,7 @@ from warpflat.surface.topology import (
     orient,
 )
 from warpflat.surface.weld import t_junction, welding
-from warpflat.words import counted
+from warpflat.words import counted, shown
 
 __all__ = ["checked_positions", "make_surface"]
 
@@ -207,10 +207,10 @@ def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDAr
 def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
     path = np.asarray(line)
     if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
-        raise InputError(f"line {name!r} must be a list of at least two vertex indices")
+        raise InputError(f"line {shown(name)} must be a list of at least two vertex indices")
     wrong = path[(path < 0) | (path >= size)]
     if len(wrong):
-        raise InputError(f"line {name!r} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
+        raise InputError(f"line {shown(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
     return path.astype(np.int64)
 
 
@@ -343,7 +343,7 @@ def _renumber_lines(mesh: _Mesh, paths: Mapping[str, NDArray[np.int32]]) -> dict
     for name, path in paths.items():
         rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
         if not any(row in places for row in rows):
-            mesh.notes.append(f"line {name!r} does not lie on the piece and was left out")
+            mesh.notes.append(f"line {shown(name)} does not lie on the piece and was left out")
             continue
         lines[name] = _trace_line(name, rows, places, edges)
     return lines
@@ -354,7 +354,7 @@ def _trace_line(
 ) -> list[int]:
     missing = [row for row in rows if row not in places]
     if missing:
-        raise InputError(f"line {name!r} leaves the piece at vertex {missing[0]} (counted from 0)")
+        raise InputError(f"line {shown(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
     line: list[int] = []
     for i, row in enumerate(rows):
         choice = places[row]
@@ -362,7 +362,7 @@ def _trace_line(
             choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in edges]
             if not choice:
                 raise InputError(
-                    f"line {name!r} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
+                    f"line {shown(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
                 )
         elif len(choice) > 1 and len(rows) > 1:
             follow = places[rows[1]]

@@ -19,11 +19,12 @@ from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import checked_positions, make_surface
 from warpflat.surface.mesh import Surface
 from warpflat.surface.polygons import distinct_corners, filled_up, split_polygons
+from warpflat.surface.read_checks import check_ply, check_stl
 from warpflat.surface.read_obj import read_obj
 from warpflat.surface.read_off import read_off
-from warpflat.surface.read_ply import check_ply
 from warpflat.surface.read_usd import read_usd
 from warpflat.surface.stray import stray_vertex, stray_words
+from warpflat.words import shown
 
 __all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
 
@@ -230,6 +231,8 @@ def _trimesh_scene(file: Path) -> Any:
     suffix = file.suffix.lower()
     if suffix == ".ply":
         check_ply(file)
+    elif suffix == ".stl":
+        check_stl(file)
     options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
     # What it logs goes nowhere, but to the handlers of a program that has its own.
     logging.getLogger("trimesh").addHandler(logging.NullHandler())
@@ -320,5 +323,5 @@ def _snap_curves(surface: Surface, curves: dict[str, NDArray[np.float64]]) -> Su
             continue
         off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
         if off.max() > 1e-6 * size:
-            notes.append(f"line {name!r} was drawn along the nearest edges")
+            notes.append(f"line {shown(name)} was drawn along the nearest edges")
     return replace(with_lines(surface, lines), notes=tuple(notes))

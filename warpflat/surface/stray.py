@@ -22,6 +22,6 @@ def stray_words(vertex: int, place: NDArray[np.float64]) -> str:
     """What a message says of it."""
     x, y, z = place.tolist()
     return (
-        f"vertex {vertex} (counted from 0) lies at ({x:.6g}, {y:.6g}, {z:.6g}), far from all others; move it to its place, or delete it "
+        f"vertex {vertex} (counted from 0) lies at ({x:.10g}, {y:.10g}, {z:.10g}), far from all others; move it to its place, or delete it "
         "with its faces"
     )

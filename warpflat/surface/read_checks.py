@@ -1,4 +1,4 @@
-"""A PLY file is whole: trimesh takes the rows of an ASCII file that are there for those that should be."""
+"""PLY and STL files hold what their headers tell of: of an ASCII PLY cut short trimesh takes the rows that are there."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pathlib import Path
 
 from warpflat.errors import InputError
 
-__all__ = ["check_ply"]
+__all__ = ["check_ply", "check_stl"]
 
 
 def check_ply(path: Path) -> None:
@@ -33,6 +33,22 @@ def check_ply(path: Path) -> None:
             if (reason := _fault(rows[number].split(), properties)) is not None:
                 raise InputError(f"line {above + number}: {rows[number].strip()[:40]!r} is no {name!r}: {reason}")
         at += count
+
+
+def check_stl(path: Path) -> None:
+    """See that a binary file is as long as its count of triangles asks for; one of text ends with a word, which trimesh looks for.
+
+    Raises:
+        InputError: without the file's name.
+    """
+    with path.open("rb") as file:
+        head = file.read(1000)
+    size = path.stat().st_size
+    count = int.from_bytes(head[80:84], "little")
+    if b"facet" not in head.lower() and size != 84 + 50 * count:
+        raise InputError(
+            f"not a readable STL file: {size:,} bytes long, but its header tells of {count:,} triangles of 50 bytes each"
+        )
 
 
 def _elements(head: str) -> list[tuple[str, int, list[bool]]]:
