@@ -544,3 +544,33 @@ def test_a_folder_where_a_file_is_to_be_is_told_before_anything_is_written(tmp_p
     with pytest.raises(InputError, match=r"metrics.json is a folder"):
         run_scene(scene, tmp_path, on_progress=lambda at: pytest.fail("it was flattened"))
     assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
+
+
+def test_a_tube_closed_at_one_end_is_crushed_and_flagged_and_its_film_is_written(tmp_path):
+    from warpflat.export import FrameWriter
+    from warpflat.film import Film
+    from warpflat.surface import make_surface
+
+    around, up = 16, 80
+    angle = np.linspace(0.0, 2.0 * np.pi, around, endpoint=False)
+    rings = [
+        np.column_stack([0.05 * np.cos(angle), 0.0 * angle + z, 0.05 * np.sin(angle)]) for z in np.linspace(0, 2, up)
+    ]
+    start = around * np.arange(up - 1)[:, None] + np.arange(around)
+    after = around * np.arange(up - 1)[:, None] + (np.arange(around) + 1) % around
+    quads = np.stack([start, after, after + around, start + around], axis=-1).reshape(-1, 4)
+    top = around * up
+    last = np.arange(top - around, top)
+    cap = np.column_stack([last, np.roll(last, -1), np.full(around, top), np.full(around, -1)])
+    tube = make_surface(np.vstack([*rings, [[0.0, 2.001, 0.0]]]), np.concatenate([quads, cap]))
+
+    class Seldom:
+        def is_due(self, step: int, max_steps: int) -> bool:
+            return step % 50 == 0
+
+    with FrameWriter(tmp_path / "frames.usdc") as writer:
+        film = Film(writer, tube, Seldom)
+        result = flatten(tube, relax=RelaxOptions(max_steps=100), callback=film)
+        film.last(result)
+    assert result.flipped_faces > 0
+    assert (tmp_path / "frames.usdc").exists()

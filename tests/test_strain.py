@@ -101,6 +101,17 @@ def test_a_face_of_no_area_has_no_density():
     assert not worn.area.any()
 
 
+def test_a_crushed_face_counts_as_flipped_and_its_density_fits_a_film():
+    surface = square(triangles=True)
+    network = network_of(surface)
+    for share in (1e-12, 1e-30, 1e-160):
+        positions = share * surface.vertices[:, :2]
+        density = worn_strain(network, positions).energy_density
+        assert np.isfinite(density.astype(np.float32)).all()
+        assert layout_errors(surface, network, positions).flipped_faces == len(surface.faces)
+    assert layout_errors(surface, network, 0.01 * surface.vertices[:, :2]).flipped_faces == 0
+
+
 def test_errors_are_those_of_their_definitions():
     surface = square(triangles=False)
     positions = surface.vertices[:, :2] * [0.9, 1.2]

@@ -25,6 +25,8 @@ class CycleMemory:
     """The last few cycles: where they led, and how much the forces fell along each way on each other. In the plane of these ways the energy
     is known, to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
 
+    Of a layout that is crushed to a point the forces are beyond all numbers, and so is what is worked out of them; `lowest` sees it.
+
     A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
     share with each cycle.
 
@@ -43,6 +45,7 @@ class CycleMemory:
         self.past = 0
         self._curvature = np.zeros((0, 0))
 
+    @np.errstate(over="ignore", invalid="ignore")
     def begin(self, mark: Mark) -> None:
         """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told. The mark
         is copied."""
@@ -54,6 +57,7 @@ class CycleMemory:
             self._curvature = self._curvature[-self.past :, -self.past :]
         self._keep(mark)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def come_to(self, mark: Mark) -> None:
         """A part of the cycle has led here: each is a way of its own. The mark is copied."""
         assert self._last is not None
@@ -85,13 +89,14 @@ class CycleMemory:
         layout, forces = self._last or (None, None)
         self._last = self._algebra.keep(mark[0], layout), self._algebra.keep(mark[1], forces)
 
+    @np.errstate(over="ignore", invalid="ignore")
     def lowest(self, room: Vectors) -> bool:
         """Put the way from where the cycle has come to where the energy is least there, #V by 2 [m]; whether that can be told."""
         assert self._last is not None
         moved = [number for number, way in enumerate(self._ways) if self._algebra.moves(way)]
         ways, curvature = [self._ways[number] for number in moved], self._curvature[np.ix_(moved, moved)]
         size = np.sqrt(np.abs(np.diag(curvature)))
-        if not len(size) or not (size > 0.0).all():
+        if not len(size) or not (size > 0.0).all() or not np.isfinite(curvature).all():
             return False
         gain = self._algebra.products(ways, self._last[1])
         values, axes = np.linalg.eigh(curvature / np.outer(size, size))

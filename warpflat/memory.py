@@ -51,7 +51,7 @@ def require_memory_for_run(vertices: int, *, frames: bool) -> None:
     Raises:
         InputError: it cannot.
     """
-    usd = 0 if not frames or "pxr.Usd" in sys.modules else _USD + _USD_THREAD * _cores()
+    usd = 0 if not frames or "pxr.Usd" in sys.modules else _usd()
     remedy = ", or leave the film out with frames = 0" if frames else ""
     _require(_RUN + usd + _VERTEX * vertices, f"flattening {vertices:,} vertices", remedy)
 
@@ -63,7 +63,7 @@ def require_memory_for_usd() -> None:
         InputError: it cannot.
     """
     if "pxr.Usd" not in sys.modules:
-        _require(_USD + _USD_THREAD * _cores(), "loading the USD library", "")
+        _require(_usd(), "loading the USD library", "")
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
@@ -98,6 +98,11 @@ def _require(megabytes: float, what: str, remedy: str) -> None:
         raise InputError(
             f"not enough memory: {what} takes {megabytes:,.0f} MB more{told}; raise the limit{remedy}"
         ) from None
+
+
+def _usd() -> float:
+    threads = os.environ.get("PXR_WORK_THREAD_LIMIT", "")
+    return _USD + _USD_THREAD * (int(threads) if threads.isdecimal() and int(threads) > 0 else _cores())
 
 
 def _cores() -> int:

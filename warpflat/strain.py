@@ -41,6 +41,9 @@ __all__ = [
 
 FloatArray = NDArray[np.float64]
 
+# A cell that is smaller in the plane than this share of its area on the body is crushed to a point or a line.
+_COLLAPSED = 1e-9
+
 
 def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
     """The fabric as an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21), and so on."""
@@ -70,8 +73,11 @@ class WornStrain:
 
     @property
     def energy_density(self) -> FloatArray:
-        """#F [J/m2], per flat area of cloth."""
-        return self.energy / np.where(self.area > 0, self.area, np.inf)
+        """#F [J/m2], per flat area of cloth; of a face that is crushed to a point, the most that a film's numbers can say."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            density = self.energy / np.where(self.area > 0, self.area, np.inf)
+        most = float(np.finfo(np.float32).max)
+        return np.minimum(np.nan_to_num(density, nan=most, posinf=most), most)
 
 
 def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
@@ -127,7 +133,8 @@ class LayoutErrors:
         length_error: sum |l2 - L3| / sum L3 over the mesh edges (Wang 2002, E_c).
         area_error: sum |a2 - A3| / sum A3 over the faces (Wang 2002, E_s).
         boundary_error: |border length in the plane - in space| / in space.
-        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed.
+        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed, to less than a
+            billionth of its area on the body.
     """
 
     length_error: float
@@ -141,8 +148,8 @@ def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArra
     he = half_edges_of(surface)
     edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
-    corner, face, _ = corner_triangles(network.cell_arrays.faces)
-    signed = signed_cell_areas(corner, positions)
+    corner, face, weight = corner_triangles(network.cell_arrays.faces)
+    signed = weight * signed_cell_areas(corner, positions)
     flat, body = face_areas(network, positions)
     border = he.count == 1
     border_space, border_plane = in_space[border].sum(), in_plane[border].sum()
@@ -150,7 +157,7 @@ def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArra
         length_error=float(np.abs(in_plane - in_space).sum() / in_space.sum()),
         area_error=float(np.abs(flat - body).sum() / body.sum()),
         boundary_error=float(abs(border_plane - border_space) / border_space),
-        flipped_faces=len(np.unique(face[signed <= 0])),
+        flipped_faces=len(np.unique(face[signed <= _COLLAPSED * network.cell_arrays.area])),
     )
 
 

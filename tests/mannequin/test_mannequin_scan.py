@@ -260,3 +260,20 @@ def test_broken_meshes_and_options_are_refused() -> None:
         on_scan(points, faces, up="+y", facing="-y")
     with pytest.raises(InputError, match="did you mean 'waist'"):
         on_scan(points, faces, landmarks={"waste": 1.0})
+
+
+def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
+    from warpflat.mannequin.table import mannequin_from_scan_file
+
+    points, faces = _joined([_box((0.4, 1.8, 0.3), (0.0, 0.9, 0.0))])
+    points = points.copy()
+    points[5, 0] = 999999999.0
+    file = tmp_path / "body.obj"
+    rows = [f"v {x!r} {y!r} {z!r}" for x, y, z in points.tolist()]
+    rows += ["f " + " ".join(str(i + 1) for i in face) for face in faces.tolist()]
+    file.write_text("\n".join(rows) + "\n")
+    words = r"body\.obj: scan: vertex 5 \(counted from 0\) lies at \(999999999, .*far from all others; move it"
+    with pytest.raises(InputError, match=words):
+        mannequin_from_scan_file(file, options=ScanOptions(), resolution_mm=20.0)
+    with pytest.raises(InputError, match=r"none\.obj: does not exist"):
+        mannequin_from_scan_file(tmp_path / "none.obj", options=ScanOptions(), resolution_mm=20.0)

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, nearest
 from warpflat.mannequin.profiles import Floats
+from warpflat.surface.stray import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
 
@@ -200,6 +201,8 @@ def _welded(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray
     span = float(np.ptp(vertices[used], axis=0).max())
     if span <= 0.0:
         raise InputError("scan: all its vertices lie at one point")
+    if (stray := stray_vertex(vertices[used])) is not None:
+        raise InputError(f"scan: {stray_words(int(used[stray]), vertices[used[stray]])}")
     _, first, inverse = np.unique(
         np.round(vertices / (1e-6 * span)).astype(np.int64), axis=0, return_index=True, return_inverse=True
     )

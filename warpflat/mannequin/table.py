@@ -10,10 +10,11 @@ from typing import Annotated, Literal
 from pydantic import Field, model_validator
 
 from warpflat.errors import InputError
-from warpflat.inputs import listening_to_reads, note_read, noting_resolver
+from warpflat.inputs import listening_to_reads, note_read
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import size_table
 from warpflat.mannequin.scan_pose import ScanOptions
+from warpflat.surface.read import read_scan
 from warpflat.toml_file import Table
 from warpflat.words import MADE_TO_MEASURE
 
@@ -93,25 +94,10 @@ def mannequin_from_scan_file(path: Path, *, options: ScanOptions, resolution_mm:
     Raises:
         InputError: the file cannot be read as a mesh, or the mesh is no standing body.
     """
-    import trimesh
-
-    if not path.exists():
-        raise InputError(f"{path}: no such file; give the mesh of a body (OBJ, PLY, STL, GLB)")
-    if path.is_dir():
-        raise InputError(f"{path}: is a folder; give the mesh of a body (OBJ, PLY, STL, GLB)")
     note_read(path)
     sources = [path.absolute()]
-    try:
-        with listening_to_reads(sources.append):
-            mesh = trimesh.load(path, process=False, force="mesh", resolver=noting_resolver(path))
-        vertices, faces = mesh.vertices.view(), mesh.faces.view()
-    except InputError:
-        raise
-    except Exception as error:  # whatever a reader makes of noise
-        reason = " ".join(str(error).split()) or type(error).__name__
-        raise InputError(f"{path}: cannot be read as a mesh ({reason}); OBJ, PLY, STL and GLB can") from None
-    if len(faces) == 0:
-        raise InputError(f"{path}: has no faces; give the mesh of a body")
+    with listening_to_reads(sources.append):
+        vertices, faces = read_scan(path)
     try:
         mannequin = Mannequin.from_scan(vertices, faces, options=options, resolution_mm=resolution_mm)
     except InputError as error:

@@ -17,6 +17,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import EdgeGraph, are_joined, as_vertex, path_in
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of
+from warpflat.words import shown
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 
@@ -228,7 +229,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
 
     curve = np.asarray(points, dtype=np.float64)
     if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.isfinite(curve).all():
-        raise InputError(f"curve {name!r} must be at least two points of three finite numbers [m]")
+        raise InputError(f"curve {shown(name)} must be at least two points of three finite numbers [m]")
     graph = EdgeGraph(surface)
     edge = float(graph.length.mean())
     tree = cKDTree(surface.vertices)
@@ -236,7 +237,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
     if distance.max() > _OFF_PIECE * max(edge, float(graph.length.max())):
         far = int(np.argmax(distance))
         raise InputError(
-            f"curve {name!r} does not lie on the piece {surface.name!r}: its point {far} is {distance[far]:.3g} m off"
+            f"curve {shown(name)} does not lie on the piece {surface.name!r}: its point {far} is {distance[far]:.3g} m off"
         )
     on = distance <= _ON_VERTEX * edge
     on[[0, -1]] = True
@@ -252,7 +253,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
         line += _along(surface, graph, curve[i : j + 1], start, end, edge)
     line = _without_detours(line)
     if len(line) < 2:
-        raise InputError(f"curve {name!r} is shorter than the edges of {surface.name!r} around it")
+        raise InputError(f"curve {shown(name)} is shorter than the edges of {surface.name!r} around it")
     return np.array(line, dtype=np.int32)
 
 
@@ -298,5 +299,5 @@ def with_lines(surface: Surface, lines: Mapping[str, ArrayLike]) -> Surface:
         try:
             checked[name] = line_from_indices(surface, line)
         except InputError as error:
-            raise InputError(f"line {name!r}: {error}") from error
+            raise InputError(f"line {shown(name)}: {error}") from error
     return replace(surface, lines=checked)

@@ -36,9 +36,12 @@ from warpflat.surface.topology import (
     orient,
 )
 from warpflat.surface.weld import t_junction, welding
-from warpflat.words import counted
+from warpflat.words import counted, shown
 
 __all__ = ["checked_positions", "make_surface"]
+
+# Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
+_SMALLEST, _LARGEST = 1e-20, 1e20
 
 
 @dataclass
@@ -134,7 +137,7 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
     """Vertices as #V by 3 numbers.
 
     Raises:
-        InputError: of another shape, or not finite; names the vertex.
+        InputError: of another shape, not finite, or out of all bounds; names the vertex.
     """
     try:
         given = np.asarray(vertices)
@@ -154,6 +157,12 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
         raise InputError(
             f"vertex {bad[0]} (counted from 0) is not finite: ({x:g}, {y:g}, {z:g}){more}; coordinates must be numbers"
         )
+    far = int(np.argmax(np.abs(positions).max(axis=1)))
+    if np.abs(positions[far]).max() > _LARGEST:
+        x, y, z = positions[far].tolist()
+        raise InputError(
+            f"vertex {far} (counted from 0) lies at ({x:.3g}, {y:.3g}, {z:.3g}) m, too far to compute with; positions are in metres"
+        )
     return positions
 
 
@@ -171,6 +180,9 @@ def _checked_faces(positions: NDArray[np.float64], polygons: ArrayLike | Sequenc
             f"face {row} (counted from 0) refers to vertex {padded[row].max()}, but there are {len(positions):,} "
             f"vertices (0 to {len(positions) - 1})"
         )
+    size = float(np.ptp(positions[padded[real]], axis=0).max())
+    if size < _SMALLEST:
+        raise InputError(f"all vertices of faces lie within {size:.3g} m of each other; positions are in metres")
     notes: list[str] = []
     distinct, keep, lost = distinct_corners(padded)
     _note_repeated(notes, np.flatnonzero(~keep), np.flatnonzero(lost))
@@ -195,10 +207,10 @@ def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDAr
 def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
     path = np.asarray(line)
     if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
-        raise InputError(f"line {name!r} must be a list of at least two vertex indices")
+        raise InputError(f"line {shown(name)} must be a list of at least two vertex indices")
     wrong = path[(path < 0) | (path >= size)]
     if len(wrong):
-        raise InputError(f"line {name!r} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
+        raise InputError(f"line {shown(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
     return path.astype(np.int64)
 
 
@@ -331,7 +343,7 @@ def _renumber_lines(mesh: _Mesh, paths: Mapping[str, NDArray[np.int32]]) -> dict
     for name, path in paths.items():
         rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
         if not any(row in places for row in rows):
-            mesh.notes.append(f"line {name!r} does not lie on the piece and was left out")
+            mesh.notes.append(f"line {shown(name)} does not lie on the piece and was left out")
             continue
         lines[name] = _trace_line(name, rows, places, edges)
     return lines
@@ -342,7 +354,7 @@ def _trace_line(
 ) -> list[int]:
     missing = [row for row in rows if row not in places]
     if missing:
-        raise InputError(f"line {name!r} leaves the piece at vertex {missing[0]} (counted from 0)")
+        raise InputError(f"line {shown(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
     line: list[int] = []
     for i, row in enumerate(rows):
         choice = places[row]
@@ -350,7 +362,7 @@ def _trace_line(
             choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in edges]
             if not choice:
                 raise InputError(
-                    f"line {name!r} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
+                    f"line {shown(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
                 )
         elif len(choice) > 1 and len(rows) > 1:
             follow = places[rows[1]]

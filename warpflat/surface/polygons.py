@@ -14,11 +14,15 @@ from warpflat.surface.vectors import cross, dot, points_at
 __all__ = [
     "crossed_quads",
     "distinct_corners",
+    "filled_up",
     "list_some",
     "padded_polygons",
     "split_non_convex_quads",
     "split_polygons",
 ]
+
+# Entries of the table of faces, faces times the largest count of corners: a gigabyte.
+_MOST_CORNERS = 2**27
 
 
 def list_some(indices: ArrayLike, most: int = 8) -> str:
@@ -57,8 +61,23 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
     short = np.flatnonzero(count < 3)
     if len(short):
         raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
-    out = np.full((len(rows), max(int(count.max()), 3)), -1, dtype=np.int64)
-    out[np.arange(out.shape[1]) < count[:, None]] = flat
+    return filled_up(flat, count)
+
+
+def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
+    """#F by the largest corner count, at least 4: corners one face after the other, filled up with -1 on the right.
+
+    Raises:
+        InputError: if one face has so many corners that the table of all faces would not fit into memory.
+    """
+    width = max(int(count.max()), 4)
+    if len(count) * width > _MOST_CORNERS:
+        raise InputError(
+            f"face {int(count.argmax())} (counted from 0) has {width:,} corners, too many beside {len(count):,} faces; cut it into "
+            "triangles before"
+        )
+    out = np.full((len(count), width), -1, dtype=np.int64)
+    out[np.arange(width) < count[:, None]] = flat
     return out
 
 
@@ -90,7 +109,7 @@ def split_polygons(
 ) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     """#F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
 
-    Polygons of more than four corners are cut into triangles, ear by ear, in the plane that fits them.
+    Polygons of more than four corners are cut into triangles in their mean plane, as fat ones as their corners allow.
 
     Raises:
         InputError: naming the polygon, if its outline crosses itself.
@@ -104,9 +123,9 @@ def split_polygons(
     origin = [np.flatnonzero(~large).astype(np.int32)]
     for row in np.flatnonzero(large).tolist():
         corners = polygons[row][polygons[row] >= 0]
-        triangles = _clip_ears(vertices[corners], row)
+        triangles = _triangulated(vertices[corners], row)
         block = np.full((len(triangles), 4), -1, dtype=np.int32)
-        block[:, :3] = corners[np.array(triangles)]
+        block[:, :3] = corners[triangles]
         parts.append(block)
         origin.append(np.full(len(triangles), row, dtype=np.int32))
     index = np.concatenate(origin)
@@ -119,36 +138,32 @@ def _newell(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
 
 
-def _clip_ears(points: NDArray[np.float64], row: int) -> list[list[int]]:
-    """Triangles (local corner numbers) of one simple polygon."""
+def _triangulated(points: NDArray[np.float64], row: int) -> NDArray[np.int64]:
+    """Triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
+    import shapely
+
     centred = points - points.mean(axis=0)
-    normal = _newell(centred)
-    drop = int(np.argmax(np.abs(normal)))
-    flat = np.delete(centred, drop, axis=1)
-    turn = np.sign(normal[drop]) * (-1.0 if drop == 1 else 1.0)
-
-    def area(i: int, j: int, k: int) -> float:
-        (ax, ay), (bx, by), (cx, cy) = flat[i], flat[j], flat[k]
-        return float(turn * ((bx - ax) * (cy - ay) - (by - ay) * (cx - ax)))
-
-    ring = list(range(len(points)))
-    triangles = []
-    while len(ring) > 3:
-        best, best_ear = 0.0, -1
-        for n, j in enumerate(ring):
-            i, k = ring[n - 1], ring[(n + 1) % len(ring)]
-            size = area(i, j, k)
-            if size <= best:
-                continue
-            others = (p for p in ring if p not in (i, j, k))
-            if not any(area(i, j, p) >= 0 and area(j, k, p) >= 0 and area(k, i, p) >= 0 for p in others):
-                best, best_ear = size, n
-        if best_ear < 0:
-            raise InputError(f"face {row} (counted from 0) crosses itself: it cannot be cut into triangles")
-        triangles.append([ring[best_ear - 1], ring[best_ear], ring[(best_ear + 1) % len(ring)]])
-        del ring[best_ear]
-    triangles.append(ring)
+    flat = centred @ _plane_axes(_newell(centred)).T
+    outline = shapely.Polygon(flat)
+    number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
+    if not outline.is_valid or len(number) < len(flat):
+        raise InputError(
+            f"face {row} (counted from 0) crosses itself or touches itself: it cannot be cut into triangles"
+        )
+    rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(outline)).reshape(-1, 4, 2)[:, :3]
+    triangles = np.array([number[corner] for corner in map(tuple, rings.reshape(-1, 2).tolist())]).reshape(-1, 3)
+    a, b, c = flat[triangles].transpose(1, 0, 2)
+    clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    triangles[clockwise] = triangles[clockwise, ::-1]
     return triangles
+
+
+def _plane_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+    """2 by 3, two unit vectors at right angles to each other and to `normal`, so that all three make a right-handed frame."""
+    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = np.cross(axis, normal)
+    second = np.cross(normal, first)
+    return np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)])
 
 
 def split_non_convex_quads(

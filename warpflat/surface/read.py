@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import logging
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from os import PathLike
@@ -15,12 +17,17 @@ from warpflat.errors import InputError, expect, nearest
 from warpflat.inputs import listening_to_reads, note_read, noting_resolver
 from warpflat.names import checked_name, fitted_name
 from warpflat.surface.lines import line_from_curve, with_lines
-from warpflat.surface.mend import make_surface
+from warpflat.surface.mend import checked_positions, make_surface
 from warpflat.surface.mesh import Surface
+from warpflat.surface.polygons import distinct_corners, filled_up, split_polygons
+from warpflat.surface.read_checks import check_ply, check_stl
 from warpflat.surface.read_obj import read_obj
+from warpflat.surface.read_off import read_off
 from warpflat.surface.read_usd import read_usd
+from warpflat.surface.stray import stray_vertex, stray_words
+from warpflat.words import shown
 
-__all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_surface"]
+__all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
 
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
@@ -58,7 +65,7 @@ def read_surface(
 ) -> Surface:
     """Read, mend and check a surface.
 
-    OBJ keeps its quads, and USD too; PLY, STL, OFF, GLB and glTF are read with trimesh, which cuts polygons into
+    OBJ, OFF and USD keep their quads; PLY, STL, GLB and glTF are read with trimesh, which cuts polygons into
     triangles. GLB and glTF are in metres and Y up by their standard, USD says its unit and its up axis (Z up is turned
     to Y up); all other axes are taken as they are. Line elements of OBJ and linear BasisCurves beside or below a USD
     mesh, or in the group MESH_lines beside it, become feature lines.
@@ -95,6 +102,8 @@ def read_surface(
         raise InputError(f"{file}: {error}") from error
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    if component is None:
+        _refuse_stray_vertex(raw, file)
     surface = make_surface(
         raw.vertices * raw.scale,
         raw.polygons,
@@ -108,6 +117,26 @@ def read_surface(
     _check_size(surface, file, raw.scale)
     surface = _snap_curves(surface, {key: curve * raw.scale for key, curve in raw.curves.items()})
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
+
+
+def read_scan(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    """Read any mesh as it stands, closed or in several parts, such as the scan of a body.
+
+    Returns:
+        #V by 3, positions in the file's own unit; #F by 4, faces, -1 in the last column of a triangle.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    try:
+        _check_file(path)
+        raw = _read(path, None, None)
+        polygons, keep, _ = distinct_corners(raw.polygons)
+        return raw.vertices, split_polygons(checked_positions(raw.vertices), polygons[keep])[0]
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
 
 
 def _check_file(file: Path) -> None:
@@ -130,7 +159,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
         mesh = read_usd(file, prim=prim, metres_per_unit=scale)
         return _Raw(
             vertices=mesh.vertices,
-            polygons=mesh.polygons,
+            polygons=filled_up(mesh.corners, mesh.sizes),
             scale=1.0,
             name=mesh.name,
             curves=mesh.curves,
@@ -140,6 +169,9 @@ def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
         raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
     if suffix == ".obj":
         return _from_obj(file, scale)
+    if suffix == ".off":
+        vertices, polygons = read_off(file)
+        return _Raw(vertices=vertices, polygons=polygons, scale=scale)
     return _from_trimesh(file, scale, prim)
 
 
@@ -174,20 +206,8 @@ def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
 
 
 def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
-    import trimesh
-
     suffix = file.suffix.lower()
-    options = {"fix_texture": False} if suffix == ".ply" else {}
-    try:
-        scene = trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
-    except InputError:
-        raise
-    # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
-    except Exception as error:
-        raise InputError(
-            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
-            "vertices and faces alone"
-        ) from error
+    scene = _trimesh_scene(file)
     meshes = list(_instances(scene))
     if prim is not None:
         names = [node for node, _, _ in meshes]
@@ -208,6 +228,32 @@ def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
     )
 
 
+def _trimesh_scene(file: Path) -> Any:
+    """The file as trimesh reads it, which says nothing meanwhile."""
+    import trimesh
+
+    suffix = file.suffix.lower()
+    if suffix == ".ply":
+        check_ply(file)
+    elif suffix == ".stl":
+        check_stl(file)
+    options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
+    # What it logs goes nowhere, but to the handlers of a program that has its own.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
+    except InputError:
+        raise
+    # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
+    except Exception as error:
+        raise InputError(
+            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
+            "vertices and faces alone"
+        ) from error
+
+
 def _instances(scene: Any) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.int64]]]:
     """The meshes of a trimesh scene: node, world positions, triangles."""
     import trimesh
@@ -223,6 +269,19 @@ def _instances(scene: Any) -> Iterator[tuple[str, NDArray[np.float64], NDArray[n
             vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
         faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
         yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+
+
+def _refuse_stray_vertex(raw: _Raw, file: Path) -> None:
+    """A vertex far from all others is told as such: as a part of the whole it makes a piece too large, or slivers."""
+    assert raw.scale is not None
+    used = np.unique(raw.polygons[raw.polygons >= 0])
+    used = used[used < len(raw.vertices)]
+    points = raw.vertices[used]
+    # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
+    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * raw.scale > _POSSIBLE[1]:
+        stray = stray_vertex(points)
+        if stray is not None:
+            raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
 
 
 def _extent(points: NDArray[np.float64], scale: float) -> str:
@@ -270,5 +329,5 @@ def _snap_curves(surface: Surface, curves: dict[str, NDArray[np.float64]]) -> Su
             continue
         off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
         if off.max() > 1e-6 * size:
-            notes.append(f"line {name!r} was drawn along the nearest edges")
+            notes.append(f"line {shown(name)} was drawn along the nearest edges")
     return replace(with_lines(surface, lines), notes=tuple(notes))

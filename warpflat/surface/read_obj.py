@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
+from warpflat.surface.polygons import filled_up
 
 __all__ = ["ObjMesh", "chain_lines", "read_obj"]
 
@@ -60,7 +61,9 @@ def read_obj(path: Path) -> ObjMesh:
     raw = path.read_bytes()
     if b"\0" in raw:
         raise InputError("not an OBJ file: it holds binary data")
-    statements = _collect(raw.decode("utf-8-sig", errors="replace"))
+    text = raw.decode("utf-8-sig", errors="replace")
+    _check_last_line(text)
+    statements = _collect(text)
     if not statements.vertices:
         raise InputError("not an OBJ file: no line of it is a vertex ('v x y z')")
     vertices = _numbers(statements)
@@ -73,6 +76,13 @@ def read_obj(path: Path) -> ObjMesh:
         lines=_line_elements(statements, len(vertices)),
         split_corners=_split_per_texture(statements, len(vertices)),
     )
+
+
+def _check_last_line(text: str) -> None:
+    """See that a file does not break off within a face's corner: nothing else in it tells how long it should be."""
+    _, _, last = text.rpartition("\n")
+    if last.startswith("f ") and last.rstrip() == last and len({word.count("/") for word in last.split()[1:]}) > 1:
+        raise InputError(f"is cut short: its last line is 'f {last[2:42]}', whose corners are not alike")
 
 
 def _collect(text: str) -> _Statements:
@@ -145,9 +155,7 @@ def _polygons(found: _Statements, total: int) -> NDArray[np.int64]:
         raise InputError(
             _face_message(found, face, f"refers to vertex {flat[wrong[0]]}, but the file has {total:,} (1 to {total})")
         )
-    polygons = np.full((len(count), max(int(count.max()), 4)), -1, dtype=np.int64)
-    polygons[np.arange(polygons.shape[1]) < count[:, None]] = index
-    return polygons
+    return filled_up(index, count)
 
 
 def _face_message(found: _Statements, face: int, what: str) -> str:
