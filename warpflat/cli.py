@@ -20,7 +20,7 @@ import click
 
 from warpflat._version import __version__
 from warpflat.errors import InputError
-from warpflat.words import plain_letters
+from warpflat.words import one_line, plain_letters
 
 if TYPE_CHECKING:
     from warpflat.scene import Scene
@@ -154,7 +154,7 @@ def _stopped_by_signals() -> Iterator[None]:
 
 
 def _fail(message: str) -> int:
-    click.echo(f"warpflat: {' '.join(message.split())}", err=True)
+    click.echo(f"warpflat: {one_line(message)}", err=True)
     return BAD_INPUT
 
 
@@ -260,7 +260,7 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
 def flatten(
     mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
 ) -> int:
-    """Flatten one mesh: OBJ, PLY, STL, GLB or USD.
+    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
 
     \b
     Examples:
@@ -315,7 +315,7 @@ def flatten(
 @click.option(
     "--table", type=click.Choice(["women", "men"]), help="Completes the measurements.  [default: the size's, or women]"
 )
-@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, GLB.")
+@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, OFF, GLB.")
 @click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")
