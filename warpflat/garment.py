@@ -162,9 +162,10 @@ class Garment:
             InputError: the folder cannot be written.
         """
         from warpflat.export import prepare_folder, write_picture
-        from warpflat.leftovers import write_metrics
+        from warpflat.leftovers import require_own_metrics, write_metrics
 
         to = prepare_folder(folder)
+        require_own_metrics(to)
         files = [piece.write_obj(to) for piece in self.pieces.values()]
         if picture:
             files.append("picture.png")

@@ -53,11 +53,12 @@ def write_results(
         InputError: the folder cannot be written.
     """
     from warpflat.export import prepare_folder, write_picture
-    from warpflat.leftovers import write_metrics
+    from warpflat.leftovers import require_own_metrics, write_metrics
 
     to = prepare_folder(
         folder, ["metrics.json", *(["frames.usdc"] if frames else []), *(["picture.png"] if picture else [])]
     )
+    require_own_metrics(to)
     files = []
     for result in results:
         files.append(result.write_obj(to))

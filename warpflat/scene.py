@@ -229,8 +229,10 @@ def run_scene(
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, or `out` cannot be written.
     """
     from warpflat.export import output_folder
+    from warpflat.leftovers import require_own_metrics
 
     with output_folder(out, _files_for_all(scene.settings)) as folder:
+        require_own_metrics(folder)
         if scene.settings.mannequin is not None:
             from warpflat.scene_garment import run_garment
 

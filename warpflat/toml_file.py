@@ -89,7 +89,7 @@ def _check_values(tables: dict[str, Any], path: Path) -> None:
             raise InputError(f"{path}: {key}: {shown(value)} has the control character {letter!r} in it; leave it out")
 
 
-def check_table(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
+def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
     """The data as a `model`.
 
     Args:
@@ -107,7 +107,8 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str) -> Mode
         # A misspelled key is usually also a missing one: tell the cause, not the consequence.
         problems.sort(key=lambda p: p["type"] != "extra_forbidden")
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        raise InputError(f"{where}: {_describe(model, data, problems[0])}{more}") from None
+        told = f"{_describe(model, data, problems[0])}{more}"
+        raise InputError(f"{where}: {told}" if where else told) from None
 
 
 def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
 from warpflat.export.atomic import atomic_path, prepare_folder
-from warpflat.leftovers import write_metrics
+from warpflat.leftovers import require_own_metrics, write_metrics
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 
@@ -32,6 +32,7 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         InputError: if a file cannot be written.
     """
     place = prepare_folder(folder)
+    require_own_metrics(place)
     files = {
         "usd": place / "mannequin.usdc", "obj": place / "mannequin.obj", "picture": place / "picture.png",
         "metrics": place / "metrics.json",
