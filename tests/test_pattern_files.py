@@ -475,7 +475,7 @@ def test_another_size_that_went_wrong_is_a_warning(
         ("{", "cannot be read as JSON"),
         ("[]", "no pattern of warpflat"),
         ('{"sizes": {}, "schema": 99}', "has schema 99"),
-        ('{"sizes": {}, "schema": 1}', "key 'stitches' is missing"),
+        ('{"sizes": {}, "schema": 1}', "name: is missing"),
     ],
 )
 def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):

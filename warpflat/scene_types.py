@@ -30,7 +30,9 @@ __all__ = [
     "text_or_table",
 ]
 
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+# The square of a much larger one is no number any more.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Vertex = Annotated[int, Field(ge=0)]
 PointOrVertex = Annotated[
     Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
 from warpflat.names import checked_label
@@ -16,10 +17,21 @@ from warpflat.words import control_in, shown
 __all__ = ["DartEntry", "EdgeEntry", "LabelEntry", "NotchEntry", "PatternEntry", "PieceEntry", "SideEntry"]
 
 
+#: No closed line of a pattern encloses less [m2].
+SMALLEST_AREA = 1e-10
+
+
 def _text(text: str) -> str:
     if letter := control_in(text, "\n"):
         raise ValueError(f"{shown(text)} has the control character {letter!r} in it")
     return text
+
+
+def _ring(points: list[list[float]]) -> list[list[float]]:
+    x, y = np.transpose(points)
+    if abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 < SMALLEST_AREA:
+        raise ValueError("encloses no area")
+    return points
 
 
 # A larger coordinate is an error of units, and its square soon no number any more.
@@ -30,7 +42,7 @@ Text = Annotated[str, AfterValidator(_text)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Ends = Annotated[list[Point], Field(min_length=2, max_length=2)]
 Line = Annotated[list[Point], Field(min_length=2)]
-Ring = Annotated[list[Point], Field(min_length=3)]
+Ring = Annotated[list[Point], Field(min_length=3), AfterValidator(_ring)]
 Segment = Annotated[list[Point], Field(min_length=4, max_length=4)]
 Row = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
