@@ -6,6 +6,7 @@ import copy
 import json
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
@@ -21,7 +22,7 @@ from warpflat.export.pattern_json import pattern_json
 from warpflat.export.svg import SvgPage
 from warpflat.fabric_file import read_fabrics
 from warpflat.names import checked_label, plain_label
-from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment
+from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment, draft_piece
 from warpflat.shapes import make_shape
 from warpflat.surface import make_surface, with_lines
 from warpflat.toml_file import read_toml
@@ -169,6 +170,16 @@ def test_texts_of_several_lines_and_large_numbers_are_read(tmp_path: Path):
     file = tmp_path / "fine.toml"
     file.write_text('a = """\none\n\ttwo\n"""\nb = -9223372036854775808\nc = [[[[1]]]]\n')
     assert read_toml(file) == {"a": "one\n\ttwo\n", "b": -(2**63), "c": [[[[1]]]]}
+
+
+@pytest.mark.filterwarnings("error")
+def test_an_allowance_that_nothing_resolves_is_none():
+    edges = [replace(edge, allowance=1e-308) for edge in square().edges]
+    drafted = draft_piece(replace(square(), edges=edges))
+    np.testing.assert_array_equal(
+        drafted.cut_line,
+        draft_piece(replace(square(), edges=[replace(edge, allowance=0.0) for edge in edges])).cut_line,
+    )
 
 
 # --- pattern.json
