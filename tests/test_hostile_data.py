@@ -323,6 +323,8 @@ def test_the_pattern_itself_is_exported(tmp_path: Path, pattern: dict[str, Any])
         ["flatten", "a\x1b[31m\u202e.obj", "--units", "m"],
         ["flatten", "x" * 3000 + ".obj"],
         ["flatten", "front.obj", "--name", "x" * 3000],
+        ["flatten", "front.obj", "--component", DIGITS],
+        ["flatten", "front.obj", "--datum", f"{DIGITS},{DIGITS}"],
         ["flatten", "front.obj", "--" + "x" * 3000],
         ["mannequin", "--measure", "x" * 3000 + "=0.9"],
         ["mannequin", "--measure", "bust=1e400"],

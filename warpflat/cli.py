@@ -287,14 +287,14 @@ def flatten(
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
-    if options["component"] is not None and re.fullmatch(r"-?[0-9]+", options["component"]):
+    if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "grain_angle", "model"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
     tables["output"]["picture"] = not options["no_picture"]
-    if datum is not None and re.fullmatch(r"\d+(,\d+)+", datum):
+    if datum is not None and re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", datum):
         vertices = [int(vertex) for vertex in datum.split(",")]
         ends = {"from": vertices[0], "to": vertices[1]}
         tables["datum"] = "datum"
