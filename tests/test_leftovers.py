@@ -149,7 +149,54 @@ def test_a_record_that_names_other_places_is_not_followed(tmp_path: Path, name: 
     out = tmp_path / "out"
     (out / "folder").mkdir(parents=True)
     (out / "folder" / "user.txt").write_text("")
-    (out / "metrics.json").write_text(json.dumps({"files": {"cap": {name: empty}}}))
+    (out / "metrics.json").write_text(json.dumps({"warpflat": "0.1.0", "files": {"cap": {name: empty}}}))
     _, notes = settle(out, {}, name="cap", files=())
     assert notes == ()
     assert all(path.exists() for path in (user, out / "folder" / "user.txt", out / "metrics.json"))
+
+
+FOREIGN = {
+    "lists in lists": "[" * 100_000,
+    "digits": '{"warpflat": ' + "9" * 5000 + "}",
+    "of another program": '{"accuracy": 0.9}',
+    "a list": "[]",
+    "no JSON": "accuracy = 0.9",
+    "empty": "",
+    "no text": "\x00\udcff",
+}
+
+
+@pytest.mark.parametrize("text", FOREIGN.values(), ids=FOREIGN)
+def test_metrics_of_another_program_are_not_replaced(
+    tmp_path: Path, text: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+):
+    def too_late(*_: object, **__: object) -> None:
+        raise AssertionError("it was flattened first")
+
+    monkeypatch.setattr("warpflat.flattening.flatten", too_late)
+    own = tmp_path / "out" / "metrics.json"
+    own.parent.mkdir()
+    own.write_text(text, errors="surrogateescape")
+    before = own.read_bytes()
+    scene = tmp_path / "cap.toml"
+    scene.write_text("[surface]\nshape = 'dome'\nresolution = 5\n")
+    assert main(["run", str(scene), "--out", str(own.parent)]) == 2
+    told = capsys.readouterr().err
+    assert told.count("\n") == 1
+    assert f"{own}: is not of warpflat" in told
+    assert [path.name for path in own.parent.iterdir()] == ["metrics.json"]
+    assert own.read_bytes() == before
+
+
+def test_a_result_saved_by_hand_does_not_replace_the_metrics_of_another_program(tmp_path: Path):
+    (tmp_path / "metrics.json").write_text('{"accuracy": 0.9}')
+    with pytest.raises(InputError, match="is not of warpflat"):
+        flatten(make_shape("dome", resolution=5)).save(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["metrics.json"]
+
+
+def test_a_pattern_is_exported_beside_the_metrics_of_another_program(tmp_path: Path):
+    run(tmp_path, formats=("json",))
+    (tmp_path / "out" / "metrics.json").write_text('{"accuracy": 0.9}')
+    assert export_pattern(tmp_path / "out", "svg") == "cap.svg"
+    assert (tmp_path / "out" / "metrics.json").read_text() == '{"accuracy": 0.9}'

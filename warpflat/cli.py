@@ -20,7 +20,7 @@ from warpflat._version import __version__
 from warpflat.errors import InputError
 from warpflat.memory import is_out_of_memory, memory_limit, require_memory_for_libraries, require_memory_for_usd
 from warpflat.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
-from warpflat.words import plain_letters
+from warpflat.words import one_line, plain_letters
 
 if TYPE_CHECKING:
     from warpflat.scene import Scene, SceneResult
@@ -145,7 +145,7 @@ def _end_of_memory(error: BaseException) -> str:
 
 
 def _fail(message: str) -> int:
-    click.echo(f"warpflat: {' '.join(message.split())}", err=True)
+    click.echo(f"warpflat: {one_line(message)}", err=True)
     return BAD_INPUT
 
 
@@ -261,7 +261,7 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
 def flatten(
     mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
 ) -> int:
-    """Flatten one mesh: OBJ, PLY, STL, GLB or USD.
+    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
 
     \b
     Examples:
@@ -288,14 +288,14 @@ def flatten(
     for option, (table, key) in places.items():
         if options[option] is not None:
             tables.setdefault(table, {})[key] = options[option]
-    if options["component"] is not None and re.fullmatch(r"-?[0-9]+", options["component"]):
+    if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
     for key in ("name", "fabric", "grain_angle", "model"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])
     tables["output"]["picture"] = not options["no_picture"]
-    if datum is not None and re.fullmatch(r"\d+(,\d+)+", datum):
+    if datum is not None and re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", datum):
         vertices = [int(vertex) for vertex in datum.split(",")]
         ends = {"from": vertices[0], "to": vertices[1]}
         tables["datum"] = "datum"
@@ -316,7 +316,7 @@ def flatten(
 @click.option(
     "--table", type=click.Choice(["women", "men"]), help="Completes the measurements.  [default: the size's, or women]"
 )
-@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, GLB.")
+@click.option("--scan", metavar="FILE", help="The mesh of a standing body: OBJ, PLY, STL, OFF, GLB.")
 @click.option("--units", metavar="UNIT", help="Of the scan: m, cm, mm ...  [default: told from its height]")
 @click.option("--facing", metavar="AXIS", help="Where the scan looks, such as +z.  [default: told from its shape]")
 @click.option("--up", metavar="AXIS", help="Where the scan's head is, such as +y.  [default: told from its shape]")

@@ -7,14 +7,26 @@ import numbers
 from collections.abc import Collection, Iterable
 from typing import TypeGuard
 
+from warpflat.words import one_line, shown
+
 __all__ = ["InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
+
+
+#: Valid words that a message lists at most.
+MOST_LISTED = 40
+#: Letters of a word by which the nearest one is found: comparing takes their square.
+LONGEST_COMPARED = 200
 
 
 class InputError(ValueError):
     """Bad input. The message is one line: what is wrong, where, and what would be right.
 
-    The command line prints it and exits with code 2; scripts catch it as a ``ValueError``.
+    The command line prints it and exits with code 2; scripts catch it as a ``ValueError``. Whatever names of the user's the message
+    quotes, it stays one line, of bounded length and without control characters.
     """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
 
 
 def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
@@ -67,10 +79,12 @@ def is_number(value: object, *, whole: bool = False) -> TypeGuard[float]:
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """The end of a message about an unknown `word`: the nearest valid one, then all of them."""
+    """The end of a message about an unknown `word`: the nearest valid one, then all of them, or the first ones of very many."""
     options = sorted(valid)
     # Somebody who writes EMT_warp means emt_warp.
     plain = {option.lower(): option for option in reversed(options)}
-    close = difflib.get_close_matches(word.lower(), plain, n=1, cutoff=0.5)
-    guess = f"did you mean {plain[close[0]]!r}? " if close else ""
-    return f"{guess}valid: {', '.join(options) if options else 'none'}"
+    close = difflib.get_close_matches(word[:LONGEST_COMPARED].lower(), plain, n=1, cutoff=0.5)
+    guess = f"did you mean {shown(plain[close[0]])}? " if close else ""
+    listed = ", ".join(shown(option)[1:-1] for option in options[:MOST_LISTED])
+    more = f" and {len(options) - MOST_LISTED} more" if len(options) > MOST_LISTED else ""
+    return f"{guess}valid: {listed or 'none'}{more}"

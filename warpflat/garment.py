@@ -162,10 +162,11 @@ class Garment:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
         """
         from warpflat.export import output_folder, write_picture
-        from warpflat.leftovers import write_metrics
+        from warpflat.leftovers import require_own_metrics, write_metrics
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.mannequin.sources) as to:
+            require_own_metrics(to)
             files = [piece.write_obj(to) for piece in self.pieces.values()]
             if picture:
                 write_picture(to / "picture.png", [piece.picture_piece() for piece in self.pieces.values()])

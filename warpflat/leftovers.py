@@ -12,10 +12,11 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from warpflat.errors import InputError
 from warpflat.export.atomic import current, is_input, remove_file
 from warpflat.export.metrics import write_json
 
-__all__ = ["note_file", "settle", "write_metrics"]
+__all__ = ["note_file", "require_own_metrics", "settle", "write_metrics"]
 
 Record = dict[str, dict[str, str]]
 
@@ -84,7 +85,10 @@ def note_file(folder: Path, name: str, file: str) -> None:
     Raises:
         InputError: `metrics.json` cannot be written.
     """
-    metrics = _read(folder)
+    try:
+        metrics = _read(folder)
+    except InputError:
+        return  # somebody else's, which knows of no run
     record = _record(metrics)
     if name in record:
         record[name][file] = _digest(current(folder / file))
@@ -106,13 +110,33 @@ def _take_away(path: Path, was: str) -> str:
     return ""
 
 
+def require_own_metrics(folder: Path) -> None:
+    """Make sure that a `metrics.json` which is there is of warpflat, since a run replaces it.
+
+    Raises:
+        InputError: it is something else by that name.
+    """
+    _read(folder)
+
+
 def _read(folder: Path) -> dict[str, Any]:
-    """What a folder's `metrics.json` holds; nothing where there is none, or something else by that name."""
+    """What a folder's `metrics.json` holds; nothing where there is none.
+
+    Raises:
+        InputError: it is something else by that name.
+    """
+    file = folder / "metrics.json"
     try:
-        data = json.loads(current(folder / "metrics.json").read_text(encoding="utf-8"))
-    except (OSError, ValueError):
+        data = json.loads(current(file).read_text(encoding="utf-8"))
+    except FileNotFoundError:
         return {}
-    return data if isinstance(data, dict) else {}
+    except (OSError, ValueError, RecursionError):
+        data = None
+    if not isinstance(data, dict) or "warpflat" not in data:
+        raise InputError(
+            f"{file}: is not of warpflat, and a run would replace it; move it away, or choose another folder"
+        )
+    return data
 
 
 def _record(metrics: Mapping[str, Any]) -> Record:

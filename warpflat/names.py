@@ -6,9 +6,9 @@ import re
 import unicodedata
 
 from warpflat.errors import InputError
-from warpflat.words import plain_letters
+from warpflat.words import control_in, plain_letters, shown
 
-__all__ = ["checked_name", "fitted_name", "plain_name", "same_file"]
+__all__ = ["checked_label", "checked_name", "fitted_name", "plain_label", "plain_name", "same_file"]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
 _FORBIDDEN = '/\\:*?"<>|'
@@ -24,11 +24,28 @@ def checked_name(name: str) -> str:
         InputError: it is no text, empty, too long, leads to another folder, or is refused by some system.
     """
     if reason := _refused(name):
-        shown = f"{name[:40]}..." if isinstance(name, str) and len(name) > 40 else name
         raise InputError(
-            f"{shown!r} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
+            f"{shown(name)} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
         )
     return name
+
+
+def checked_label(label: str, what: str) -> str:
+    """The name of a line, an edge or a size, if it can be written into every file: any text in one line.
+
+    Raises:
+        InputError: it is no text, empty, or has a control character in it; `what` says of what it is the name.
+    """
+    if not isinstance(label, str) or not label.strip():
+        raise InputError(f"{what}: {shown(label)} is no name; a name is a text that is not empty")
+    if letter := control_in(label):
+        raise InputError(f"{what}: the name {shown(label)} has the control character {letter!r} in it; leave it out")
+    return label
+
+
+def plain_label(label: str) -> str:
+    """The name that a file of somebody else gives to a line, with "_" where it has control characters."""
+    return "".join("_" if control_in(letter) else letter for letter in label)
 
 
 def fitted_name(name: str, otherwise: str = "piece") -> str:
@@ -47,9 +64,9 @@ def plain_name(name: str, others: str = " _.-") -> str:
     if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
         return name
     better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
-    hint = f"; {better!r} would do" if better else ""
+    hint = f"; {shown(better)} would do" if better else ""
     raise ValueError(
-        f"{name!r} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
+        f"{shown(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
         f"{'spaces and ' if ' ' in others else ''}{' '.join(others.strip())}{hint}"
     )
 
@@ -80,4 +97,4 @@ def _is_device(name: str) -> bool:
 
 
 def _is_forbidden(letter: str) -> bool:
-    return letter in _FORBIDDEN or unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
+    return letter in _FORBIDDEN or bool(control_in(letter))

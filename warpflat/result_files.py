@@ -53,11 +53,12 @@ def write_results(
         InputError: the folder cannot be written, or a piece was read from a file that would be replaced.
     """
     from warpflat.export import output_folder, write_picture
-    from warpflat.leftovers import write_metrics
+    from warpflat.leftovers import require_own_metrics, write_metrics
 
     others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
     sources = [source for result in results for source in result.surface.sources]
     with output_folder(folder, others, sources=sources) as to:
+        require_own_metrics(to)
         files = [result.write_obj(to) for result in results]
         if frames:
             _write_frames(to / "frames.usdc", results)

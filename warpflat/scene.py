@@ -236,9 +236,11 @@ def run_scene(
             is made from would be replaced.
     """
     from warpflat.export import output_folder
+    from warpflat.leftovers import require_own_metrics
 
     sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
     with output_folder(out, files_of_run(scene), sources=sources) as folder:
+        require_own_metrics(folder)
         if scene.settings.mannequin is not None:
             from warpflat.scene_garment import run_garment
 

@@ -10,6 +10,7 @@ from pydantic import BeforeValidator, ConfigDict, Discriminator, Field, Tag, cre
 from warpflat.errors import is_number
 from warpflat.relax import RelaxOptions
 from warpflat.toml_file import Table
+from warpflat.words import shown
 
 __all__ = [
     "BorderTable",
@@ -30,7 +31,9 @@ __all__ = [
     "text_or_table",
 ]
 
-Point = Annotated[list[float], Field(min_length=3, max_length=3)]
+# The square of a much larger one is no number any more.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Vertex = Annotated[int, Field(ge=0)]
 PointOrVertex = Annotated[
     Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
@@ -47,7 +50,7 @@ class PlaneTable(Table):
 
 def _as_component(value: Any) -> Any:
     if value != "largest" and not (is_number(value, whole=True) and value >= 0):
-        raise ValueError(f'should be "largest" or a number from 0, largest first; got {value!r}')
+        raise ValueError(f'should be "largest" or a number from 0, largest first; got {shown(value)}')
     return value
 
 

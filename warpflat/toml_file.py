@@ -13,6 +13,7 @@ from pydantic_core import ErrorDetails
 
 from warpflat.errors import InputError, nearest
 from warpflat.inputs import note_read
+from warpflat.words import control_in, shown
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -22,6 +23,11 @@ else:
 __all__ = ["Table", "check_table", "read_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
+
+_RIGHT_NUMBER = "a whole number is written in 64 bits, up to 9223372036854775807"
+_DEEPEST = 50
+# Texts of several lines may have these; what reads a name refuses them.
+_BLANKS = "\t\n\r"
 
 
 class Table(BaseModel):
@@ -48,14 +54,44 @@ def read_toml(path: Path) -> dict[str, Any]:
     except (OSError, ValueError) as error:
         raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
     try:
-        return tomllib.loads(text)
+        tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as error:
-        raise InputError(f"{path}: is not valid TOML: {_one_line(str(error))}") from None
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+    except ValueError:  # Python turns no more than 4300 digits into a number
+        raise InputError(f"{path}: has a number of thousands of digits; {_RIGHT_NUMBER}") from None
     except RecursionError:
         raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
+    _check_values(tables, path)
+    return tables
 
 
-def check_table(model: type[Model], data: Mapping[str, Any], where: str) -> Model:
+def _check_values(tables: dict[str, Any], path: Path) -> None:
+    """See that whole numbers are TOML's, that texts are written in letters, and that no table lies too deep for those who read it.
+
+    Raises:
+        InputError: the first that is not.
+    """
+    todo: list[tuple[str, int, Any]] = [("", 0, tables)]
+    for key, depth, value in todo:
+        if depth > _DEEPEST:
+            raise InputError(f"{path}: {key}: nested too deeply; tables and lists may lie in at most {_DEEPEST} others")
+        if isinstance(value, dict):
+            for name, below in value.items():
+                inner = f"{key}.{name}" if key else name
+                if letter := control_in(name, _BLANKS):
+                    raise InputError(
+                        f"{path}: {inner}: the key has the control character {letter!r} in it; leave it out"
+                    )
+                todo.append((inner, depth + 1, below))
+        elif isinstance(value, list):
+            todo += [(key, depth + 1, below) for below in value]
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise InputError(f"{path}: {key}: {shown(value)} is too large; {_RIGHT_NUMBER}")
+        elif isinstance(value, str) and (letter := control_in(value, _BLANKS)):
+            raise InputError(f"{path}: {key}: {shown(value)} has the control character {letter!r} in it; leave it out")
+
+
+def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
     """The data as a `model`.
 
     Args:
@@ -73,7 +109,8 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str) -> Mode
         # A misspelled key is usually also a missing one: tell the cause, not the consequence.
         problems.sort(key=lambda p: p["type"] != "extra_forbidden")
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        raise InputError(f"{where}: {_describe(model, data, problems[0])}{more}") from None
+        told = f"{_describe(model, data, problems[0])}{more}"
+        raise InputError(f"{where}: {told}" if where else told) from None
 
 
 def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:
@@ -83,7 +120,7 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     if kind == "extra_forbidden":
         key = str(location[-1])
         path = ".".join([*parents, key])
-        return f"{path}: unknown key {key!r}; {nearest(key, _keys(parent))}"
+        return f"{path}: unknown key {shown(key)}; {nearest(key, _keys(parent))}"
     if kind == "missing":
         return f"{'.'.join([*parents, str(location[-1])])}: is missing"
     path = ".".join(parents)
@@ -92,10 +129,10 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     if kind == "value_error" or isinstance(given, (dict, list)):
         told = message
     else:
-        told = f"{message}, got {given!r}"
+        told = f"{message}, got {shown(given)}"
         if kind in ("literal_error", "enum"):
             told += _guess(given, parent)
-    return f"{path}: {_one_line(told)}" if path else _one_line(told)
+    return f"{path}: {told}" if path else told
 
 
 def _walk(model: type[BaseModel], data: Any, location: tuple[int | str, ...]) -> tuple[list[str], Any]:
@@ -167,7 +204,3 @@ def _similar_file(path: Path) -> str:
         return ""
     close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
     return f"; did you mean {str(path.parent / close[0])!r}?" if close else ""
-
-
-def _one_line(text: str) -> str:
-    return " ".join(text.split())

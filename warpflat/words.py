@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import re
 import unicodedata
 
-__all__ = ["MADE_TO_MEASURE", "counted", "plain_letters", "shown", "size_words"]
+__all__ = ["MADE_TO_MEASURE", "control_in", "counted", "one_line", "plain_letters", "shown", "size_words"]
 
-#: Letters of the user's own words in a message, at most.
-LONGEST_SHOWN = 60
+#: Letters of a message, of one of its words (a path may be one), and of the user's own words in it, at most.
+LONGEST_LINE, LONGEST_WORD, LONGEST_SHOWN = 1500, 300, 60
 
 #: The size of what is made to somebody's own measures; after a size's name where these replace some of the size's.
 MADE_TO_MEASURE = "made to measure"
@@ -29,12 +30,37 @@ def size_words(size: str) -> str:
     return size if size == MADE_TO_MEASURE else f"size {size}"
 
 
+def control_in(text: str, allowed: str = "") -> str:
+    """The first control character of a text but for those `allowed`, or nothing.
+
+    These are the ones that no line of text holds: what XML forbids, what breaks a line, and what turns the direction of writing, so
+    that a name is not what it looks like.
+    """
+    return next((letter for letter in text if _is_control(letter) and letter not in allowed), "")
+
+
+def _is_control(letter: str) -> bool:
+    if letter.isascii():
+        return not letter.isprintable()
+    if "\u202a" <= letter <= "\u202e" or "\u2066" <= letter <= "\u2069" or ord(letter) & 0xFFFE == 0xFFFE:
+        return True
+    return unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
+
+
 def shown(value: object) -> str:
     """A value of the user as messages quote it: in one line, control characters escaped, the middle left out of a long one."""
     try:
         return _shortened(repr(value), LONGEST_SHOWN)
     except (ValueError, RecursionError):
         return "a value too long to be shown"  # a number of thousands of digits, thousands of lists in each other
+
+
+def one_line(text: str) -> str:
+    """The text of a message in one line, control characters escaped, the middle left out of what is very long."""
+    line = " ".join(part.strip() for part in text.splitlines())
+    plain = "".join(repr(letter)[1:-1] if _is_control(letter) else letter for letter in line)
+    words = re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], LONGEST_WORD), plain)
+    return _shortened(words, LONGEST_LINE)
 
 
 def _shortened(text: str, most: int) -> str:

@@ -26,7 +26,7 @@ from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
-from warpflat.words import plain_letters
+from warpflat.words import control_in, plain_letters
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -123,8 +123,9 @@ def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
 
 
 def _ascii(text: str) -> str:
-    """The standards allow 7 bits only: accents are dropped, what remains becomes "?"."""
-    return plain_letters(text).encode("ascii", "replace").decode("ascii")
+    """The standards allow 7 bits only: accents are dropped, what remains becomes "?", and control characters too: a line is a value."""
+    plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
+    return "".join("?" if control_in(letter) else letter for letter in plain)
 
 
 def _is_written(name: str) -> bool:

@@ -18,7 +18,7 @@ from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
-from warpflat.words import counted, size_words
+from warpflat.words import control_in, counted, size_words
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
@@ -213,6 +213,9 @@ class SvgPage:
 
     def write(self, path: str | os.PathLike[str]) -> None:
         """Write the document; the file appears whole or not at all."""
+        for element in self.root.iter():
+            element.text = None if element.text is None else _for_xml(element.text)
+            element.attrib.update({key: _for_xml(value) for key, value in element.attrib.items()})
         ET.indent(self.root)
         with atomic_path(path) as temporary:
             ET.ElementTree(self.root).write(temporary, encoding="utf-8", xml_declaration=True)
@@ -240,6 +243,11 @@ class SvgPage:
             unique = f"{clean}_{count}"
         self._ids.add(unique)
         return unique
+
+
+def _for_xml(text: str) -> str:
+    """The text with U+FFFD for the control characters that no XML can hold, not even escaped."""
+    return "".join("\ufffd" if control_in(letter, "\t\n") else letter for letter in text)
 
 
 def _number(value: float) -> str:

@@ -14,6 +14,7 @@ from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
 from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
 from warpflat.mannequin.profiles import Floats
 from warpflat.names import checked_name, same_file
+from warpflat.words import shown
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
@@ -111,7 +112,7 @@ def shipped_form(name: str) -> Form:
         InputError: if there is none of that name.
     """
     if name not in _shipped():
-        raise InputError(f"form {name!r} is unknown: {nearest(name, form_names())}")
+        raise InputError(f"form {shown(name)} is unknown: {nearest(name, form_names())}")
     return form_from_mapping(name, _shipped()[name])
 
 
@@ -148,7 +149,10 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
         _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
         profiles[level] = _adjustment(values, f"{where}: profile {level}")
     ruled = list(base.ruled) if base else []
-    for pair in data.get("ruled", []):
+    pairs = data.get("ruled", [])
+    if not isinstance(pairs, (list, tuple)):
+        raise InputError(f"{where}: ruled = {shown(pairs)}: a list of pairs of levels is needed, as [['hip', 'knee']]")
+    for pair in pairs:
         levels = _strings(pair, f"{where}: ruled")
         if len(levels) != 2:
             raise InputError(f"{where}: ruled: each entry is a pair of levels, as ['hip', 'knee']; got {list(levels)}")
@@ -194,13 +198,13 @@ def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:
     numbers = {k: _number(v, f"{where}: {k}", *ranges[k]) for k, v in values.items() if k in ranges}
     bridge = values.get("bridge", False)
     if not isinstance(bridge, bool):
-        raise InputError(f"{where}: bridge = {bridge!r}: true or false is needed")
+        raise InputError(f"{where}: bridge = {shown(bridge)}: true or false is needed")
     return Adjustment(like=str(values["like"]) if "like" in values else None, bridge=bridge, **numbers)
 
 
 def _number(value: object, where: str, low: float, high: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise InputError(f"{where} = {value!r}: a number from {low:g} to {high:g} is needed")
+        raise InputError(f"{where} = {shown(value)}: a number from {low:g} to {high:g} is needed")
     return float(value)
 
 
@@ -208,17 +212,17 @@ def _strings(value: object, where: str) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if not isinstance(value, (list, tuple)) or not all(isinstance(v, str) for v in value):
-        raise InputError(f"{where} = {value!r}: a list of names is needed")
+        raise InputError(f"{where} = {shown(value)}: a list of names is needed")
     return tuple(value)
 
 
 def _table(value: object, where: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{where} = {value!r}: a table is needed")
+        raise InputError(f"{where} = {shown(value)}: a table is needed")
     return value
 
 
 def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:
     for key in data:
         if key not in known:
-            raise InputError(f"{where}: key {key!r} is unknown: {nearest(key, known)}")
+            raise InputError(f"{where}: key {shown(key)} is unknown: {nearest(key, known)}")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
 from warpflat.export.atomic import atomic_path, output_folder
-from warpflat.leftovers import write_metrics
+from warpflat.leftovers import require_own_metrics, write_metrics
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 
@@ -39,6 +39,7 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         InputError: if a file cannot be written, or the body was read from one that would be replaced.
     """
     with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
+        require_own_metrics(place)
         files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])

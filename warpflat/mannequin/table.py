@@ -35,7 +35,7 @@ class MannequinTable(Table):
     facing: str | None = None
     landmarks: dict[str, float] = Field(default_factory=dict)
     mirror: bool = False
-    resolution_mm: Annotated[float, Field(ge=2.0, le=60.0)] = 10.0
+    resolution_mm: Annotated[float, Field(ge=2.0, le=40.0)] = 10.0
 
     @model_validator(mode="after")
     def _one_source(self) -> MannequinTable:

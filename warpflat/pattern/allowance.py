@@ -44,12 +44,19 @@ WIDEST_DART = np.radians(90.0)
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Side:
-    """One edge as the cut line sees it: `points` #P by 2 [m] counter-clockwise, `width` [m], `kind` as in `Edge`."""
+    """One edge as the cut line sees it: `points` #P by 2 [m] counter-clockwise, `width` [m], `kind` as in `Edge`.
+
+    A width that the grid does not resolve is none.
+    """
 
     name: str
     points: Vector
     width: float
     kind: str
+
+    def __post_init__(self) -> None:
+        if self.width < GRID:
+            object.__setattr__(self, "width", 0.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError, nearest
+from warpflat.names import checked_label
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 from warpflat.words import size_words
 
@@ -171,8 +172,7 @@ class Piece:
 
     def __post_init__(self) -> None:
         where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
-        if not self.name:
-            raise InputError("a piece has no name; every piece needs one, files and seams refer to it")
+        checked_label(self.name, "a piece, to which files and seams refer")
         if self.quantity < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
@@ -355,7 +355,10 @@ def _check_names(piece: Piece, where: str) -> None:
         ("edge", [e.name for e in piece.edges]),
         ("dart", [d.name for d in piece.darts]),
         ("hole", [h.name for h in piece.holes]),
+        ("line", list(piece.internal_lines)),
     ):
+        for name in names:
+            checked_label(name, f"{where}: {what}")
         doubled = sorted({n for n in names if names.count(n) > 1})
         if doubled:
             raise InputError(f"{where}: {what} {doubled[0]!r} occurs twice; names are unique in a piece")

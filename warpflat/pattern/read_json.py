@@ -15,9 +15,20 @@ from warpflat.errors import InputError
 from warpflat.export.pattern_json import SCHEMA
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import DraftedCutout, DraftedDart, DraftedEdge, DraftedGarment, DraftedPiece, DrillHole
+from warpflat.pattern.json_entries import (
+    DartEntry,
+    EdgeEntry,
+    LabelEntry,
+    NotchEntry,
+    PatternEntry,
+    PieceEntry,
+    SideEntry,
+)
 from warpflat.pattern.label import Label
 from warpflat.pattern.notches import Notch, SeamReport
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.toml_file import check_table
+from warpflat.words import shown
 
 __all__ = ["pattern_from_json", "read_pattern_json"]
 
@@ -37,8 +48,10 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
         raise InputError(f"{path}: no such file; a run leaves a pattern.json in its folder") from None
     except NotADirectoryError:
         raise InputError(f"{path.parent}: is a file; give the folder of a run, where its pattern.json lies") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise InputError(f"{path}: cannot be read as JSON ({' '.join(str(error).split())})") from None
+    except RecursionError:
+        raise InputError(f"{path}: cannot be read as JSON (nested too deeply)") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read as JSON ({error})") from None
     try:
         return pattern_from_json(data)
     except InputError as error:
@@ -49,170 +62,146 @@ def pattern_from_json(data: Any) -> DraftedGarment:
     """The pattern of what :func:`warpflat.export.pattern_json.pattern_json` gave.
 
     Raises:
-        InputError: another schema, a missing key, a value of the wrong kind.
+        InputError: another schema, a missing key, a value of the wrong kind, or lines that are no pattern.
     """
     if not isinstance(data, Mapping) or "sizes" not in data:
         raise InputError('is no pattern of warpflat: it has no "sizes"')
     if data.get("schema") != SCHEMA:
-        raise InputError(f"has schema {data.get('schema')!r}; this version reads {SCHEMA}: run the scene again")
+        raise InputError(f"has schema {shown(data.get('schema'))}; this version reads {SCHEMA}: run the scene again")
     try:
-        return _garment(data)
-    except KeyError as error:
-        raise InputError(f"key {error} is missing; run the scene again") from None
-    except (TypeError, ValueError, AttributeError, IndexError) as error:
-        raise InputError(f"does not hold together ({' '.join(str(error).split())}); run the scene again") from None
+        return _garment(check_table(PatternEntry, data))
+    except InputError as error:
+        raise InputError(f"{error}; run the scene again") from None
 
 
-def _garment(data: Mapping[str, Any]) -> DraftedGarment:
+def _garment(data: PatternEntry) -> DraftedGarment:
     drafted = {
-        size: tuple(_piece(name, size, piece) for name, piece in pieces.items())
-        for size, pieces in data["sizes"].items()
+        size: tuple(_piece(name, size, piece) for name, piece in pieces.items()) for size, pieces in data.sizes.items()
     }
-    seams = [
-        Seam(
-            name=stitch["name"],
-            sides=(_side(stitch["sides"][0]), _side(stitch["sides"][1])),
-            ease=stitch["ease"],
-        )
-        for stitch in data["stitches"]
-        if stitch["kind"] == "seam"
-    ]
     garment = Garment(
-        name=data["name"],
+        name=data.name,
         pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
-        seams=seams,
-        sample_size=data["sample_size"],
+        seams=[
+            Seam(name=stitch.name, sides=(_side(stitch.sides[0]), _side(stitch.sides[1])), ease=stitch.ease)
+            for stitch in data.stitches
+            if stitch.kind == "seam"
+        ],
+        sample_size=data.sample_size,
     )
     reports = tuple(
         SeamReport(
-            name=seam["name"],
-            size=seam["size"],
-            sides=(seam["sides"][0], seam["sides"][1]),
-            length_mm=(seam["length_mm"][0], seam["length_mm"][1]),
-            ease=seam["ease"],
-            difference_mm=seam["difference_mm"],
-            local_mm=seam["difference_per_50mm_mm"],
+            name=seam.name,
+            size=seam.size,
+            sides=(seam.sides[0], seam.sides[1]),
+            length_mm=(seam.length_mm[0], seam.length_mm[1]),
+            ease=seam.ease,
+            difference_mm=seam.difference_mm,
+            local_mm=seam.difference_per_50mm_mm,
         )
-        for seam in data["seams"]
+        for seam in data.seams
     )
     return DraftedGarment(garment=garment, pieces=drafted, seams=reports)
 
 
-def _side(parts: Sequence[Mapping[str, Any]]) -> tuple[SeamSide, ...]:
-    return tuple(
-        SeamSide(piece=p["piece"], edge=p["edge"], reversed=p["reversed"], mirrored=p.get("mirrored", False))
-        for p in parts
-    )
+def _side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:
+    return tuple(SeamSide(piece=p.piece, edge=p.edge, reversed=p.reversed, mirrored=p.mirrored) for p in parts)
 
 
-def _piece(name: str, size: str, data: Mapping[str, Any]) -> DraftedPiece:
-    frame = np.array(data["frame"], dtype=np.float64)
-    darts = [
-        Dart(name=d["name"], left=d["left"], right=d["right"], fold_to=d["fold_to"] or None) for d in data["darts"]
-    ]
-    cutouts = {key: _cutout(data, key) for key in data["cutouts"]}
+def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
+    frame = np.array(data.frame)
+    darts = [Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None) for d in data.darts]
+    cutouts = {key: _cutout(data, key) for key in data.cutouts}
+    fisheyes = {key: np.array(line) for key, line in data.fisheye_darts.items()}
+    internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}
+    grain = np.array(data.grain)
     holes = [
         Hole(name=key, points=_back(cutout.sew_line, frame), allowance=cutout.width) for key, cutout in cutouts.items()
     ]
-    holes += [
-        Hole(name=key, points=_back(_points(line), frame), kind="dart") for key, line in data["fisheye_darts"].items()
-    ]
+    holes += [Hole(name=key, points=_back(line, frame), kind="dart") for key, line in fisheyes.items()]
     piece = Piece(
         name=name,
         size=size,
-        fabric=data["fabric"],
-        quantity=data["quantity"],
-        paired=data["paired"],
-        edges=[_edge(edge, frame) for edge in data["edges"]],
+        fabric=data.fabric,
+        quantity=data.quantity,
+        paired=data.paired,
+        edges=[_edge(edge, frame) for edge in data.edges],
         darts=darts,
-        internal_lines={key: _back(_points(line), frame) for key, line in data["internal_lines"].items()},
-        grain=_back(_points(data["grain"]), frame),
+        internal_lines={key: _back(line, frame) for key, line in internal_lines.items()},
+        grain=_back(grain, frame),
         holes=holes,
     )
     return DraftedPiece(
         piece=piece,
         frame=frame,
-        edges=tuple(
-            DraftedEdge(
-                edge=edge,
-                curve=_curve(d),
-                line=_points(d["line"]),
-                width=d["allowance"],
-                places=np.array(d["point_lengths"], dtype=np.float64),
-                fit_error=d["fit_error"],
-                tolerance=d["tolerance"],
-            )
-            for edge, d in zip(piece.edges, data["edges"], strict=True)
-        ),
-        cut_line=_points(data["cut_line"]),
-        darts=tuple(_dart(dart, d) for dart, d in zip(darts, data["darts"], strict=True)),
-        drill_holes=tuple(DrillHole(name=hole["name"], at=np.array(hole["at"])) for hole in data["drill_holes"]),
-        notches=tuple(_notch(notch) for notch in data["notches"]),
-        internal_lines={key: _points(line) for key, line in data["internal_lines"].items()},
+        edges=tuple(_drafted_edge(edge, d) for edge, d in zip(piece.edges, data.edges, strict=True)),
+        cut_line=np.array(data.cut_line),
+        darts=tuple(_dart(dart, d) for dart, d in zip(darts, data.darts, strict=True)),
+        drill_holes=tuple(DrillHole(name=hole.name, at=np.array(hole.at)) for hole in data.drill_holes),
+        notches=tuple(_notch(notch) for notch in data.notches),
+        internal_lines=internal_lines,
         cutouts=cutouts,
-        fisheyes={key: _points(line) for key, line in data["fisheye_darts"].items()},
-        grain=_points(data["grain"]),
-        label=_label(data["label"]),
-        notes=tuple(data["notes"]),
+        fisheyes=fisheyes,
+        grain=grain,
+        label=_label(data.label),
+        notes=tuple(data.notes),
     )
 
 
-def _label(data: Mapping[str, Any]) -> Label:
-    leader = data.get("leader")
+def _label(data: LabelEntry) -> Label:
     return Label(
-        at=np.array(data["at"]),
-        lines=tuple(zip(data["lines"], data["heights"], strict=True)),
-        angle=data.get("angle", 0.0),
-        leader=None if leader is None else _points(leader),
+        at=np.array(data.at),
+        lines=tuple(zip(data.lines, data.heights, strict=True)),
+        angle=data.angle,
+        leader=None if data.leader is None else np.array(data.leader),
     )
 
 
-def _cutout(data: Mapping[str, Any], name: str) -> DraftedCutout:
-    """Files that say nothing of allowances around holes are from when these had none: cut on the sewing line."""
-    line = data["cutouts"][name]
+def _cutout(data: PieceEntry, name: str) -> DraftedCutout:
+    line = data.cutouts[name]
     return DraftedCutout(
-        sew_line=_points(data.get("cutout_sew_lines", {}).get(name, line)),
-        cut_line=_points(line),
-        width=data.get("cutout_allowances", {}).get(name, 0.0),
+        sew_line=np.array(data.cutout_sew_lines.get(name, line)),
+        cut_line=np.array(line),
+        width=data.cutout_allowances.get(name, 0.0),
     )
 
 
-def _edge(data: Mapping[str, Any], frame: Vector) -> Edge:
-    vertices = data["mesh_vertices"]
+def _edge(data: EdgeEntry, frame: Vector) -> Edge:
     return Edge(
-        name=data["name"],
-        points=_back(_points(data["line"]), frame),
-        kind=data["kind"],
-        allowance=None if data["kind"] == "fold" else data["allowance"],
-        vertices=None if vertices is None else np.array(vertices, dtype=np.int32),
+        name=data.name,
+        points=_back(np.array(data.line), frame),
+        kind=data.kind,
+        allowance=None if data.kind == "fold" else data.allowance,
+        vertices=None if data.mesh_vertices is None else np.array(data.mesh_vertices, dtype=np.int32),
     )
 
 
-def _curve(data: Mapping[str, Any]) -> Curve:
-    return Curve(bezier=np.array(data["bezier"], dtype=np.float64), straight=np.array(data["straight"], dtype=bool))
-
-
-def _dart(dart: Dart, data: Mapping[str, Any]) -> DraftedDart:
-    fold = None if data["fold"] is None else _points(data["fold"])
-    return DraftedDart(
-        dart=dart, tip=np.array(data["tip"]), fold=fold, fold_to=data["fold_to"], opening=data["opening"]
+def _drafted_edge(edge: Edge, data: EdgeEntry) -> DraftedEdge:
+    return DraftedEdge(
+        edge=edge,
+        curve=Curve(bezier=np.array(data.bezier), straight=np.array(data.straight)),
+        line=np.array(data.line),
+        width=data.allowance,
+        places=np.array(data.point_lengths),
+        fit_error=data.fit_error,
+        tolerance=data.tolerance,
     )
 
 
-def _notch(data: Mapping[str, Any]) -> Notch:
+def _dart(dart: Dart, data: DartEntry) -> DraftedDart:
+    fold = None if data.fold is None else np.array(data.fold)
+    return DraftedDart(dart=dart, tip=np.array(data.tip), fold=fold, fold_to=data.fold_to, opening=data.opening)
+
+
+def _notch(data: NotchEntry) -> Notch:
     return Notch(
-        seam=data["seam"],
-        edge=data["edge"],
-        length=data["length"],
-        at=np.array(data["at"]),
-        base=tuple(np.array(base) for base in data["base"]),
-        direction=np.array(data["direction"]),
-        depth=data["depth"],
+        seam=data.seam,
+        edge=data.edge,
+        length=data.length,
+        at=np.array(data.at),
+        base=tuple(np.array(base) for base in data.base),
+        direction=np.array(data.direction),
+        depth=data.depth,
     )
-
-
-def _points(rows: Any) -> Vector:
-    return np.array(rows, dtype=np.float64).reshape(-1, 2)
 
 
 def _back(points: Vector, frame: Vector) -> Vector:

@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
+from warpflat.names import checked_label
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import EdgeGraph, are_joined, as_vertex, path_in
 from warpflat.surface.row_by_row import row_by_row
@@ -292,10 +293,11 @@ def with_lines(surface: Surface, lines: Mapping[str, ArrayLike]) -> Surface:
     """The surface with further feature lines; one of the same name is replaced.
 
     Raises:
-        InputError: if a line does not run along edges.
+        InputError: if a line does not run along edges, or its name cannot be written.
     """
     checked = dict(surface.lines)
     for name, line in lines.items():
+        checked_label(name, "lines")
         try:
             checked[name] = line_from_indices(surface, line)
         except InputError as error:

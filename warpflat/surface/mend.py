@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat.errors import InputError
-from warpflat.names import checked_name
+from warpflat.names import checked_label, checked_name
 from warpflat.surface.mesh import Surface
 from warpflat.surface.polygons import (
     distinct_corners,
@@ -205,6 +205,7 @@ def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDAr
 
 
 def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
+    checked_label(name, "lines")
     path = np.asarray(line)
     if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
         raise InputError(f"line {shown(name)} must be a list of at least two vertex indices")

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpflat.errors import InputError, expect, nearest
 from warpflat.inputs import listening_to_reads, note_read, noting_resolver
-from warpflat.names import checked_name, fitted_name
+from warpflat.names import checked_name, fitted_name, plain_label
 from warpflat.surface.lines import line_from_curve, with_lines
 from warpflat.surface.mend import checked_positions, make_surface
 from warpflat.surface.mesh import Surface
@@ -108,14 +108,14 @@ def read_surface(
         raw.vertices * raw.scale,
         raw.polygons,
         name=name or fitted_name(raw.name or file.stem),
-        lines=raw.chains,
+        lines={plain_label(key): chain for key, chain in raw.chains.items()},
         component=component,
         weld=weld,
         split_corners=raw.split_corners,
         source=str(file),
     )
     _check_size(surface, file, raw.scale)
-    surface = _snap_curves(surface, {key: curve * raw.scale for key, curve in raw.curves.items()})
+    surface = _snap_curves(surface, {plain_label(key): curve * raw.scale for key, curve in raw.curves.items()})
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
