@@ -274,22 +274,19 @@ def _environments() -> Iterator[Case]:
     full = {"limits": {resource.RLIMIT_FSIZE: 20_000}, "variables": {"WARP_CACHE_PATH": nowhere}}
     yield around("the cache's disk is full", **full)
     yield around("--device cuda", replace(small, arguments=(*small.arguments, "--device", "cuda")))
-    # Its files have 3, 4, 6, 12, 70, 170, 370 and 680 kB.
-    middle = Case(
+    # Its files have 3, 4, 6, 12, 70, 170 and 370 kB, and 680 with frames, which are written first.
+    framed = Case(
         "environment", {"cloth.obj": _grid(40)}, (*flatten, "--max-steps", "50"), leaves="out/metrics.json", seconds=120
     )
+    still = replace(framed, arguments=(*framed.arguments, "--frames", "0"))
     old = {f"out/{name}": b"old" for name in ("cloth.obj", "frames.usdc", "picture.png", "pattern.json")}
-    earlier = replace(
-        middle, files={**middle.files, **old, "out/metrics.json": json.dumps(METRICS).encode()}, replaces="*"
-    )
-    for name, case in (("a fresh folder", middle), ("an earlier run's folder", earlier)):
-        for limit in (5, 8, 50, 120, 300, 520):
-            yield around(
-                f"ulimit -f {limit}, {name}",
-                replace(case, refused=True),
-                limits={resource.RLIMIT_FSIZE: limit * KILOBYTE},
-            )
-    big = replace(middle, files={"cloth.obj": _grid(316)}, arguments=(*flatten, *BARE, "--max-steps", "2"), seconds=300)
+    old["out/metrics.json"] = json.dumps(METRICS).encode()
+    for limit, run in ((5, still), (8, still), (50, still), (120, still), (300, still), (520, framed)):
+        refused = replace(run, refused=True)
+        within = {resource.RLIMIT_FSIZE: limit * KILOBYTE}
+        yield around(f"ulimit -f {limit}, a fresh folder", refused, limits=within)
+        yield around(f"ulimit -f {limit}, an earlier run's folder", _over(refused, old), limits=within)
+    big = replace(framed, files={"cloth.obj": _grid(316)}, arguments=(*flatten, *BARE, "--max-steps", "2"), seconds=300)
     for kilobytes in (
         300_000,
         500_000,
@@ -305,7 +302,12 @@ def _environments() -> Iterator[Case]:
         yield around(f"ulimit -v {kilobytes:,}", big, limits={resource.RLIMIT_AS: kilobytes * KILOBYTE})
     for number in (signal.SIGINT, signal.SIGTERM):
         for seconds in (0.1, 0.2, 0.4, 0.8, 1.6, 2.4, 3.2):
-            yield around(f"{number.name} after {seconds} s", earlier, stop=(number, seconds))
+            yield around(f"{number.name} after {seconds} s", _over(framed, old), stop=(number, seconds))
+
+
+def _over(case: Case, old: dict[str, bytes]) -> Case:
+    """A case whose folder holds the files of an earlier run, which it may replace."""
+    return replace(case, files={**case.files, **old}, replaces="*")
 
 
 GROUPS = {

@@ -18,7 +18,7 @@ __all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "case_of_file", "meshes", "p
 BARE = ("--frames", "0", "--no-picture", "--quiet")
 CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
 QUIET = "[output]\nframes = 0\npicture = false\n"
-SHORT = "[relax]\nmax_steps = 300\n" + QUIET
+SHORT = "[relax]\nmax_steps = 30\n" + QUIET
 SCENES = {
     "shape": "fabric = 'woven'\ndatum = 'centre'\nname = 'cap'\n[surface]\nshape = 'dome'\nresolution = 5\n" + SHORT,
     "file": "fabric = 'own'\nfabric_files = ['own.toml']\ngrain_angle = 45\ndatum = 'axis'\nmodel = 'membrane'\n[surface]\n"
