@@ -20,7 +20,7 @@ import time
 import unicodedata
 import xml.etree.ElementTree
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from types import TracebackType
 
@@ -169,9 +169,13 @@ def _broken(
     case: Case, here: str, ended: Verdict, before: dict[str, bytes | None], after: dict[str, bytes | None]
 ) -> str:
     """What was not as promised, or ""."""
-    stopped = () if case.environment is None or case.environment.stop is None else (130, 143)
-    if stopped and ended.code == -case.environment.stop[0] and after == before and not ended.stderr:
-        return ""  # ended before Python ran
+    stop = case.environment.stop[0] if case.environment is not None and case.environment.stop is not None else None
+    stopped = () if stop is None else (128 + stop,)
+    if stop is not None and ended.code == -stop:
+        if after == before and not ended.stderr:
+            return ""  # ended before Python ran
+        # Python ends by the signal itself where code from a string was interrupted; a shell calls that the same.
+        ended = replace(ended, code=128 + stop)
     if ended.code is None or ended.code < 0:
         return "hangs" if ended.code is None else f"crash: {signal.Signals(-ended.code).name}"
     if ended.code not in (0, 1, 2, *stopped):
