@@ -1,0 +1,50 @@
+"""The regression files: each a past failure, in tests/regressions, run by its name.
+
+NAME.obj, .ply, .stl, .off, .glb, .gltf, .usd, .usda, .usdc, .usdz   flattened
+NAME.scene.toml                                                      run
+NAME.fabric.toml                                                     listed, and flattened with
+NAME.pattern.json                                                    exported in all formats
+NAME.metrics.json                                                    in the folder of results before a run
+NAME.scan.obj                                                        made a mannequin
+NAME.arguments.json                                                  a list of strings: the command line
+
+NAME says what the file has, such as `one_vertex_far_away`. A file must keep the promise, and may be refused or not;
+NAME.refused.obj must be refused, NAME.accepted.obj must not. `NAME.obj.gz` is unpacked first.
+"""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+from .promise import Case
+from .seeds import MESHES, case_of_file
+
+__all__ = ["REGRESSIONS", "cases_of", "regression_files"]
+
+REGRESSIONS = Path(__file__).resolve().parents[1] / "regressions"
+_TWO_ENDINGS = {
+    ".scene.toml": "scene",
+    ".fabric.toml": "fabric",
+    ".pattern.json": "pattern",
+    ".metrics.json": "metrics",
+    ".scan.obj": "scan",
+    ".arguments.json": "arguments",
+}
+
+
+def cases_of(file: Path) -> list[Case]:
+    """The cases of a regression file, told by its name."""
+    content, name = file.read_bytes(), file.name
+    if name.endswith(".gz"):
+        content, name = gzip.decompress(content), name.removesuffix(".gz")
+    kind = next((kind for ending, kind in _TWO_ENDINGS.items() if name.endswith(ending)), name.rpartition(".")[2])
+    if kind not in (*MESHES, "usd", *_TWO_ENDINGS.values()):
+        raise ValueError(f"{file}: the name tells no kind; see {__name__}")
+    refused = True if ".refused." in name else False if ".accepted." in name else None
+    return case_of_file(kind, content, name=name.partition(".")[0], refused=refused)
+
+
+def regression_files() -> list[Path]:
+    """All of them."""
+    return sorted(path for path in REGRESSIONS.iterdir() if path.is_file() and path.suffix != ".md")

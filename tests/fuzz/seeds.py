@@ -1,0 +1,255 @@
+"""Small valid files of every format that the command line reads, and the case that runs a file of each."""
+
+from __future__ import annotations
+
+import functools
+import json
+import os
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from .promise import Case
+
+__all__ = ["COMMANDS", "FABRIC", "KINDS", "SCENES", "case_of_file", "meshes", "pattern"]
+
+BARE = ("--frames", "0", "--no-picture", "--quiet")
+CLOTH = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 2 0 0.2\nv 2 1 0.2\nf 1 2 3 4\nf 2 5 6 3\n"
+QUIET = "[output]\nframes = 0\npicture = false\n"
+SHORT = "[relax]\nmax_steps = 30\n" + QUIET
+SCENES = {
+    "shape": "fabric = 'woven'\ndatum = 'centre'\nname = 'cap'\n[surface]\nshape = 'dome'\nresolution = 5\n" + SHORT,
+    "file": "fabric = 'own'\nfabric_files = ['own.toml']\ngrain_angle = 45\ndatum = 'axis'\nmodel = 'membrane'\n[surface]\n"
+    "file = 'cloth.obj'\nunits = 'm'\ncomponent = 'largest'\n[lines]\naxis = {from = 0, to = 3}\nside = {vertices = [1, 2]}\n"
+    "[wear]\nstretch_warp = 0.05\n" + SHORT,
+    "cut": "fabric = 'denim'\ndatum = 'centre'\n[surface]\nshape = 'bodice'\nresolution = 7\n[lines]\n"
+    "dart = {plane = {point = [0.05, 0.0, 0.0], normal = [1.0, 0.0, 0.0]}}\n[[cuts]]\nline = 'dart'\n" + SHORT,
+    "constraints": "fabric = 'woven'\ndatum = 'centre'\n[surface]\nshape = 'bodice'\nresolution = 7\n[[constraints]]\n"
+    "line = 'bottom'\nstraight = 'weft'\n[[constraints]]\nline = 'top'\nlength_mm = 'body'\n[pattern]\nallowance_mm = 7\n"
+    "hem_mm = 25\nkinds = {top = 'hem'}\nallowances_mm = {left = 20}\n" + SHORT,
+    "seam": "[surface]\nshape = 'cone'\nresolution = 7\n[[seams]]\nname = 'back'\nsides = ['left', 'right']\n"
+    "[pattern]\nformats = ['dxf', 'svg', 'json']\n" + SHORT,
+}
+FORM_SCENE = (
+    "fabric = 'interlock'\nform = {like = 'skirt'}\n[mannequin]\nsize = 'EU 40'\nresolution_mm = 40\n"
+    "measurements = {waist = 0.76}\n[[seams]]\nname = 'side left'\nease = 0.01\n" + QUIET
+)
+FABRIC = """[sources]
+own = "measured"
+[own]
+description = "a cloth"
+aliases = ["mine"]
+areal_density = { value = 0.168, unit = "kg/m2", source = "own", grade = "C" }
+stiffness_warp = { value = 411.0, unit = "N/m", test_load = "low strain", source = "own", grade = "A" }
+stiffness_weft = 2028.0
+shear_stiffness = { value = 26.2, unit = "N/m per rad", test_load = "FAST EB5", source = "own", grade = "C" }
+curve_warp = { secants = [[0.0, 411.0], [0.167, 464.0]], unit = "N/m", source = "own", grade = "A" }
+strain_limit = { value = 0.05, unit = "1", source = "own", grade = "C" }
+[stiff]
+areal_density = 0.3
+stiffness_warp = 4000
+stiffness_weft = 4000
+shear_stiffness = 60
+"""
+METRICS = {
+    "schema": 1,
+    "pieces": {"cloth": {"vertices": 6}},
+    "files": {"cloth": {"cloth.obj": "0" * 64, "old.svg": "1" * 64}},
+}
+MESHES = ("obj", "ply", "stl", "off", "glb", "gltf", "usda", "usdc", "usdz")
+KINDS = (*MESHES, "scene", "fabric", "pattern", "metrics", "scan")
+COMMANDS = (
+    ("flatten", "cloth.obj", "--units", "cm", "--fabric", "denim", "--out", "out", *BARE),
+    ("flatten", "cloth.obj", "--units", "m", "--name", "front", "--datum", "0,3", "--model", "membrane", *BARE),
+    ("flatten", "cloth.obj", "--units", "m", "--solver", "plain", "--max-steps", "50", "--stretch-warp", "0.1", *BARE),
+    (
+        "flatten",
+        "cloth.obj",
+        "--units",
+        "m",
+        "--fabric",
+        "own",
+        "--fabric-file",
+        "own.toml",
+        "--grain-angle",
+        "45",
+        *BARE,
+    ),
+    ("run", "cap.scene.toml", "--out", "out", "--quiet"),
+    ("fabrics", "--file", "own.toml", "own", "--json"),
+    ("export", "done", "--format", "svg", "--format", "dxf", "--dialect", "astm", "--paper", "A4"),
+    ("export", "done", "--format", "json", "--size", "EU 38"),
+    ("mannequin", "--measure", "waist=0.76", "--size", "EU 38", "--resolution", "40", "--out", "out"),
+    ("cuts", "cap.scene.toml", "--by", "per_cm", "--out", "out"),
+    ("compare", "cap.scene.toml", "--fabric", "denim", "--fabric", "jersey", "--out", "out"),
+)
+
+
+def case_of_file(kind: str, content: bytes, *, name: str = "odd", refused: bool | None = None) -> list[Case]:
+    """The cases that read a file of a kind, each with the files that it needs beside it.
+
+    Args:
+        kind: one of KINDS; "usd" too, and "arguments" for a JSON list, the command line itself.
+        content: of the file.
+        name: of the file, without its ending.
+        refused: whether it must be refused, or must not.
+    """
+    file = f"{name}.{kind}" if kind in (*MESHES, "usd") else f"{name}.{kind}.toml"
+    flatten = ("flatten", "cloth.obj", "--units", "m", "--out", "out", *BARE)
+    plain = {"cloth.obj": CLOTH, "own.toml": FABRIC.encode()}
+
+    def case(arguments: tuple[str, ...], files: dict[str, bytes], **more: Any) -> Case:
+        return Case(kind, files, arguments, name=name, refused=refused, **{"leaves": "out/metrics.json", **more})
+
+    if kind in (*MESHES, "usd"):
+        units = () if kind.startswith(("usd", "gl")) else ("--units", "m")
+        return [case(("flatten", file, *units, "--out", "out", *BARE), {file: content}, subject=file)]
+    if kind == "scene":
+        slow = 90.0 if b"mannequin" in content else 20.0
+        return [case(("run", file, "--out", "out", "--quiet"), {**plain, file: content}, subject=file, seconds=slow)]
+    if kind == "fabric":
+        listed = case(("fabrics", "--file", file), {file: content}, subject=file, leaves=None)
+        used = case((*flatten, "--fabric-file", file, "--fabric", "own"), {**plain, file: content})
+        return [listed, used]
+    if kind == "pattern":
+        formats = ("--format", "dxf", "--format", "svg", "--format", "pdf", "--format", "json")
+        return [
+            case(
+                ("export", "out", *formats, "--quiet"),
+                {"out/pattern.json": content},
+                leaves=None,
+                subject="out/pattern.json",
+                replaces="out/pattern.json",
+            )
+        ]
+    if kind == "metrics":
+        return [
+            case(flatten, {**plain, "out/metrics.json": content, "out/old.svg": b"<svg/>"}, replaces="out/metrics.json")
+        ]
+    if kind == "scan":
+        # A standing body is searched for limbs: it takes long.
+        scan = ("mannequin", "--scan", f"{name}.obj", "--units", "m", "--resolution", "40", "--out", "out", "--quiet")
+        return [case(scan, {f"{name}.obj": content}, subject=f"{name}.obj", seconds=90.0)]
+    if kind == "arguments":
+        arguments = tuple(json.loads(content))
+        replaces = "done/pattern.json" if "export" in arguments else ""
+        return [case(arguments, beside_commands(), leaves=None, replaces=replaces, seconds=90.0)]
+    raise ValueError(f"{kind}: no kind of file; one of {', '.join((*KINDS, 'usd', 'arguments'))}")
+
+
+def beside_commands() -> dict[str, bytes]:
+    """What COMMANDS need."""
+    return {
+        "cloth.obj": CLOTH,
+        "own.toml": FABRIC.encode(),
+        "cap.scene.toml": SCENES["shape"].encode(),
+        "done/pattern.json": json.dumps(pattern()).encode(),
+    }
+
+
+@functools.cache
+def meshes(kind: str) -> tuple[bytes, ...]:
+    """Valid meshes of a format, some with what a file may have besides: lines, colours, textures, a second part."""
+    import numpy as np
+    import trimesh
+
+    columns = 4
+    u, v = (a.ravel() for a in np.meshgrid(np.linspace(0, 1, columns), np.linspace(0, 1, columns)))
+    points = np.stack([u, v, 0.3 * u * (1 - u) + 0.2 * v * (1 - v)], axis=1).round(6)
+    i = np.arange(columns * columns).reshape(columns, columns)
+    quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    if kind.startswith("usd"):
+        return _usd(kind, points, quads)
+    mesh = trimesh.Trimesh(points, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
+    if kind == "obj":
+        rows = ["mtllib odd.mtl", "o front", *(f"v {x} {y} {z}" for x, y, z in points), "vt 0 0", "vn 0 0 1", "g all"]
+        rows += [*(" ".join(["f", *(f"{k + 1}/1/1" for k in quad)]) for quad in quads), "g axis", "l 1 5 9 13"]
+        return CLOTH, "\n".join([*rows, ""]).encode()
+    if kind == "ply":
+        vertex = "element vertex 4\nproperty float x\nproperty float y\nproperty float z\nproperty uchar red\n"
+        head = f"ply\nformat ascii 1.0\ncomment c\n{vertex}element face 1\nproperty list uchar int vertex_indices\nend_header\n"
+        rows = "0 0 0 1\n1 0 0 2\n1 1 0.1 3\n0 1 0 4\n4 0 1 2 3\n"
+        return (head + rows).encode(), mesh.export(file_type="ply"), mesh.export(file_type="ply", encoding="ascii")
+    if kind == "stl":
+        return mesh.export(file_type="stl"), mesh.export(file_type="stl_ascii").encode()
+    if kind == "off":
+        rows = [f"{x} {y} {z}" for x, y, z in points] + [" ".join(map(str, [4, *quad])) for quad in quads]
+        return f"OFF\n{len(points)} {len(quads)} 0\n# c\n".encode() + "\n".join([*rows, ""]).encode(), mesh.export(
+            file_type="off"
+        ).encode()
+    if kind == "glb":
+        two = trimesh.Scene([mesh, mesh.copy().apply_translation([3, 0, 0])])
+        return mesh.export(file_type="glb"), two.export(file_type="glb")
+    if kind == "gltf":
+        return (_gltf(mesh),)
+    raise ValueError(kind)
+
+
+def _gltf(mesh: Any) -> bytes:
+    """One file: its buffers as data in it."""
+    import base64
+
+    files = mesh.export(file_type="gltf")
+    model = json.loads(files.pop("model.gltf"))
+    for buffer in model["buffers"]:
+        buffer["uri"] = "data:application/octet-stream;base64," + base64.b64encode(files[buffer["uri"]]).decode()
+    return json.dumps(model).encode()
+
+
+def _usd(kind: str, points: Any, quads: Any) -> tuple[bytes, ...]:
+    """A mesh of quads with a curve, in centimetres; and one by a reference, as text."""
+    from pxr import Usd, UsdGeom, UsdUtils
+
+    with tempfile.TemporaryDirectory() as folder:
+        layer = Path(folder) / f"a.{'usdc' if kind == 'usdz' else kind}"
+        stage = Usd.Stage.CreateNew(str(layer))
+        UsdGeom.SetStageMetersPerUnit(stage, 0.01)
+        UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+        world = UsdGeom.Xform.Define(stage, "/World")
+        world.AddTranslateOp().Set((1.0, 2.0, 3.0))
+        stage.SetDefaultPrim(world.GetPrim())
+        mesh = UsdGeom.Mesh.Define(stage, "/World/front")
+        mesh.CreatePointsAttr((100 * points).tolist())
+        mesh.CreateFaceVertexCountsAttr([4] * len(quads))
+        mesh.CreateFaceVertexIndicesAttr(quads.ravel().tolist())
+        curve = UsdGeom.BasisCurves.Define(stage, "/World/axis")
+        curve.CreatePointsAttr((100 * points[::4]).tolist())
+        curve.CreateCurveVertexCountsAttr([len(points[::4])])
+        curve.CreateTypeAttr("linear")
+        stage.GetRootLayer().Save()
+        if kind == "usdz":
+            package = Path(folder) / "a.usdz"
+            UsdUtils.CreateNewUsdzPackage(str(layer), str(package))
+            return (package.read_bytes(),)
+        whole = layer.read_bytes()
+    if kind == "usda":
+        moved = whole.replace(b"point3f[] points = [", b"point3f[] points.timeSamples = { 1: [", 1)
+        return whole, moved.replace(b")]\n", b")]}\n", 1)
+    return (whole,)
+
+
+def bodies() -> tuple[bytes, ...]:
+    """Standing bodies: real ones where their folder is known, and one of boxes that is none."""
+    import trimesh
+
+    boxes = [((0.3, 0.6, 0.2), (0, 1.2, 0)), ((0.2, 0.25, 0.2), (0, 1.65, 0))]
+    boxes += [((0.12, 0.9, 0.12), (side * 0.09, 0.45, 0)) for side in (-1, 1)]
+    parts = [trimesh.creation.box(size).apply_translation(place) for size, place in boxes]
+    rough = trimesh.util.concatenate(parts).subdivide().subdivide().export(file_type="obj").encode()
+    real = Path(os.environ.get("WARPFLAT_DATA", "")) / "body_female.obj"
+    return (rough, real.read_bytes()) if real.is_file() else (rough,)
+
+
+@functools.cache
+def pattern() -> dict[str, Any]:
+    """The content of a pattern.json with a dart, notches, a hem and an internal line."""
+    with tempfile.TemporaryDirectory() as folder:
+        (Path(folder) / "cut.toml").write_text(
+            SCENES["cut"].replace("[output]", "[pattern]\nformats = ['json']\n[output]")
+        )
+        command = [sys.executable, "-m", "warpflat", "run", "cut.toml", "--out", "out", "--quiet"]
+        subprocess.run(command, cwd=folder, check=False, capture_output=True)
+        found: dict[str, Any] = json.loads((Path(folder) / "out" / "pattern.json").read_text())
+    return found

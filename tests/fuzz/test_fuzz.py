@@ -1,0 +1,83 @@
+"""Damaged files and odd command lines keep the promise: some hundreds of them here, any number by `python -m tests.fuzz`.
+
+What Hypothesis finds it shrinks; the file is printed with the failure, and belongs into tests/regressions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from random import Random
+
+import pytest
+from hypothesis import HealthCheck, Phase, given, settings
+from hypothesis import strategies as st
+
+from .known_faults import GROUPS
+from .mutations import SHARES, random_case
+from .promise import Case, Worker
+from .regressions import cases_of, regression_files
+
+# Together about half a minute on one core. A scan and a pattern take longer than a mesh that is refused.
+EXAMPLES = {kind: 2 * share for kind, share in SHARES.items()} | {"metrics": 4, "scan": 1}
+
+
+@pytest.fixture(scope="module")
+def worker() -> Iterator[Worker]:
+    """Runs cases in a process of its own."""
+    with Worker() as worker:
+        yield worker
+
+
+def keeps_the_promise(worker: Worker, case: Case) -> None:
+    verdict = worker.run(case)
+    assert not verdict.broken, (
+        f"{verdict.cause}\n{case.arguments}\n{case.files.get(case.subject)!r:.3000}\n{verdict.stderr:.3000}"
+    )
+
+
+@pytest.mark.parametrize("kind", list(SHARES))
+def test_damaged_input_keeps_the_promise(worker: Worker, kind: str) -> None:
+    @settings(
+        max_examples=EXAMPLES[kind],
+        derandomize=True,
+        database=None,
+        deadline=None,
+        phases=[Phase.generate, Phase.shrink],
+        suppress_health_check=list(HealthCheck),
+    )
+    @given(random=st.randoms(use_true_random=False))
+    def damaged(random: Random) -> None:
+        keeps_the_promise(worker, random_case(kind, random))
+
+    damaged()
+
+
+@pytest.mark.parametrize("group", list(GROUPS))
+def test_faults_once_found_stay_mended(worker: Worker, group: str) -> None:
+    verdicts = {case.name: worker.run(case) for case in GROUPS[group]()}
+    assert {name: verdict.cause for name, verdict in verdicts.items() if verdict.broken} == {}
+
+
+@pytest.mark.parametrize("file", [pytest.param(file, id=file.name) for file in regression_files()])
+def test_a_file_that_once_broke_the_promise_keeps_it(worker: Worker, file: Path) -> None:
+    cases = cases_of(file)
+    assert cases
+    for case in cases:
+        keeps_the_promise(worker, case)
+
+
+# --- the harness itself
+
+
+def test_a_broken_promise_is_seen(worker: Worker) -> None:
+    """A refusal that was not due, and one that was but did not come."""
+    refused = worker.run(Case("arguments", {}, ("flatten", "gone.obj", "--units", "m"), refused=False))
+    assert (refused.code, refused.broken) == (2, "refused")
+    accepted = worker.run(Case("arguments", {}, ("fabrics",), refused=True))
+    assert (accepted.code, accepted.broken) == (0, "accepted")
+    hangs = worker.run(Case("arguments", {}, ("fabrics",), seconds=1e-6))
+    assert hangs.broken == "takes more than 1e-06 s"
+    without = worker.run(Case("arguments", {}, ("fabrics",), leaves="out/metrics.json"))
+    assert without.broken == "done, but without metrics.json"
+    assert not worker.run(Case("arguments", {}, ("fabrics",))).broken

@@ -1,0 +1,85 @@
+"""The process that runs the command line on one case after the other, and may crash or hang without harm.
+
+It reads one JSON object per line from its standard input and answers each with one on its standard output.
+"""
+
+from __future__ import annotations
+
+import faulthandler
+import gc
+import json
+import os
+import resource
+import signal
+import sys
+import time
+import traceback
+import warnings
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+MEMORY = 6 * 1024**3
+"""Address space of the process [B]; a third of it is taken by the libraries."""
+
+
+def peak_memory(*, reset: bool = False) -> int:
+    """The most memory [B] that this process has had in use since the last reset; 0 where the system does not tell."""
+    try:
+        if reset:
+            Path("/proc/self/clear_refs").write_text("5")
+        line = next(line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
+    except (OSError, StopIteration):
+        return 0
+    return int(line.split()[1]) * 1024
+
+
+def run_case(case: dict[str, Any]) -> dict[str, Any]:
+    """Run the command line in the case's folder, with standard output and error in files; return code, seconds and bytes."""
+    from warpflat.cli import main
+
+    os.chdir(case["folder"])
+    for number, name in ((1, "stdout"), (2, "stderr")):
+        file = os.open(case[name], os.O_WRONLY | os.O_CREAT | os.O_TRUNC)
+        os.dup2(file, number)
+        os.close(file)
+    before = peak_memory(reset=True)
+    faulthandler.dump_traceback_later(case["seconds"], file=2)  # tells where a case hangs
+    started = time.perf_counter()
+    try:
+        with warnings.catch_warnings():  # each case warns anew
+            code = main(case["arguments"])
+    except SystemExit as ended:
+        code = ended.code
+    except BaseException:
+        traceback.print_exc()
+        code = 1
+    seconds = time.perf_counter() - started
+    faulthandler.cancel_dump_traceback_later()
+    for stream in (sys.stdout, sys.stderr):
+        with suppress(OSError, ValueError):
+            stream.flush()
+    return {"code": code, "seconds": seconds, "memory": peak_memory() - before}
+
+
+def serve() -> None:
+    """Answer requests until the input ends."""
+    requests, answers = os.fdopen(os.dup(0)), os.fdopen(os.dup(1), "w")
+    nothing = os.open(os.devnull, os.O_RDONLY)
+    os.dup2(nothing, 0)
+    resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    # A file of 1 GB is an answer to no case.
+    resource.setrlimit(resource.RLIMIT_FSIZE, (1024**3, 1024**3))
+    signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    faulthandler.enable(file=2)
+    for request in requests:
+        answers.write(json.dumps(run_case(json.loads(request))) + "\n")
+        answers.flush()
+        if not gc.get_freeze_count():
+            gc.collect()
+            gc.freeze()  # what the first case has loaded stays, and need not be searched again
+
+
+if __name__ == "__main__":
+    serve()
