@@ -224,7 +224,7 @@ DRESS = "form = 'dress'\n[mannequin]\nsize = 'EU 38'\n"
             r"mannequin: measurement waist = 3 m: valid range",
         ),
         ("[mannequin]\nsize = 'EU 38'\n[form.pieces]\nx = { bricks = ['wast-hip/front-*'] }\n", r"form: .*wast-hip"),
-        ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: no such file"),
+        ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: does not exist"),
         (
             DRESS + "[[seams]]\nname = 'sid left'\nease = 0.02\n",
             r"seams: there is no seam 'sid left'; did you mean 'side left'",

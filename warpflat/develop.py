@@ -193,6 +193,8 @@ def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntA
             other = line_on_plane(surface, point + shift * direction, normal)
         except InputError:
             continue
+        if len(other) < 2:
+            continue
         its_reach, its_slope = reach_and_slope(other)
         # Rounded, so that rounding does not choose: of two as level and as near, the right one.
         key = round(its_slope, 6), round(abs(shift) / reach, 6), -shift

@@ -26,6 +26,8 @@ _SHORT = 3.0
 # The last resort: a degenerate face whose shortest edge is below this share of its surroundings loses that edge, if an
 # end of it is neither on the border nor on a feature line.
 _LAST_RESORT = 0.1
+# A mesh with so many degenerate faces, as a number and as a share of all, is none of cloth: merging them would take minutes.
+_TOO_MANY, _TOO_LARGE_A_SHARE = 200, 0.25
 _MOST_ROUNDS = 20
 
 
@@ -95,6 +97,9 @@ def merge_degenerate_faces(
     for _ in range(_MOST_ROUNDS):
         found = degenerate_faces(vertices, faces, tolerance)
         if len(found) == 0:
+            break
+        if len(found) > max(_TOO_MANY, _TOO_LARGE_A_SHARE * len(faces)):
+            left = of[found]
             break
         faces, origin, lines, left = _merge_once(vertices, faces, lines, found, tolerance)
         merged, left = np.union1d(merged, np.setdiff1d(of[found], of[left])), of[left]
