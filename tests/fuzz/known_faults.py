@@ -270,7 +270,7 @@ def _environments() -> Iterator[Case]:
         return replace(of, name=name, environment=Environment(**more))
 
     yield around("WARP_CACHE_PATH=/dev/null/x", variables={"WARP_CACHE_PATH": "/dev/null/x"})
-    yield around("HOME=/dev/null", variables={"HOME": "/dev/null", "XDG_CACHE_HOME": "", "WARP_CACHE_PATH": ""})
+    yield around("HOME=/dev/null", variables={"HOME": "/dev/null", "XDG_CACHE_HOME": None, "WARP_CACHE_PATH": None})
     full = {"limits": {resource.RLIMIT_FSIZE: 20_000}, "variables": {"WARP_CACHE_PATH": nowhere}}
     yield around("the cache's disk is full", **full)
     yield around("--device cuda", replace(small, arguments=(*small.arguments, "--device", "cuda")))

@@ -37,7 +37,8 @@ CASES_PER_PROCESS = 500
 class Environment:
     """What surrounds a case that needs a process of its own."""
 
-    variables: Mapping[str, str] = field(default_factory=dict)
+    variables: Mapping[str, str | None] = field(default_factory=dict)
+    """None where one is not set."""
     limits: Mapping[int, int] = field(default_factory=dict)
     """By `resource.RLIMIT_...`."""
     stop: tuple[int, float] | None = None
@@ -317,6 +318,7 @@ def _run_apart(place: _Place) -> Verdict:
         for name, value in environment.limits.items():
             resource.setrlimit(name, (value, value))
 
+    variables = {**os.environ, **environment.variables}
     started = time.perf_counter()
     with open(place.stdout, "wb") as stdout, open(place.stderr, "wb") as stderr:
         process = subprocess.Popen(
@@ -325,7 +327,7 @@ def _run_apart(place: _Place) -> Verdict:
             stdout=stdout,
             stderr=stderr,
             cwd=place.here,
-            env={**os.environ, **environment.variables},
+            env={name: value for name, value in variables.items() if value is not None},
             preexec_fn=limit,
         )
         try:
