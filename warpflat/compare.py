@@ -184,13 +184,16 @@ def _run(
     """The pieces as a run of the scene gives them, and how they were sewn."""
     from warpflat.cutting import separate
     from warpflat.scene_garment import plan_garment
+    from warpflat.wear_report import advise
 
     if story is None:
         garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: told(progress))
         how = garment.summary()
-        return garment.pieces, {key: how[key] for key in how if key != "pieces"}
+        return {name: advise(piece) for name, piece in garment.pieces.items()}, {
+            key: how[key] for key in how if key != "pieces"
+        }
     result, sewn = flatten_scene(scene, story, callback=told, device=device)
-    return {piece.surface.name: piece for piece in separate(result)}, {} if sewn is None else sewn.metrics()
+    return {piece.surface.name: advise(piece) for piece in separate(result)}, {} if sewn is None else sewn.metrics()
 
 
 def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:

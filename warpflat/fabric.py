@@ -21,6 +21,7 @@ __all__ = [
     "Fabric",
     "Provenance",
     "as_fabric",
+    "fabric_called",
     "find_fabric",
     "grain_axes",
     "load_library",
@@ -226,8 +227,15 @@ def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabri
         InputError: there is none; names the nearest.
     """
     expect(name, str, "name", f"that of a fabric, such as {DEFAULT_FABRIC!r}")
-    if library is None:
-        library = load_library()
+    return fabric_called(name, load_library() if library is None else library)
+
+
+def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
+    """Return a library's fabric of that name or alias; case, spaces and underscores do not matter.
+
+    Raises:
+        InputError: there is none; names the nearest.
+    """
     wanted = _plain(name)
     for fabric in library.values():
         if wanted in (_plain(fabric.name), *map(_plain, fabric.aliases)):

@@ -13,7 +13,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from warpflat.errors import InputError, nearest
-from warpflat.fabric import Curve, Fabric, Provenance, find_fabric
+from warpflat.fabric import Curve, Fabric, Provenance, fabric_called
 from warpflat.fabric_readings import (
     FAST_LOADS,
     GF_PER_CM,
@@ -226,7 +226,7 @@ def fabric_from_table(
 
 def _base(name: str, base: str, library: Mapping[str, Fabric]) -> Fabric:
     try:
-        return find_fabric(base, library)
+        return fabric_called(base, library)
     except InputError as error:
         raise InputError(f"fabric {name!r}: base: {error}") from None
 

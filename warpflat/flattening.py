@@ -32,6 +32,7 @@ from warpflat.strain import LayoutErrors, WornStrain, layout_errors, strain_ener
 from warpflat.strain_map import energy_report
 from warpflat.surface import Surface, line_from_indices, read_surface
 from warpflat.tightness import Wear, WornFit, assess_fit, unused_stretch
+from warpflat.wear_report import Remedy, wear_measures
 
 if TYPE_CHECKING:
     from warpflat.export import PicturePiece
@@ -59,6 +60,7 @@ class Flattening:
         wear: how it is meant to be worn, if that was asked for.
         options: of its last relaxation.
         alone: the piece as it lay before it was sewn or given fullness; None of one that was not.
+        remedies: cuts that may help where it does not fit, once `warpflat.advise` has looked for them.
     """
 
     surface: Surface
@@ -76,6 +78,7 @@ class Flattening:
     wear: Wear | None = None
     options: RelaxOptions = field(default_factory=RelaxOptions)
     alone: Flattening | None = None
+    remedies: tuple[Remedy, ...] = ()
 
     @property
     def faces(self) -> IntArray:
@@ -121,8 +124,10 @@ class Flattening:
 
     @cached_property
     def opened(self) -> Opened | None:
-        """The faces that are more than twice as large as on the body, if they matter."""
-        return opened_faces(self)
+        """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
+        if any(stage.name == "fullness" for stage in self.stages):
+            return None
+        return opened_faces(self.network, self.positions)
 
     @property
     def told(self) -> tuple[str, ...]:
@@ -132,8 +137,6 @@ class Flattening:
     @cached_property
     def measures(self) -> dict[str, Any]:
         """The piece's entry in `metrics.json`."""
-        from warpflat.wear_report import wear_measures
-
         errors, last = self._errors, self.stages[-1]
         return {
             "vertices": len(self.surface.vertices),
@@ -151,7 +154,12 @@ class Flattening:
             "spring_energy_j": last.spring_energy_j,
             "guard_energy_j": last.guard_energy_j,
             "area_m2": float(self.worn.area.sum()),
-            "wear": wear_measures(self),
+            "wear": wear_measures(
+                self.fit,
+                wear=self.wear,
+                unsewn=None if self.alone is None else self.alone.fit,
+                remedies=self.remedies,
+            ),
             "converged": self.converged,
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],

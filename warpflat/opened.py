@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from warpflat.network import SpringNetwork
 from warpflat.strain import face_areas
 from warpflat.words import counted
-
-if TYPE_CHECKING:
-    from warpflat.flattening import Flattening
 
 __all__ = ["Opened", "opened_faces"]
 
@@ -57,13 +56,15 @@ class Opened:
         return {**vars(self), "at": list(self.at), "in_pattern": list(self.in_pattern)}
 
 
-def opened_faces(result: Flattening) -> Opened | None:
-    """The faces of a pattern that are more than twice as large as on the body; None where these are next to nothing, or more cloth than
-    the body needs was asked for."""
-    if any(stage.name == "fullness" for stage in result.stages):
-        return None
-    surface, positions = result.network.surface, result.positions
-    flat, body = face_areas(result.network, positions)
+def opened_faces(network: SpringNetwork, positions: NDArray[np.float64]) -> Opened | None:
+    """Find the faces of a pattern that are more than twice as large as on the body; None where they make up next to nothing.
+
+    Args:
+        network: the piece's springs, with its cuts made.
+        positions: #P by 2, the pattern [m].
+    """
+    surface = network.surface
+    flat, body = face_areas(network, positions)
     chosen = np.flatnonzero(flat > _OPENED * body)
     if (flat - body)[chosen].sum() <= _MATTERS * body.sum():
         return None

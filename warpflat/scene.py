@@ -261,6 +261,7 @@ def _run_surface(
     from warpflat.film import Film
     from warpflat.pattern_files import pattern_options
     from warpflat.scene_seams import scene_surface_seams
+    from warpflat.wear_report import advise
 
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is told before anything is made
@@ -281,7 +282,7 @@ def _run_surface(
                 on_progress(progress)
 
         result, sewn = flatten_scene(scene, story, film=film, callback=each_step, device=device)
-    pieces = separate(result)
+    pieces = [advise(piece) for piece in separate(result)]
     return write_surface(
         scene,
         pieces,

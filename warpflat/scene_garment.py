@@ -149,6 +149,7 @@ def run_garment(
     """As :func:`warpflat.scene.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
     from warpflat.export import FrameWriter, expect_files
     from warpflat.export.letters import note_on_names
+    from warpflat.wear_report import advise
 
     settings = scene.settings
     plan = plan_garment(scene, device=device)
@@ -177,6 +178,8 @@ def run_garment(
                 on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
+        doing("measuring how it fits")
+        garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
         told = on_progress or (lambda progress: None)
         graded = {
             size: replace(plan, mannequin=body, form=other).flatten(callback=lambda _, progress: told(progress))
@@ -184,7 +187,6 @@ def run_garment(
         }
         if writer is not None:
             _last_frames(writer, garment)
-    doing("measuring how it fits")
     files = garment.save(out, picture=settings.output.picture)
     if settings.wear is not None and settings.output.picture:
         from warpflat.wear_picture import write_wear_sheet

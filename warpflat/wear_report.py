@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from itertools import islice
 from typing import TYPE_CHECKING, Any
@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.errors import InputError
-from warpflat.tightness import TOLERATED, Misfit, WornFit, assess_fit
+from warpflat.tightness import TOLERATED, Misfit, Wear, WornFit, assess_fit
 
 if TYPE_CHECKING:
     from warpflat.flattening import Flattening
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "RANGES",
     "Remedy",
+    "advise",
     "fit_lines",
     "garment_wear",
     "help_words",
@@ -61,17 +62,34 @@ class Remedy:
     outside: float | None = None
 
 
-def wear_measures(result: Flattening) -> dict[str, Any]:
-    """The entry `wear` in `metrics.json`; where a way of wearing was asked for, the remedies have been tried."""
-    asked = result.wear is not None
-    measures = {**(asdict(result.wear) if result.wear is not None else {}), **result.fit.as_dict()}
-    if result.alone is not None:
-        measures["outside_unsewn"] = result.alone.fit.outside
+def wear_measures(
+    fit: WornFit, *, wear: Wear | None = None, unsewn: WornFit | None = None, remedies: Sequence[Remedy] = ()
+) -> dict[str, Any]:
+    """Build the entry `wear` of a piece in `metrics.json`.
+
+    Args:
+        fit: how the piece sits.
+        wear: how it is meant to be worn, if that was asked for.
+        unsewn: how it sat before it was sewn, if it was.
+        remedies: cuts that may help.
+    """
+    measures = {**(asdict(wear) if wear is not None else {}), **fit.as_dict()}
+    if unsewn is not None:
+        measures["outside_unsewn"] = unsewn.outside
     measures["would_help"] = [
-        {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside}
-        for remedy in remedies(result, result.fit, trial=asked)
+        {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside} for remedy in remedies
     ]
     return measures
+
+
+def advise(result: Flattening) -> Flattening:
+    """Look for cuts that would help where a piece does not fit, and return the piece with them in `remedies`.
+
+    Where a way of wearing was asked for, up to eight cuts are made and relaxed on trial, and the best three are kept. Otherwise
+    the three nearest are named and none is tried.
+    """
+    found = remedies(result, result.fit, trial=result.wear is not None)
+    return replace(result, remedies=tuple(found)) if found else result
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:

@@ -17,7 +17,7 @@ from warpflat.names import checked_name, same_file
 from warpflat.words import shown
 
 if TYPE_CHECKING:
-    from warpflat.mannequin.mannequin import Mannequin
+    from warpflat.mannequin.layout import Layout
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -168,29 +168,30 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     return Form(name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend)
 
 
-def realise(mannequin: Mannequin, form: Form, *, half: bool = False) -> FormResult:
-    """A form's surface on a body, cut into its pieces.
+def realise(layout: Layout, vertices: Floats, form: Form, *, half: bool = False) -> FormResult:
+    """Build a form's surface on a body and cut it into its pieces.
 
     Args:
-        mannequin: the body.
+        layout: the mannequin's.
+        vertices: #V by 3, the mannequin's [m].
         form: the garment.
         half: symmetric pieces as their left half, on the fold.
 
     Raises:
         InputError: for an unknown brick, line or level, or a piece that is not one disk.
     """
-    vertices = _surface(mannequin, form)
+    vertices = _surface(layout, vertices, form)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
-    pieces, seams = cut_pieces(mannequin.layout, vertices, recipes, half=half)
+    pieces, seams = cut_pieces(layout, vertices, recipes, half=half)
     return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=seams)
 
 
-def _surface(mannequin: Mannequin, form: Form) -> Floats:
-    vertices = adjusted_vertices(mannequin.layout, mannequin.vertices, form.profiles, form.ruled)
+def _surface(layout: Layout, body: Floats, form: Form) -> Floats:
+    vertices = adjusted_vertices(layout, body, form.profiles, form.ruled)
     if form.blend is None:
         return vertices
     other, weight = form.blend
-    return blended(vertices, _surface(mannequin, other), weight)
+    return blended(vertices, _surface(layout, body, other), weight)
 
 
 def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:

@@ -208,7 +208,7 @@ class Mannequin:
         """
         from warpflat.mannequin.forms import realise, shipped_form
 
-        return realise(self, shipped_form(form) if isinstance(form, str) else form, half=half)
+        return realise(self.layout, self.vertices, shipped_form(form) if isinstance(form, str) else form, half=half)
 
     def metrics(self) -> dict[str, Any]:
         """What ``metrics.json`` says about the mannequin: its source and each level's height and girths [m].
