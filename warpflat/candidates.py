@@ -12,8 +12,8 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening
 from warpflat.strain_map import EnergyMap, energy_map, smooth_to_vertices
@@ -26,8 +26,6 @@ from warpflat.surface.trace import SurfacePath, polyline_path
 
 __all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # All lengths are shares of the piece's diagonal.
 _SMOOTHING = 0.02
@@ -135,7 +133,7 @@ def _diagonal(surface: Surface) -> float:
     return float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
 
 
-def _border(result: Flattening) -> NDArray[np.bool_]:
+def _border(result: Flattening) -> BoolArray:
     """#V, whether a vertex of the uncut surface is on the border or on a crack; the tip of a dart is on none."""
     edges = border_edges(result.faces)
     flags = np.zeros(len(result.surface.vertices), dtype=bool)

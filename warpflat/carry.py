@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.launching import launch_each
 from warpflat.surface.grid import Lattice
@@ -21,10 +22,7 @@ from warpflat.surface.vectors import norm, points_at
 
 __all__ = ["GridCarry", "LatticeCarry", "cubics_between", "places_of_rows"]
 
-FloatArray = NDArray[np.float64]
 Number = TypeVar("Number", np.float64, np.complex128)
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 # Columns along which the distances of rows are measured, and the other way round.
 _LINES = 16

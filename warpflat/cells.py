@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.surface_cells import add_areas
 from warpflat.launching import launch_each
@@ -16,9 +17,6 @@ from warpflat.surface.topology import border_of, corner_triangles
 from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
 
 __all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)

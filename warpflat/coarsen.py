@@ -24,6 +24,7 @@ import warp as wp
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.carry import GridCarry, LatticeCarry
 from warpflat.cells import cells_of, creases_of
 from warpflat.cores import thread_count
@@ -49,9 +50,6 @@ __all__ = [
     "steps_down",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 # A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
 # piece.

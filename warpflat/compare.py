@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat._version import __version__
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening, Progress
 from warpflat.scene import Scene, flatten_scene, scene_cuts, scene_fabric
@@ -29,9 +29,6 @@ __all__ = [
 ]
 
 COMPARED_FILES = ("compare.json", "compare.png", "compare.svg")
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

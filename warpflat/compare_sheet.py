@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.compare import Comparison, outline
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.letters import all_letters
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 
-FloatArray = NDArray[np.float64]
 
 # Okabe and Ito's colours, which are told apart without red-green vision; and dashes, for print in grey.
 _STYLES: tuple[tuple[str, tuple[float, ...]], ...] = (
@@ -172,7 +171,7 @@ def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, Float
     return sorted(found, key=lambda entry: -entry[2])[:_CLOSE_UPS]
 
 
-def _loops(comparison: Comparison, piece: str) -> list[NDArray[np.int32]]:
+def _loops(comparison: Comparison, piece: str) -> list[IntArray]:
     from warpflat.surface.topology import border_loops
 
     return border_loops(comparison.results[comparison.fabrics[0]][piece].faces)

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import grain_axes
 from warpflat.surface.mirror import mirror_partners
@@ -18,9 +18,6 @@ if TYPE_CHECKING:
     from warpflat.flattening import Flattening
 
 __all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "constraint_ties", "piece_of"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)

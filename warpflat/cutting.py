@@ -13,8 +13,9 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.darts import AppliedCut, seam_kind
 from warpflat.develop import choose_datum, develop
 from warpflat.edits import expect_unsewn, relax_cut
@@ -47,8 +48,6 @@ __all__ = [
     "separate",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 _LEAST_AREA = 0.01
 

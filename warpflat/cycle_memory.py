@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.ways import Vectors, Ways, ways_of
 
 __all__ = ["CycleMemory", "Mark"]
 
-FloatArray = NDArray[np.float64]
 
 # Of so many cycles it is remembered where they have led, leaps and all.
 _DEPTH = 2

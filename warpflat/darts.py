@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.cut import Seam
 from warpflat.surface.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
@@ -32,7 +32,7 @@ class AppliedCut:
     """
 
     name: str
-    paths: tuple[NDArray[np.int32], ...]
+    paths: tuple[IntArray, ...]
     seams: tuple[Seam, ...]
     length: float
     tip_back: float = 0.0
@@ -44,7 +44,7 @@ def seam_kind(seam: Seam) -> str:
     return ("parting", "dart", "fish-eye")[tips]
 
 
-def measure_cut(surface: Surface, positions: NDArray[np.float64], cut: AppliedCut) -> dict[str, Any]:
+def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dict[str, Any]:
     """The cut's entry in `metrics.json`: lengths [m], angles in degrees, a dart or gap per seam.
 
     Args:
@@ -62,10 +62,10 @@ def measure_cut(surface: Surface, positions: NDArray[np.float64], cut: AppliedCu
 
 def _measure_seam(
     surface: Surface,
-    positions: NDArray[np.float64],
+    positions: FloatArray,
     seam: Seam,
     tip_back: float,
-    loops: list[NDArray[np.int32]],
+    loops: list[IntArray],
 ) -> dict[str, Any]:
     kind = seam_kind(seam)
     found: dict[str, Any] = {"kind": kind}
@@ -96,9 +96,7 @@ def _measure_seam(
     return found
 
 
-def _drawn(
-    positions: NDArray[np.float64], seam: Seam, kind: str, tip_back: float, loops: list[NDArray[np.int32]]
-) -> dict[str, Any]:
+def _drawn(positions: FloatArray, seam: Seam, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
     """The dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run; else why it is not."""
     try:
         if kind == "fish-eye":
@@ -127,7 +125,7 @@ def _drawn(
     }
 
 
-def _curved(left: NDArray[np.float64], right: NDArray[np.float64]) -> dict[str, Any]:
+def _curved(left: FloatArray, right: FloatArray) -> dict[str, Any]:
     """A dart along its curved legs, both from the border to the tip."""
     tip = left[-1]
     to_left, to_right = left[0] - tip, right[0] - tip

@@ -13,6 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.cells import CellArrays, cells_of
 from warpflat.coarsen import Coarser, coarser_surfaces
 from warpflat.errors import InputError
@@ -51,8 +52,6 @@ __all__ = [
     "profile_layout",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # A datum that climbs by less than this share of its length is as level as its plane.
 _LEVEL = 1e-6

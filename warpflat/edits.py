@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.cells import inherit_cells
 from warpflat.coarsen import inherit_levels
 from warpflat.darts import AppliedCut
@@ -30,7 +31,6 @@ from warpflat.surface.weld import weld_map
 
 __all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
 
-FloatArray = NDArray[np.float64]
 
 #: A face whose width is no more than this share of the edges around it has no area to be measured by.
 _COLLAPSED = 1e-6

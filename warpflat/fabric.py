@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, expect, is_number, nearest
 
 __all__ = [
@@ -165,7 +166,7 @@ class Fabric:
         sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
         return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
 
-    def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> NDArray[np.float64]:
+    def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> FloatArray:
         """Tension at given strains along one direction, by the curve where there is one.
 
         Args:
@@ -257,7 +258,7 @@ def as_fabric(fabric: Fabric | str) -> Fabric:
     return find_fabric(fabric)
 
 
-def grain_axes(grain_angle: float) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def grain_axes(grain_angle: float) -> tuple[FloatArray, FloatArray]:
     """Unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
     angle = np.deg2rad(grain_angle)
     return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])

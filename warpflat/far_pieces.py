@@ -11,8 +11,8 @@ from itertools import pairwise
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray
 from warpflat.cycle_memory import Mark
 from warpflat.far_sums import FarSums
 from warpflat.kernels.implicit import count_braked, stop_braked
@@ -27,9 +27,6 @@ from warpflat.sums import begins
 from warpflat.upright import Upright
 
 __all__ = ["FarPieces"]
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class FarPieces:

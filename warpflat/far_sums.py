@@ -6,8 +6,8 @@ from collections.abc import Callable, Hashable, Sequence
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.sums import dot_blocks, least_of_blocks, sum_blocks
 from warpflat.launching import Launch, record
 from warpflat.launching import Sequence as LaunchSequence
@@ -15,8 +15,6 @@ from warpflat.sums import begins
 
 __all__ = ["FarSums"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # So many values one thread goes through.
 _BLOCK = 64

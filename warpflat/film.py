@@ -7,8 +7,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import half_edges
 
@@ -18,8 +18,6 @@ if TYPE_CHECKING:
     from warpflat.flattening import Flattening, Progress
 
 __all__ = ["Film", "path_in_pattern"]
-
-IntArray = NDArray[np.int32]
 
 
 class Schedule(Protocol):

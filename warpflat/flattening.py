@@ -13,8 +13,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.coarsen import levels_meanwhile
 from warpflat.compiling import start_warp
 from warpflat.darts import AppliedCut, measure_cut
@@ -38,9 +39,6 @@ if TYPE_CHECKING:
     from warpflat.export import PicturePiece
 
 __all__ = ["Flattening", "Progress", "Stage", "flatten"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

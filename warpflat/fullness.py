@@ -13,8 +13,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.cells import CellArrays, first_of_faces
 from warpflat.fabric import grain_axes
 from warpflat.flattening import Flattening
@@ -30,10 +30,6 @@ from warpflat.surface.topology import border_loops, half_edges_of
 from warpflat.upright import Upright
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int32]
 
 
 # What the cloth stores beyond what the springs of a gathered piece tell of is worth a note from what so much strain everywhere along the

@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.batch import flatten_all
 from warpflat.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.errors import InputError, expect, expect_callback, expect_each, nearest
@@ -78,7 +78,7 @@ class Garment:
                     found.append((first, second))
         return tuple(found)
 
-    def mirror_vertices(self, first: str, second: str) -> NDArray[np.int32] | None:
+    def mirror_vertices(self, first: str, second: str) -> IntArray | None:
         """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair."""
         return _partners(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
 
@@ -241,13 +241,13 @@ def flatten_form(
     )
 
 
-def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[NDArray[np.int32]]:
+def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
     """Vertices along each side of a seam of the piece that has no fullness."""
     sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
     return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
 
 
-def _partners(first: FormPiece, second: FormPiece, image: NDArray[np.int32]) -> NDArray[np.int32] | None:
+def _partners(first: FormPiece, second: FormPiece, image: IntArray) -> IntArray | None:
     """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair.
 
     Told face by face: along a line that a piece is cut open at, a vertex of the mannequin is two of the piece.

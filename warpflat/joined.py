@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.cells import CellArrays
 from warpflat.network import SpringNetwork
 from warpflat.springs import SpringArrays, SpringsAround
@@ -15,8 +15,6 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.unfold import ByVertex
 
 __all__ = ["join_networks", "join_surfaces"]
-
-IntArray = NDArray[np.int32]
 
 
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
@@ -62,7 +60,7 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     )
 
 
-def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> NDArray[np.float64] | None:
+def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> FloatArray | None:
     """#F by so many, what `SpringArrays` have of their faces under a name; None where no piece has any."""
     arrays = [getattr(net.spring_arrays, name) for net in networks]
     if not any(array is not None for array in arrays):

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.joined import join_networks
 from warpflat.levels import ENERGY_WORK, Levels
 from warpflat.relax import Relaxation
@@ -13,7 +13,6 @@ from warpflat.upright import turn_upright
 
 __all__ = ["carry_up"]
 
-FloatArray = NDArray[np.float64]
 
 # Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
 # of a per cent.

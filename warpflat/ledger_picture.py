@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
@@ -77,13 +77,11 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
         figure.savefig(temporary, format="png", dpi=DPI, metadata={"Software": "warpflat"})
 
 
-def _draw_paths(
-    pen: Pen, drawn: DrawnView, vertices: NDArray[np.float64], entries: Sequence[LedgerEntry], view: Any
-) -> None:
+def _draw_paths(pen: Pen, drawn: DrawnView, vertices: FloatArray, entries: Sequence[LedgerEntry], view: Any) -> None:
     # The view's directions, found again from what it did to the vertices.
     centred = vertices - vertices.mean(axis=0)
     turn = np.linalg.lstsq(centred, view.points, rcond=None)[0]
-    placed: list[NDArray[np.float64]] = []
+    placed: list[FloatArray] = []
     labels: dict[tuple[float, float], list[str]] = {}
     for number, entry in reversed(list(enumerate(entries, start=1))):
         one = entry.candidate

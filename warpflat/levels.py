@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from scipy.sparse import block_diag, csr_array
 
+from warpflat.arrays import BoolArray, FloatArray
 from warpflat.carry import GridCarry
 from warpflat.coarsen import Coarser
 from warpflat.cycle_memory import CycleMemory, Mark
@@ -30,8 +30,6 @@ from warpflat.surface.untangle import untangle
 
 __all__ = ["ENERGY_WORK", "FORCE_WORK", "Levels"]
 
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 # The coarsest is relaxed by so many steps at a time until its forces have come down to this share of what they were, in a cycle and at
 # the very first, or so many times the vertices along its side: a crack that opens is slow there too. In a cycle it is enough, too, once

@@ -6,16 +6,14 @@ from typing import Literal
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import Curve, Fabric
 from warpflat.kernels.membrane import Cloth
 
 __all__ = ["MODELS", "Model", "check_model", "cloth_of", "corner_sums", "step_matrix"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 Model = Literal["springs", "membrane"]
 MODELS: tuple[Model, ...] = ("springs", "membrane")

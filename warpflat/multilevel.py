@@ -32,8 +32,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray
 from warpflat.cycle_memory import CycleMemory
 from warpflat.large_start import carry_up
 from warpflat.levels import ENERGY_WORK, FORCE_WORK, Levels
@@ -44,7 +44,6 @@ from warpflat.whole_steps import relax_whole, whole_steps_pay
 
 __all__ = ["levels_pay", "relax_multilevel"]
 
-BoolArray = NDArray[np.bool_]
 
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
 _SOFT = 35.0

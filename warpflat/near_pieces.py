@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.cycle_memory import Mark
 from warpflat.network import SpringNetwork
 from warpflat.step_buffers import StepBuffers
@@ -15,9 +15,6 @@ from warpflat.sums import begins
 from warpflat.upright import Upright, hold_upright, take_out_turning
 
 __all__ = ["NearPieces"]
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 class NearPieces:
@@ -112,7 +109,7 @@ class NearPieces:
         return np.asarray(self._buffers.first_guess.numpy())
 
 
-def _sums(values: FloatArray, begin: NDArray[np.int32]) -> FloatArray:
+def _sums(values: FloatArray, begin: IntArray) -> FloatArray:
     """The sum of each range of the values; `begin` has its begins and the last end."""
     # Of a whole array NumPy adds in pairs, which loses less.
     return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])

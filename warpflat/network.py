@@ -36,6 +36,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.cells import CellArrays, cells_of
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
@@ -54,8 +55,6 @@ from warpflat.thread_lines import LineArrays, join_lines, lines_of
 
 __all__ = ["SpringNetwork"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # Eq. (10) cuts a Neumann series off after its second term, and leaves a mode in which the two ends of one spring that
 # outweighs all others move against each other (the short side of a needle) without any correction; this share of the

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.network import SpringNetwork
 from warpflat.strain import face_areas
 from warpflat.words import counted
@@ -56,7 +56,7 @@ class Opened:
         return {**vars(self), "at": list(self.at), "in_pattern": list(self.in_pattern)}
 
 
-def opened_faces(network: SpringNetwork, positions: NDArray[np.float64]) -> Opened | None:
+def opened_faces(network: SpringNetwork, positions: FloatArray) -> Opened | None:
     """Find the faces of a pattern that are more than twice as large as on the body; None where they make up next to nothing.
 
     Args:

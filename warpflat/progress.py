@@ -5,9 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpflat.arrays import FloatArray
 from warpflat.looks import Energies
 from warpflat.network import SpringNetwork
 from warpflat.relax import Relaxation
@@ -15,8 +13,6 @@ from warpflat.strain import worn_strain
 from warpflat.surface import Surface
 
 __all__ = ["Progress", "Stage"]
-
-FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True)

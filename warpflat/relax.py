@@ -19,8 +19,8 @@ from typing import Literal
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray
 from warpflat.errors import InputError, expect, is_number, nearest
 from warpflat.far_pieces import FarPieces
 from warpflat.far_steps import FarSteps
@@ -54,9 +54,6 @@ SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
 _FOLLOW_EVERY = 100
 # Pieces leave the others once they have this share of the vertices: to make the others anew takes as long as a dozen steps.
 _LEAVE = 0.2
-
-FloatArray = NDArray[np.float64]
-BoolArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, kw_only=True)

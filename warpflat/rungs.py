@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from scipy.sparse import csr_array, eye
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.cells import cells_of
 from warpflat.coarsen import Coarser, coarser, is_coarsest, spread_surface, steps_down
 from warpflat.heap import give_back, is_large
@@ -25,8 +25,6 @@ from warpflat.thinning import SpreadKind, Transfer
 
 __all__ = ["Rung", "far_below", "let_go", "rungs_of", "stay"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # A cell pressed to less than this share of its area is mended as if it were mirrored.
 _LEAST_AREA = 1e-6

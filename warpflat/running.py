@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.coarsen import coarser_surfaces, has_coarser
 from warpflat.develop import Development
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, as_fabric, grain_axes
@@ -30,8 +30,6 @@ from warpflat.whole_steps import relax_whole, whole_steps_pay
 
 __all__ = ["Relaxed", "Run", "relax_runs"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # Rounds before the last only turn and shape the layout, since directions are measured again after them: tolerances are so many times the
 # others.

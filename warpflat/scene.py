@@ -10,10 +10,9 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, Literal
 
-import numpy as np
-from numpy.typing import NDArray
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.fabric import DEFAULT_FABRIC, Fabric, find_fabric, load_library
 from warpflat.fabric_file import FabricTable, fabric_from_table
@@ -489,7 +488,7 @@ def scene_surface(scene: Scene) -> Surface:
     return surface
 
 
-def _line(surface: Surface, table: LineTable) -> NDArray[np.int32]:
+def _line(surface: Surface, table: LineTable) -> IntArray:
     if table.vertices is not None:
         return line_from_indices(surface, table.vertices, as_read=True)
     if table.from_ is not None and table.to is not None:

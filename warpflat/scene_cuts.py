@@ -8,14 +8,12 @@ from typing import TYPE_CHECKING, Annotated, Literal
 
 from pydantic import AfterValidator, Field, model_validator
 
+from warpflat.arrays import IntArray
 from warpflat.names import plain_name
 from warpflat.scene_types import PlaneTable, Point, PointOrVertex
 from warpflat.toml_file import Table
 
 if TYPE_CHECKING:
-    import numpy as np
-    from numpy.typing import NDArray
-
     from warpflat.cutting import CutPlan
     from warpflat.flattening import Flattening
     from warpflat.ledger import AutoCut, Ledger
@@ -127,7 +125,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
             with told_by(f"cuts[{number}]"):
                 surface = draw_line(surface, line, _path(surface, table))
             drawn[number] = line
-    paths: dict[str, list[NDArray[np.int32]]] = {}
+    paths: dict[str, list[IntArray]] = {}
     tip_back: dict[str, float] = {}
     for number, (name, table) in enumerate(zip(names, tables, strict=True)):
         with told_by(f"cuts[{number}]"):
@@ -140,7 +138,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
     return CutStory(surface=surface, plans=plans, first_auto=len(plans))
 
 
-def _check_tip_back(surface: Surface, path: NDArray[np.int32], tip_back: float) -> None:
+def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:
     """See that something is left of the dart, or of the fish-eye with two tips inside, that the path opens into."""
     from warpflat.surface.drawn_legs import check_tip_back
     from warpflat.surface.paths import path_length

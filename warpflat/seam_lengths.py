@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpflat.arrays import FloatArray
 
 __all__ = ["SeamLengths", "polyline_length"]
 
@@ -49,6 +50,6 @@ class SeamLengths:
         }
 
 
-def polyline_length(points: NDArray[np.float64]) -> float:
+def polyline_length(points: FloatArray) -> float:
     """Length of a polyline, #P by 2 or 3 [m]."""
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

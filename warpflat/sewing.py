@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
 from warpflat.activity import doing
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.constraints import Constraint, constraint_ties, piece_of
 from warpflat.errors import InputError
 from warpflat.flattening import Flattening
@@ -34,8 +34,6 @@ from warpflat.together import Together
 
 __all__ = ["Held", "SeamPair", "Sewn", "sew"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # Of a tie's spring over the median spring of the cloth.
 _STIFFNESS = 4.0

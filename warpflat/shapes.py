@@ -13,8 +13,8 @@ from collections.abc import Callable
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, is_number, nearest
 from warpflat.surface import Surface, make_surface
 
@@ -216,7 +216,7 @@ def _check_range(shape: str, key: str, value: float, lowest: float, highest: flo
         raise InputError(f"{shape}: {key} = {value:g}; must lie between {lowest:g} and {highest:g}")
 
 
-def _parameters(shape: str, across: int, up: int | None = None) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _parameters(shape: str, across: int, up: int | None = None) -> tuple[FloatArray, FloatArray]:
     """u and w at each vertex, both `up` by `across`."""
     up = across if up is None else up
     if not 3 <= up <= _MAX_RESOLUTION:
@@ -225,7 +225,7 @@ def _parameters(shape: str, across: int, up: int | None = None) -> tuple[NDArray
     return u, w
 
 
-def _grid(name: str, points: NDArray[np.float64], triangles: bool, *, rows: dict[str, int] | None = None) -> Surface:
+def _grid(name: str, points: FloatArray, triangles: bool, *, rows: dict[str, int] | None = None) -> Surface:
     """The surface of `points` (rows by columns by 3); further lines along `rows`."""
     height, width = points.shape[:2]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)

@@ -11,8 +11,8 @@ from functools import cached_property, partial
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.cells import CellArrays, cells_of, creases_of, first_of_faces
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.stiffness import (
@@ -43,8 +43,6 @@ __all__ = [
     "with_stiffness",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # A shear spring stiffens tension too; a cell so long that nothing would be left for the structural spring keeps this share of it, has
 # weaker shear springs, and is sheared as a whole against what they lack.

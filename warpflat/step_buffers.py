@@ -14,6 +14,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.seams import evaluate_seams
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
@@ -26,7 +27,6 @@ from warpflat.sums import begins
 
 __all__ = ["StepBuffers"]
 
-FloatArray = NDArray[np.float64]
 
 # So many lines of a lattice are worth a thread of their own: they have about as many vertices each.
 _LEAST_LINES = 64

@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.strain import (
     Membrane,
@@ -39,7 +39,6 @@ __all__ = [
     "worn_strain",
 ]
 
-FloatArray = NDArray[np.float64]
 
 # A cell that is smaller in the plane than this share of its area on the body is crushed to a point or a line.
 _COLLAPSED = 1e-9
@@ -171,5 +170,5 @@ def face_areas(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArra
     return np.asarray(flat, dtype=np.float64), np.asarray(body, dtype=np.float64)
 
 
-def _lengths(points: FloatArray, edges: NDArray[np.int32]) -> FloatArray:
+def _lengths(points: FloatArray, edges: IntArray) -> FloatArray:
     return np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)

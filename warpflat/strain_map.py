@@ -7,8 +7,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.kernels.surface_cells import measure_triangles
 from warpflat.launching import launch_each
@@ -66,7 +67,7 @@ class EnergyPeak:
     """
 
     vertex: int
-    position: NDArray[np.float64]
+    position: FloatArray
     density: float
     lines: Mapping[str, float]
     landmarks: Mapping[str, float]
@@ -86,8 +87,8 @@ class EnergyMap:
         peak: the place of the highest smoothed density.
     """
 
-    face_density: NDArray[np.float64]
-    vertex_density: NDArray[np.float64]
+    face_density: FloatArray
+    vertex_density: FloatArray
     total: float
     regions: Mapping[str, float]
     lines: Mapping[str, LineEnergy]
@@ -157,9 +158,7 @@ def energy_report(
     return report
 
 
-def smooth_to_vertices(
-    surface: Surface, face_density: ArrayLike, *, smoothing_length: float = 0.0
-) -> NDArray[np.float64]:
+def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_length: float = 0.0) -> FloatArray:
     """Energy density at the vertices, with the same total energy.
 
     Each face hands its energy to its corners in equal parts, each vertex has the same parts of its faces' areas.
@@ -191,9 +190,7 @@ def smooth_to_vertices(
     return np.divide(energy, area, out=np.zeros(count), where=area > 0)
 
 
-def _diffused(
-    surface: Surface, area: NDArray[np.float64], energy: NDArray[np.float64], length: float
-) -> NDArray[np.float64]:
+def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: float) -> FloatArray:
     from scipy.sparse import coo_array, diags_array
     from scipy.sparse.linalg import cg, spsolve
 
@@ -330,11 +327,11 @@ def _place(
 
 def _in_words(
     vertex: int,
-    here: NDArray[np.float64],
-    offsets: Mapping[str, NDArray[np.float64]],
+    here: FloatArray,
+    offsets: Mapping[str, FloatArray],
     lines: Mapping[str, float],
     landmarks: Mapping[str, float],
-    up: NDArray[np.float64],
+    up: FloatArray,
 ) -> str:
     """Such as "4 mm above bust line, 12 mm from princess front; 13 mm from bust point"."""
     phrases = []
@@ -360,7 +357,7 @@ def _by_distance(distances: Mapping[str, float]) -> dict[str, float]:
     return dict(sorted(distances.items(), key=lambda item: item[1]))
 
 
-def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> NDArray[np.float64]:
+def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> FloatArray:
     if isinstance(place, (int, np.integer)):
         count = len(surface.vertices)
         if not 0 <= place < count:
@@ -372,7 +369,7 @@ def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> NDArray[np
     return position
 
 
-def _nearest_on_line(points: NDArray[np.float64], target: NDArray[np.float64]) -> NDArray[np.float64]:
+def _nearest_on_line(points: FloatArray, target: FloatArray) -> FloatArray:
     if len(points) == 1:
         return points[0]
     along = np.diff(points, axis=0)
@@ -383,7 +380,7 @@ def _nearest_on_line(points: NDArray[np.float64], target: NDArray[np.float64]) -
 
 
 @once_per_surface
-def _face_areas(surface: Surface) -> NDArray[np.float64]:
+def _face_areas(surface: Surface) -> FloatArray:
     """#F [m2]; a quad's is the mean of both ways of splitting it."""
     triangles, face, weight = corner_triangles(surface.faces)
     area, _ = _measured(surface, triangles)
@@ -392,14 +389,14 @@ def _face_areas(surface: Surface) -> NDArray[np.float64]:
     return total
 
 
-def _measured(surface: Surface, triangles: NDArray[np.int32]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _measured(surface: Surface, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
     """Of triangles (#T by 3 vertices): areas, and at each corner the product of the edges that leave it [m2]."""
     area, product = np.empty(len(triangles)), np.empty((len(triangles), 3))
     launch_each(measure_triangles, len(triangles), [surface.vertices, triangles], [area, product])
     return area, product
 
 
-def _checked_density(values: ArrayLike, count: int, what: str) -> NDArray[np.float64]:
+def _checked_density(values: ArrayLike, count: int, what: str) -> FloatArray:
     density = np.asarray(values, dtype=float)
     if density.shape != (count,):
         raise InputError(f"energy density: one value per {what} expected, {count} of them, got shape {density.shape}")

@@ -11,9 +11,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
+
 __all__ = ["begins", "dot", "products", "weighted_rows"]
 
-FloatArray = NDArray[np.float64]
 Rows = Sequence[NDArray[np.floating]] | NDArray[np.floating]
 
 # Products of so many columns are small enough to stay on one core; so many are gathered at a time.
@@ -21,7 +22,7 @@ _COLUMNS = 512
 _GATHERED = 16 * _COLUMNS
 
 
-def begins(counts: Sequence[int] | NDArray[np.integer]) -> NDArray[np.int32]:
+def begins(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
     """Where each of several ranges of so many begins, and where the last one ends."""
     ends = np.zeros(np.size(counts) + 1, dtype=np.int32)
     np.cumsum(counts, out=ends[1:])

@@ -12,16 +12,14 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import border_loops
 
 __all__ = ["NamedSeam", "SurfaceSeam", "surface_seams"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 #: Sides that keep this near [m] to each other in space are one curve.
 _SHARED = 1e-3

@@ -21,6 +21,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.carry import GridCarry, LatticeCarry, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
@@ -28,9 +29,6 @@ from warpflat.surface.unfold import corners_of
 
 __all__ = ["Spread", "SpreadKind", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of", "thirds_of"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 # Which small grid is spread over a large one: for stiff cloth, whose next level has every third row and column; for others, whose levels
 # have every second one; and for cloth so soft that steps go along lines.

@@ -8,13 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.surface.grid import lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.topology import half_edges_of, join_labels
 
 __all__ = ["LineArrays", "join_lines", "lines_of"]
-
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)

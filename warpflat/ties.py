@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
@@ -23,8 +24,6 @@ __all__ = [
     "stretch_ties",
 ]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # What may be amiss of an edge's length, and of the sum along a line [m].
 _EDGE_TOLERANCE = 2e-5

@@ -13,8 +13,9 @@ from typing import Any
 
 import numpy as np
 import warp as wp
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, is_number
 from warpflat.fabric import Fabric, grain_axes
 from warpflat.kernels.curvature import bend_threads
@@ -28,8 +29,6 @@ from warpflat.surface.curvature import curvature_tensors
 
 __all__ = ["MAPS", "Misfit", "Wear", "WornFit", "assess_fit", "assess_pattern", "meant_stretch", "unused_stretch"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # Cloth bridges what is smaller than this, and a scan is rough below it: curvature is taken over such lengths [m].
 SKIN_LENGTH = 0.01

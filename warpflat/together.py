@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.flattening import Flattening
 from warpflat.joined import join_networks, join_surfaces
 from warpflat.network import SpringNetwork
@@ -19,8 +19,6 @@ from warpflat.surface.topology import components
 from warpflat.upright import Upright
 
 __all__ = ["Together"]
-
-IntArray = NDArray[np.int32]
 
 
 class Together:

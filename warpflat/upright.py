@@ -9,14 +9,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import ComplexArray, FloatArray
 from warpflat.sums import dot
 
 __all__ = ["Upright", "hold_upright", "take_out_turning", "turn_upright"]
-
-FloatArray = NDArray[np.float64]
-ComplexArray = NDArray[np.complex128]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -15,6 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.memory import require_memory_for_usd
 from warpflat.words import shown
@@ -44,10 +45,10 @@ class UsdMesh:
     """
 
     name: str
-    vertices: NDArray[np.float64]
+    vertices: FloatArray
     sizes: NDArray[np.int64]
     corners: NDArray[np.int64]
-    curves: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    curves: dict[str, FloatArray] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
     layers: list[str] = field(default_factory=list)
 
@@ -145,7 +146,7 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
 
-    def to_metres(points: Any, of: Any) -> tuple[NDArray[np.float64], bool]:
+    def to_metres(points: Any, of: Any) -> tuple[FloatArray, bool]:
         """World positions [m], Y up, and whether the transform mirrors."""
         matrix = np.array(cache.GetLocalToWorldTransform(of), dtype=np.float64)
         world = np.asarray(points, dtype=np.float64).reshape(-1, 3) @ matrix[:3, :3] + matrix[3, :3]

@@ -7,15 +7,14 @@ from typing import Any, Protocol
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.kernels.sums import add_share, subtract
 from warpflat.launching import launch_each
 from warpflat.sums import products, weighted_rows
 
 __all__ = ["FarWays", "NearWays", "Vectors", "Ways", "ways_of"]
 
-FloatArray = NDArray[np.float64]
 Vectors = Any
 """#V by 2, of NumPy or on a device."""
 

@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.activity import doing
+from warpflat.arrays import FloatArray
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
@@ -29,7 +29,6 @@ if TYPE_CHECKING:
 
 __all__ = ["write_wear_picture", "write_wear_sheet"]
 
-FloatArray = NDArray[np.float64]
 
 # Below these a map would show rounding.
 _LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.tightness import TOLERATED, Misfit, Wear, WornFit, assess_fit
 
@@ -29,7 +30,6 @@ __all__ = [
     "wear_measures",
 ]
 
-IntArray = NDArray[np.int32]
 
 #: What ranges of strain and pressure are told of.
 RANGES = "5 to 95 % of the cloth [all of it]"
@@ -162,7 +162,7 @@ def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
             yield _remedy(result, path[last:], "a dart from the border")
 
 
-def _border_feet(points: NDArray[np.float64], border: IntArray, worst: int) -> list[int]:
+def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
     """The border's vertex nearest to the place, and the nearest in a direction at right angles to that or further off."""
     away = points[border] - points[worst]
     distance = np.linalg.norm(away, axis=1)

@@ -17,10 +17,10 @@ from dataclasses import replace
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 from scipy.sparse import csc_array, csr_array, diags_array, vstack
 from scipy.sparse.linalg import splu
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric import grain_axes
 from warpflat.looks import Outcome
 from warpflat.network import SpringNetwork
@@ -29,9 +29,6 @@ from warpflat.upright import Upright
 
 __all__ = ["WholeSteps", "relax_whole", "whole_steps_pay"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
-BoolArray = NDArray[np.bool_]
 
 # K/G from which they pay, on triangles, and the most vertices: a factor's entries grow faster than the mesh.
 _SOFT = 35.0

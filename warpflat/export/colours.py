@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from warpflat.arrays import FloatArray
 
 __all__ = [
     "SMALLEST_SCALE",
@@ -36,7 +38,7 @@ _ANCHORS = np.array(
 )
 
 
-def energy_colours(density: ArrayLike, scale: float) -> NDArray[np.float64]:
+def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
     """sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N); what exceeds `scale` gets the last colour."""
     position = np.clip(np.asarray(density, dtype=np.float64) / scale, 0.0, 1.0) * (len(_ANCHORS) - 1)
     lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
@@ -44,7 +46,7 @@ def energy_colours(density: ArrayLike, scale: float) -> NDArray[np.float64]:
     return np.asarray(_ANCHORS[lower] * (1.0 - fraction) + _ANCHORS[lower + 1] * fraction)
 
 
-def linear_rgb(colours: ArrayLike) -> NDArray[np.float64]:
+def linear_rgb(colours: ArrayLike) -> FloatArray:
     """sRGB to linear Rec. 709, the space in which USD reads ``displayColor`` (IEC 61966-2-1)."""
     srgb = np.asarray(colours, dtype=np.float64)
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)

@@ -16,9 +16,9 @@ from datetime import datetime
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat._version import __version__
+from warpflat.arrays import BoolArray, FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.export.atomic import atomic_path
 from warpflat.export.letters import titles
@@ -34,7 +34,6 @@ if TYPE_CHECKING:
 
 __all__ = ["block_name", "write_dxf"]
 
-Vector = NDArray[np.float64]
 
 DIALECTS = ("aama", "astm")
 #: File units per metre, by what the file says of itself.
@@ -200,30 +199,30 @@ def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: 
         _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
 
 
-def _polyline(block: BlockLayout, points: Vector, scale: float, layer: str, *, closed: bool = False) -> None:
+def _polyline(block: BlockLayout, points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:
     block.add_polyline2d([tuple(p) for p in (points * scale).tolist()], close=closed, dxfattribs={"layer": layer})
 
 
-def _line(block: BlockLayout, ends: Vector, scale: float, layer: str) -> None:
+def _line(block: BlockLayout, ends: FloatArray, scale: float, layer: str) -> None:
     start, end = (tuple(p) for p in (ends * scale).tolist())
     block.add_line(start, end, dxfattribs={"layer": layer})
 
 
-def _point(block: BlockLayout, at: Vector, scale: float, layer: str) -> None:
+def _point(block: BlockLayout, at: FloatArray, scale: float, layer: str) -> None:
     block.add_point(tuple((at * scale).tolist()), dxfattribs={"layer": layer})
 
 
-def _text(block: BlockLayout | Modelspace, text: str, at: Vector, scale: float, layer: str, height: float) -> None:
+def _text(block: BlockLayout | Modelspace, text: str, at: FloatArray, scale: float, layer: str, height: float) -> None:
     entity = block.add_text(_ascii(text), height=height * scale, dxfattribs={"layer": layer})
     entity.set_placement(tuple((at * scale).tolist()))
 
 
-def _is_corner(ring: Vector) -> NDArray[np.bool_]:
+def _is_corner(ring: FloatArray) -> BoolArray:
     around = np.concatenate([ring[-1:], ring, ring[:1]])
     return np.asarray(np.abs(turning_angles(around)) > TURN)
 
 
-def _from_a_corner(ring: Vector) -> Vector:
+def _from_a_corner(ring: FloatArray) -> FloatArray:
     """CAD systems expect a boundary to begin in a turn point."""
     corners = np.flatnonzero(_is_corner(ring))
     return np.roll(ring, -int(corners[0]), axis=0) if len(corners) else ring

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.surface.topology import triangulate
 
 __all__ = [
@@ -20,7 +20,7 @@ __all__ = [
     "vertex_normals",
 ]
 
-Polylines = list[NDArray[np.int32]]
+Polylines = list[IntArray]
 
 
 def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
@@ -33,14 +33,14 @@ def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
     return {name: parts for name, parts in result.items() if parts}
 
 
-def face_areas(positions: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
     """#F, the area [m2] of each face (#F by 4) over `positions` (#V by 2 or 3); a quad is split along corners 0-2."""
     triangles, face = triangulate(faces)
     areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
 
 
-def area_vectors(positions: NDArray[np.float64], triangles: NDArray[np.int32]) -> NDArray[np.float64]:
+def area_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
     """#T by 3, the normals of triangles (#T by 3) over `positions` (#V by 2 or 3), as long as their areas [m2]."""
     space = positions if positions.shape[1] == 3 else np.column_stack([positions, np.zeros(len(positions))])
     # By columns: twice as fast as np.cross on the rows, which matters at a million faces.
@@ -50,7 +50,7 @@ def area_vectors(positions: NDArray[np.float64], triangles: NDArray[np.int32]) -
     return 0.5 * np.column_stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx])
 
 
-def vertex_normals(vectors: NDArray[np.float64], triangles: NDArray[np.int32], count: int) -> NDArray[np.float64]:
+def vertex_normals(vectors: FloatArray, triangles: IntArray, count: int) -> FloatArray:
     """#V (= `count`) by 3, unit normals, the mean of the triangles around each vertex by area; +Z where there is none.
 
     Args:
@@ -69,12 +69,12 @@ def vertex_normals(vectors: NDArray[np.float64], triangles: NDArray[np.int32], c
 
 
 def corner_average(
-    values: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    face: NDArray[np.int32],
-    vertex: NDArray[np.int32],
+    values: FloatArray,
+    weights: FloatArray,
+    face: IntArray,
+    vertex: IntArray,
     count: int,
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """#V (= `count`), the mean of the face values around each vertex by face weight; 0 where no face is.
 
     Args:
@@ -89,7 +89,7 @@ def corner_average(
     return np.asarray(summed / np.where(share > 0.0, share, 1.0))
 
 
-def outline_edges(faces: NDArray[np.int32]) -> NDArray[np.int32]:
+def outline_edges(faces: IntArray) -> IntArray:
     """#B by 2, the edges with one face only, as (lower, higher) vertex: outer border, holes and the sides of cracks.
 
     The same edges as ``warpflat.surface.topology.border_edges`` without their direction, which costs a sort of one

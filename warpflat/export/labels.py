@@ -8,7 +8,9 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from warpflat.arrays import BoolArray, FloatArray
 
 __all__ = [
     "LabelRoom",
@@ -53,7 +55,7 @@ class LabelRoom:
         middle = Spot(x=0.5 * (left + right), y=0.5 * (bottom + top), angle=0.0 if flat else 0.5 * math.pi)
         self._add(_discs([middle], max(width, height), min(width, height))[0])
 
-    def take_line(self, points: NDArray[np.float64], thickness: float, *, passable: bool = False) -> None:
+    def take_line(self, points: FloatArray, thickness: float, *, passable: bool = False) -> None:
         """Keep labels off a polyline (#N by 2) [in], and leaders, unless it is passable."""
         for a, b in pairwise(points):
             length = float(np.linalg.norm(b - a))
@@ -70,7 +72,7 @@ class LabelRoom:
         width: float,
         height: float,
         page: tuple[float, float, float, float],
-        avoid: NDArray[np.float64] | None = None,
+        avoid: FloatArray | None = None,
         *,
         may_cross: bool = True,
     ) -> Spot | None:
@@ -104,11 +106,11 @@ class LabelRoom:
         ink = points_on(leader, 0.03)[3:]
         return bool(_apart(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
 
-    def _add(self, discs: NDArray[np.float64]) -> None:
+    def _add(self, discs: FloatArray) -> None:
         self._discs = np.concatenate([self._discs, discs])
 
 
-def leader_of(spot: Spot, width: float) -> NDArray[np.float64] | None:
+def leader_of(spot: Spot, width: float) -> FloatArray | None:
     """2 by 2, the leader from where it begins to a text so wide [in]; None of a spot without one."""
     if spot.leader is None:
         return None
@@ -116,16 +118,14 @@ def leader_of(spot: Spot, width: float) -> NDArray[np.float64] | None:
     return np.array([spot.leader, (spot.x - side * (0.5 * width + _GAP), spot.y)])
 
 
-def rectangles(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.float64]:
+def rectangles(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
     """#S by #N by 2, points all over a text of this size at each spot [in]."""
     along = np.linspace(-0.5 * width, 0.5 * width, max(3, math.ceil(width / height)))
     x, y = (of.ravel() for of in np.meshgrid(along, (-0.5 * height, 0.0, 0.5 * height)))
     return np.stack(_turned(spots, x, y), axis=-1)
 
 
-def _turned(
-    spots: Sequence[Spot], x: NDArray[np.float64], y: NDArray[np.float64]
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _turned(spots: Sequence[Spot], x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
     """#S by #N each, where points along and across a text (#N) come to at each spot."""
     at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
     left, low, c, s = at.T[:, :, None]
@@ -158,14 +158,14 @@ def in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
         count = min(2 * count, 64)
 
 
-def _apart(discs: NDArray[np.float64], others: NDArray[np.float64]) -> NDArray[np.bool_]:
+def _apart(discs: FloatArray, others: FloatArray) -> BoolArray:
     """#S, of each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
     away = discs[:, :, None, :2] - others[:, :2]
     reach = discs[:, :, None, 2] + others[:, 2]
     return np.asarray((np.einsum("snmk,snmk->snm", away, away) >= reach**2).all(axis=(1, 2)))
 
 
-def _discs(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.float64]:
+def _discs(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
     """#S by #N by 3: middles and radius of discs that cover a turned rectangle along its length, at each spot."""
     count = max(1, math.ceil(width / height))
     places = ((np.arange(count) + 0.5) / count - 0.5) * width
@@ -174,13 +174,13 @@ def _discs(spots: Sequence[Spot], width: float, height: float) -> NDArray[np.flo
     return np.stack([x, y, np.full_like(x, radius)], axis=-1)
 
 
-def points_on(line: NDArray[np.float64], step: float) -> NDArray[np.float64]:
+def points_on(line: FloatArray, step: float) -> FloatArray:
     """#N by 2, points on a polyline (#M by 2) [in], no farther apart along it than a step, its ends among them."""
     length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
     return at_shares(line, np.linspace(0.0, 1.0, max(2, math.ceil(length / max(step, 1e-3)) + 1)))
 
 
-def along_line(line: NDArray[np.float64], width: float, clearance: float) -> Iterator[Spot]:
+def along_line(line: FloatArray, width: float, clearance: float) -> Iterator[Spot]:
     """Spots beside a polyline (#N by 2) [in] and parallel to it, from its middle outwards, on either side."""
     steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
     total = float(steps.sum())
@@ -188,7 +188,7 @@ def along_line(line: NDArray[np.float64], width: float, clearance: float) -> Ite
         return
     reached = np.concatenate([[0.0], np.cumsum(steps)])
 
-    def at(distance: float) -> NDArray[np.float64]:
+    def at(distance: float) -> FloatArray:
         return np.array([np.interp(distance, reached, line[:, axis]) for axis in range(2)])
 
     for share in (0.5, 0.42, 0.58, 0.35, 0.65, 0.28, 0.72, 0.22, 0.78, 0.16, 0.84, 0.1, 0.9):
@@ -207,7 +207,7 @@ def along_line(line: NDArray[np.float64], width: float, clearance: float) -> Ite
             yield Spot(x=float(x), y=float(y), angle=math.atan2(direction[1], direction[0]))
 
 
-def beyond_ends(line: NDArray[np.float64], width: float, height: float) -> Iterator[Spot]:
+def beyond_ends(line: FloatArray, width: float, height: float) -> Iterator[Spot]:
     """Level spots just beyond either end of a polyline (#N by 2) [in]."""
     for end, inner in ((line[-1], line[-2]), (line[0], line[1])):
         outwards = end - inner
@@ -244,14 +244,14 @@ def beside(
                 yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
 
 
-def at_shares(line: NDArray[np.float64], shares: ArrayLike) -> NDArray[np.float64]:
+def at_shares(line: FloatArray, shares: ArrayLike) -> FloatArray:
     """Points of a polyline (#N by 2) [in] at these shares of its length, one for each."""
     reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
     places = np.asarray(shares) * reached[-1]
     return np.column_stack([np.interp(places, reached, line[:, axis]) for axis in range(2)])
 
 
-def away_from(line: NDArray[np.float64], width: float) -> Iterator[Spot]:
+def away_from(line: FloatArray, width: float) -> Iterator[Spot]:
     """Level spots away from the middle of a polyline (#N by 2) [in], each with a leader to it."""
     middle = line[len(line) // 2]
     for side in (1.0, -1.0):

@@ -9,6 +9,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.export.atomic import atomic_path
 from warpflat.surface.mesh import Surface
 
@@ -57,7 +58,7 @@ def write_obj(
         _write_faces(file, corners, in_input)
 
 
-def _check(surface: Surface, flat: NDArray[np.float64], corners: NDArray[np.int64], origin: NDArray[np.int64]) -> None:
+def _check(surface: Surface, flat: FloatArray, corners: NDArray[np.int64], origin: NDArray[np.int64]) -> None:
     if flat.ndim != 2 or flat.shape[1] != 2:
         raise ValueError(f"positions must be #P by 2, not {flat.shape}")
     if corners.ndim != 2 or corners.shape[1] != 4:
@@ -74,7 +75,7 @@ def _chunks(count: int) -> Iterator[slice]:
     return (slice(start, start + _ROWS_AT_ONCE) for start in range(0, count, _ROWS_AT_ONCE))
 
 
-def _write_rows(file: TextIO, row: str, values: NDArray[np.float64]) -> None:
+def _write_rows(file: TextIO, row: str, values: FloatArray) -> None:
     # One formatting call per chunk: ten times faster than one per row, and Python's %r is the shortest exact form.
     for part in _chunks(len(values)):
         block = values[part]

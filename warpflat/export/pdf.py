@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.export.atomic import atomic_path
 from warpflat.export.pdf_legend import LEGEND_SIZE, draw_legend, legend_page
@@ -31,7 +31,6 @@ if TYPE_CHECKING:
 
 __all__ = ["PAPERS", "Paper", "Tiling", "write_pdf"]
 
-Vector = NDArray[np.float64]
 
 #: Points per metre: a PDF's unit is 1/72 inch.
 POINT = 72 / 0.0254
@@ -59,7 +58,7 @@ class Paper:
     overlap: float
 
     @property
-    def step(self) -> Vector:
+    def step(self) -> FloatArray:
         """How far one tile lies from the next [m], across and up."""
         return np.array([self.width, self.height]) - 2 * self.margin - self.overlap
 
@@ -90,7 +89,7 @@ class Tiling:
     sheet: Sheet
     joined: bool = True
 
-    def corner(self, row: int, column: int) -> Vector:
+    def corner(self, row: int, column: int) -> FloatArray:
         """Lower left of a tile on the sheet [m]."""
         step = self.paper.step
         return np.array([column * step[0], float(self.sheet.size[1]) - (row + 1) * step[1] - self.paper.overlap])
@@ -236,7 +235,7 @@ def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Se
     canvas.endForm()
 
 
-def _stroke(canvas: Any, stroke: Stroke, offset: Vector, size_index: int | None) -> None:
+def _stroke(canvas: Any, stroke: Stroke, offset: FloatArray, size_index: int | None) -> None:
     colour, width, dashes = STYLE[stroke.role]
     if size_index is not None:
         colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in OF_SIZE else colour
@@ -261,7 +260,7 @@ def _stroke(canvas: Any, stroke: Stroke, offset: Vector, size_index: int | None)
     canvas.drawPath(path)
 
 
-def _words(canvas: Any, words: Words, offset: Vector, colour: str) -> None:
+def _words(canvas: Any, words: Words, offset: FloatArray, colour: str) -> None:
     font, size = (BOLD if words.bold else FONT), words.height / CAPITALS * POINT
     canvas.saveState()
     canvas.translate(*((words.at + offset) * POINT))
@@ -336,7 +335,7 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
     canvas.drawString((low[0] + 0.006) * POINT, (top - 0.014) * POINT, tiling.name(row, column))
 
 
-def _diamond(canvas: Any, at: Vector, tiling: Tiling, here: tuple[int, int], there: tuple[int, int]) -> None:
+def _diamond(canvas: Any, at: FloatArray, tiling: Tiling, here: tuple[int, int], there: tuple[int, int]) -> None:
     first, second = sorted((here, there))
     size = 0.004
     path = canvas.beginPath()

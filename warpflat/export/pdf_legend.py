@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.export.svg import STYLE
 from warpflat.pattern.draft import DraftedGarment
 from warpflat.pattern.label import fit_label
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LEGEND_SIZE", "TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
 
-Vector = NDArray[np.float64]
 
 #: Width and height [m] of the block that :func:`draw_legend` draws.
 LEGEND_SIZE = (0.180, 0.128)
@@ -45,7 +44,7 @@ _KEY = (
 )
 
 
-def draw_legend(canvas: Any, at: Vector, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
+def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
     """Title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
     from warpflat.export.pdf import SIZE_COLOURS, SIZE_DASHES
 
@@ -138,7 +137,7 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
         _name(canvas, placed, number, origin + scale * placed.offset, scale)
 
 
-def _name(canvas: Any, placed: Placed, number: int, origin: Vector, scale: float) -> None:
+def _name(canvas: Any, placed: Placed, number: int, origin: FloatArray, scale: float) -> None:
     """The piece's name in what is drawn of it, or its number in the list above where there is no room."""
     import shapely
 

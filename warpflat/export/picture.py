@@ -9,9 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.activity import doing
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.export.atomic import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
@@ -44,9 +44,9 @@ class PicturePiece:
 
     name: str
     surface: Surface
-    faces: NDArray[np.int32]
-    positions: NDArray[np.float64]
-    face_energy_density: NDArray[np.float64]
+    faces: IntArray
+    positions: FloatArray
+    face_energy_density: FloatArray
     lines: Mapping[str, Any] = field(default_factory=dict)
     surface_lines: Mapping[str, Any] | None = None
     datum: str | None = None

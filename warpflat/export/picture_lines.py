@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.export.labels import (
     LabelRoom,
     Spot,
@@ -30,7 +30,6 @@ from warpflat.export.picture_views import INK, DrawnView
 
 __all__ = ["draw_lines"]
 
-FloatArray = NDArray[np.float64]
 
 # A name goes to the left only where it stands so much nearer to its line there [in]: there are the dimensions.
 _RATHER_RIGHT = 0.12
@@ -190,7 +189,7 @@ class _Names:
         return True
 
 
-def _draw(pen: Pen, drawn: DrawnView, parts: list[NDArray[np.int32]], *, is_datum: bool) -> FloatArray:
+def _draw(pen: Pen, drawn: DrawnView, parts: list[IntArray], *, is_datum: bool) -> FloatArray:
     """Draw a line, and return the longest stretch of it that can be seen, #N by 2 [in]."""
     visible = [drawn.visible_line(part) for part in parts]
     for part, points in zip(parts, visible, strict=True):

@@ -7,8 +7,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.labels import LabelRoom, Spot
 from warpflat.export.picture_lines import draw_lines
@@ -36,7 +36,7 @@ class Row:
 
     name: str
     captions: Mapping[str, str]
-    density: NDArray[np.float64]
+    density: FloatArray
     on_body: View
     pattern: View
     datum: str | None
@@ -46,7 +46,7 @@ class Row:
     band: float = 0.0
 
     @property
-    def areas(self) -> NDArray[np.float64]:
+    def areas(self) -> FloatArray:
         """#F, the areas of the faces on the body [m2]."""
         facets, vectors = self.on_body.facets, self.on_body.vectors
         lengths = np.zeros(len(facets.triangles)) if vectors is None else np.linalg.norm(vectors, axis=1)
@@ -145,9 +145,7 @@ def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) 
     room.take_box(x - 0.5 * width, y - 0.5 * height, x + 0.5 * width, y + 0.5 * height)
 
 
-def _grain(
-    pen: Pen, room: LabelRoom, drawn: DrawnView, datum: NDArray[np.int32], grain_angle: float, *, inside: bool
-) -> bool:
+def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: IntArray, grain_angle: float, *, inside: bool) -> bool:
     """A grain arrow, turned from the datum line by so many degrees, on the pattern or right of it; False if no room."""
     line = drawn.to_page(drawn.view.points[datum])
     along = line[-1] - line[0]
@@ -179,12 +177,12 @@ def _grain(
 
 def _grain_inside(
     drawn: DrawnView,
-    middle: NDArray[np.float64],
-    along: NDArray[np.float64],
-    across: NDArray[np.float64],
+    middle: FloatArray,
+    along: FloatArray,
+    across: FloatArray,
     length: float,
     text_height: float,
-) -> tuple[NDArray[np.float64], float] | None:
+) -> tuple[FloatArray, float] | None:
     """The middle of the arrow and half its length [in], where it and its word lie on the cloth."""
     left, bottom, right, top = drawn.box
     width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
@@ -200,7 +198,7 @@ def _grain_inside(
     return None
 
 
-def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[NDArray[np.float64], float] | None:
+def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[FloatArray, float] | None:
     _, bottom, right, top = drawn.box
     spots = [
         Spot(x=right + far, y=bottom + share * (top - bottom), angle=angle)
@@ -267,8 +265,8 @@ def draw_colour_bar(
     pen: Pen,
     row: Row,
     scale: float,
-    density: NDArray[np.float64],
-    areas: NDArray[np.float64],
+    density: FloatArray,
+    areas: FloatArray,
     quantity: str,
 ) -> None:
     """The colour bar beside the first row, and what lies above its end."""
@@ -311,7 +309,7 @@ def draw_colour_bar(
         pen.write(left - 0.08, bottom - 0.12, text, 7.5, color=GREY, va="top", linespacing=1.35)
 
 
-def _ticks(scale: float, length: float) -> tuple[NDArray[np.float64], list[str], str]:
+def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
     """Round values from 0 to `scale` for a bar of this length [in], as words, and the power of ten that these leave out."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
+from warpflat.arrays import FloatArray
 from warpflat.export.picture_views import HALO_LAYER, INK
 
 __all__ = ["DPI", "GRAIN", "GREY", "LABEL_SIZE", "PAGE_WIDTH", "POINT", "Pen"]
@@ -58,7 +56,7 @@ class Pen:
             drawn.set_path_effects([withStroke(linewidth=2.4, foreground=(1.0, 1.0, 1.0, 0.85))])
 
     def line(
-        self, points: NDArray[np.float64], *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
+        self, points: FloatArray, *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
     ) -> None:
         """A polyline (#N by 2); with a halo it stays visible on dark colours."""
         from matplotlib.lines import Line2D
@@ -69,7 +67,7 @@ class Pen:
             self.axes.add_artist(Line2D(x, y, **below))
         self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, linestyle=style, zorder=5))
 
-    def arrow(self, ends: NDArray[np.float64], *, width: float, colour: Any, head: float, halo: bool = False) -> None:
+    def arrow(self, ends: FloatArray, *, width: float, colour: Any, head: float, halo: bool = False) -> None:
         """A straight line (2 by 2) with a filled head at either end."""
         from matplotlib.patches import FancyArrowPatch
         from matplotlib.patheffects import withStroke

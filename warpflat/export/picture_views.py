@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
@@ -37,14 +38,14 @@ class Facets:
         used: the vertices that have a face.
     """
 
-    faces: NDArray[np.int32]
-    triangles: NDArray[np.int32]
-    face_of_triangle: NDArray[np.int32]
-    outline: NDArray[np.int32]
+    faces: IntArray
+    triangles: IntArray
+    face_of_triangle: IntArray
+    outline: IntArray
     used: NDArray[np.int64]
 
 
-def facets_of(faces: NDArray[np.int32]) -> Facets:
+def facets_of(faces: IntArray) -> Facets:
     """The facets of faces (#F by 4)."""
     triangles, face = triangulate(faces)
     has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
@@ -65,23 +66,23 @@ class View:
             flat pattern, which needs no light and hides nothing.
     """
 
-    points: NDArray[np.float64]
+    points: FloatArray
     facets: Facets
-    lines: Mapping[str, list[NDArray[np.int32]]]
-    vectors: NDArray[np.float64] | None
+    lines: Mapping[str, list[IntArray]]
+    vectors: FloatArray | None
 
     @cached_property
-    def low(self) -> NDArray[np.float64]:
+    def low(self) -> FloatArray:
         """Left, bottom and back [m]."""
         return np.asarray(self.points[self.facets.used].min(axis=0))
 
     @cached_property
-    def size(self) -> NDArray[np.float64]:
+    def size(self) -> FloatArray:
         """Width, height and depth [m]."""
         return np.asarray(self.points[self.facets.used].max(axis=0) - self.low)
 
 
-def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[NDArray[np.int32]]]) -> View:
+def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
     """The surface from its front: along its mean normal, a little from the side and from above, Y upwards.
 
     A surface that faces all ways (a skirt) is seen from +Z, one that lies flat on the ground from above.
@@ -92,13 +93,13 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[NDAr
     return View(points=centred @ directions.T, facets=facets, lines=lines, vectors=vectors @ directions.T)
 
 
-def pattern_view(positions: NDArray[np.float64], facets: Facets, lines: Mapping[str, list[NDArray[np.int32]]]) -> View:
+def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
     """The pattern (#P by 2) as it lies."""
     points = np.column_stack([positions, np.zeros(len(positions))])
     return View(points=points, facets=facets, lines=lines, vectors=None)
 
 
-def _view_directions(vectors: NDArray[np.float64]) -> NDArray[np.float64]:
+def _view_directions(vectors: FloatArray) -> FloatArray:
     """3 by 3, rows: right, up and towards the viewer; from the area vectors (#T by 3)."""
     total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
     length = float(np.linalg.norm(mean))
@@ -138,7 +139,7 @@ class DrawnView:
         shape = (self._rows * self._per_pixel, self._columns * self._per_pixel)
         self._samples: Samples = rasterise(self._grid, view.facets.triangles, shape)
 
-    def to_page(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def to_page(self, points: FloatArray) -> FloatArray:
         """#N by 2 [in] of points in the view's directions (#N by 2 or 3) [m]."""
         return np.asarray((points[:, :2] - self._low[:2]) * self._scale + (self.left, self.bottom))
 
@@ -148,7 +149,7 @@ class DrawnView:
         width, height = self.view.size[:2] * self._scale
         return self.left, self.bottom, self.left + float(width), self.bottom + float(height)
 
-    def covers(self, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def covers(self, spots: FloatArray) -> BoolArray:
         """#N, whether the mesh is at places on the page (#N by 2) [in]."""
         per_inch = self._dpi * self._per_pixel
         margin = _MARGIN * self._per_pixel
@@ -159,7 +160,7 @@ class DrawnView:
         hit = self._samples.triangle[np.where(inside, row, 0), np.where(inside, column, 0)] >= 0
         return np.asarray(inside & hit)
 
-    def draw(self, axes: Any, face_colours: NDArray[np.float64]) -> None:
+    def draw(self, axes: Any, face_colours: FloatArray) -> None:
         """The coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
         from warpflat.export.picture_pixels import Pixels
 
@@ -169,7 +170,7 @@ class DrawnView:
         self.draw_segments(axes, self.view.facets.outline, width=1.5, zorder=4)
 
     def draw_segments(
-        self, axes: Any, edges: NDArray[np.int32], *, width: float, colour: Any = INK, halo: bool = False, zorder: float
+        self, axes: Any, edges: IntArray, *, width: float, colour: Any = INK, halo: bool = False, zorder: float
     ) -> None:
         """The visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
         from matplotlib.collections import PathCollection
@@ -190,7 +191,7 @@ class DrawnView:
                 }
                 axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
 
-    def visible_line(self, line: NDArray[np.int32]) -> NDArray[np.float64]:
+    def visible_line(self, line: IntArray) -> FloatArray:
         """#N by 2 [in], the longest stretch of a polyline of vertices that can be seen."""
         points = self.to_page(self.view.points[line])
         seen = np.concatenate([[False], self._seen(self._grid[line]), [False]])
@@ -201,7 +202,7 @@ class DrawnView:
         longest = int(np.argmax(ends - begins))
         return points[begins[longest] : ends[longest]]
 
-    def _to_samples(self, points: NDArray[np.float64]) -> NDArray[np.float64]:
+    def _to_samples(self, points: FloatArray) -> FloatArray:
         per_metre = self._scale * self._dpi
         result = np.empty((len(points), 3))
         result[:, 0] = ((points[:, 0] - self._low[0]) * per_metre + _MARGIN) * self._per_pixel
@@ -209,7 +210,7 @@ class DrawnView:
         result[:, 2] = points[:, 2]
         return result
 
-    def _image(self, face_colours: NDArray[np.float64]) -> NDArray[np.uint8]:
+    def _image(self, face_colours: FloatArray) -> NDArray[np.uint8]:
         """#R by #C by 4, the pixels, RGBA."""
         facets = self.view.facets
         return shade(
@@ -225,7 +226,7 @@ class DrawnView:
             back=_BACK,
         )
 
-    def _normals(self) -> NDArray[np.float64] | None:
+    def _normals(self) -> FloatArray | None:
         """Of any length, at the vertices; of a fine mesh each triangle's own."""
         vectors, facets = self.view.vectors, self.view.facets
         if vectors is None or self._fine:
@@ -244,7 +245,7 @@ class DrawnView:
         edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
         self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
 
-    def _visible(self, edges: NDArray[np.int32]) -> NDArray[np.float64]:
+    def _visible(self, edges: IntArray) -> FloatArray:
         """#S by 2 by 2 [in], the edges, on a surface without their hidden parts, which are found in short pieces."""
         a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
         if self.view.vectors is None:
@@ -260,7 +261,7 @@ class DrawnView:
         first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
         return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
-    def _seen(self, spots: NDArray[np.float64]) -> NDArray[np.bool_]:
+    def _seen(self, spots: FloatArray) -> BoolArray:
         """#N, whether points on the mesh (#N by 3, as samples) are in front, with room for the mesh's own slope."""
         if self.view.vectors is None:
             return np.ones(len(spots), dtype=bool)

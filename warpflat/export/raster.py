@@ -15,6 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
 __all__ = ["Samples", "rasterise", "shade"]
@@ -38,17 +39,17 @@ class Samples:
     step: float
 
     @cached_property
-    def triangle(self) -> NDArray[np.int32]:
+    def triangle(self) -> IntArray:
         """#R by #C, index of the triangle, -1 where there is none."""
         return self.front.astype(np.int32)
 
-    def depth_at(self, row: NDArray[Any], column: NDArray[Any]) -> NDArray[np.float64]:
+    def depth_at(self, row: NDArray[Any], column: NDArray[Any]) -> FloatArray:
         """The depth at samples (of any shape) to within a step, -inf where there is no triangle."""
         front = self.front[row, column]
         return np.where(front >= 0, self.back + self.step * (front >> 32), -np.inf)
 
 
-def rasterise(points: NDArray[np.float64], triangles: NDArray[np.int32], shape: tuple[int, int]) -> Samples:
+def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -> Samples:
     """The nearest triangle at the centre of each sample.
 
     Args:
@@ -68,12 +69,12 @@ def rasterise(points: NDArray[np.float64], triangles: NDArray[np.int32], shape: 
 def shade(
     samples: Samples,
     per_pixel: int,
-    points: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    colours: NDArray[np.float64],
+    points: FloatArray,
+    triangles: IntArray,
+    colours: FloatArray,
     *,
-    face: NDArray[np.int32],
-    normals: NDArray[np.float64] | None = None,
+    face: IntArray,
+    normals: FloatArray | None = None,
     blended: bool = True,
     light: tuple[float, float, float] = (0.0, 0.0, 1.0),
     back: tuple[float, float, float] = (1.0, 1.0, 1.0),

@@ -8,8 +8,8 @@ from collections.abc import Sequence
 from xml.etree import ElementTree as ET
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.export.atomic import atomic_path
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.draft import DraftedGarment
@@ -22,7 +22,6 @@ from warpflat.words import control_in, counted, size_words
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
-Vector = NDArray[np.float64]
 
 #: Stroke colour, width [mm], dashes [mm] by role; shared with the PDF.
 STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
@@ -140,7 +139,7 @@ class SvgPage:
         ET.SubElement(self.root, "style").text = "\n".join(style)
         self._ids: set[str] = set()
 
-    def piece(self, drawing: Drawing, matrix: Vector, *, hue: int | None = None) -> None:
+    def piece(self, drawing: Drawing, matrix: FloatArray, *, hue: int | None = None) -> None:
         """Add a group for one piece and size, moved by a 2 by 3 matrix [m]."""
         piece = drawing.piece
         key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
@@ -152,7 +151,7 @@ class SvgPage:
             self.words(group, words, matrix, colour if words.tag else None)
 
     def stroke(
-        self, parent: ET.Element, stroke: Stroke, key: str, matrix: Vector | None = None, colour: str | None = None
+        self, parent: ET.Element, stroke: Stroke, key: str, matrix: FloatArray | None = None, colour: str | None = None
     ) -> None:
         """Add one line to a group; `key` begins its id."""
         matrix = np.eye(2, 3) if matrix is None else matrix
@@ -171,7 +170,9 @@ class SvgPage:
             attributes["d"] = "M" + " L".join(_pair(p) for p in points) + (" Z" if stroke.closed else "")
         ET.SubElement(parent, "path", attributes)
 
-    def words(self, parent: ET.Element, words: Words, matrix: Vector | None = None, colour: str | None = None) -> None:
+    def words(
+        self, parent: ET.Element, words: Words, matrix: FloatArray | None = None, colour: str | None = None
+    ) -> None:
         """Add one line of text, centred on its place."""
         matrix = np.eye(2, 3) if matrix is None else matrix
         x, y = self._page((words.at @ matrix[:, :2].T + matrix[:, 2])[None])[0]
@@ -220,7 +221,7 @@ class SvgPage:
         with atomic_path(path) as temporary:
             ET.ElementTree(self.root).write(temporary, encoding="utf-8", xml_declaration=True)
 
-    def _page(self, points: Vector) -> Vector:
+    def _page(self, points: FloatArray) -> FloatArray:
         return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
 
     def _bezier(self, curve: Curve) -> str:
@@ -255,5 +256,5 @@ def _number(value: float) -> str:
     return f"{value:.4f}".rstrip("0").rstrip(".") if abs(value) > 5e-5 else "0"
 
 
-def _pair(point: Vector) -> str:
+def _pair(point: FloatArray) -> str:
     return f"{_number(point[0])},{_number(point[1])}"

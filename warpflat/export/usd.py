@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.export.atomic import hidden_file, require_writable
 from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
@@ -59,20 +60,20 @@ class _Piece:
 
     surface: Surface
     path: str
-    areas: NDArray[np.float64]
+    areas: FloatArray
     on_surface: MeshSamples
     on_pattern: MeshSamples
     surface_cuts: SampledLines
     pattern_lines: SampledLines
     pattern_cuts: SampledLines
-    faces: NDArray[np.int32]
-    to_surface: NDArray[np.int32]
+    faces: IntArray
+    to_surface: IntArray
     lines: dict[str, Polylines]
     cuts: dict[str, Polylines] = field(default_factory=dict)
     frames: int = 0
     last_density: NDArray[np.float32] | None = None
-    low: NDArray[np.float64] = field(default_factory=lambda: np.full(2, np.inf))
-    high: NDArray[np.float64] = field(default_factory=lambda: np.full(2, -np.inf))
+    low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
+    high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
 
 
 class FrameWriter:
@@ -282,10 +283,10 @@ class FrameWriter:
         self,
         piece: _Piece,
         faces: ArrayLike | None,
-        flat: NDArray[np.float64],
+        flat: FloatArray,
         density: NDArray[np.float32],
         number: int,
-    ) -> NDArray[np.int32] | None:
+    ) -> IntArray | None:
         """The faces to write with this frame, or None where they stay; checks that all arrays fit together."""
         what = f"frame {number} of piece {piece.surface.name!r}"
         own = piece.surface.faces
@@ -415,8 +416,8 @@ class _Brush:
 
     def _mixed(
         self,
-        density: NDArray[np.float64],
-        vertex: NDArray[np.int32],
+        density: FloatArray,
+        vertex: IntArray,
         size: int,
         scale: float,
         table: NDArray[np.float32],
@@ -435,7 +436,7 @@ def _density(samples: MeshSamples) -> Any:
     return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
 
 
-def _on_surface(parts: Polylines, to_surface: NDArray[np.int32]) -> Polylines:
+def _on_surface(parts: Polylines, to_surface: IntArray) -> Polylines:
     """The lines in the surface's numbering, where both sides of a crack are the same line."""
     return [
         np.array(line, dtype=np.int32) for line in dict.fromkeys(tuple(to_surface[part].tolist()) for part in parts)

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.export.atomic import atomic_path
 from warpflat.export.geometry import Polylines
@@ -87,7 +88,7 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
     return prim
 
 
-def define_mesh(stage: Any, path: str, normals: NDArray[np.float64], *, per_face: bool) -> Any:
+def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
     """A polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
 
     Args:
@@ -125,7 +126,7 @@ class MeshSamples:
         self._stored = 0
         self._padding = 0
 
-    def write(self, time: Any, points: NDArray[np.float32], faces: NDArray[np.int32] | None = None) -> None:
+    def write(self, time: Any, points: NDArray[np.float32], faces: IntArray | None = None) -> None:
         """Write the points (#P by 3) [m]; `faces` (#F by 4) begin a new topology."""
         from pxr import Vt
 

@@ -9,9 +9,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
-from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Ids, Layout
-from warpflat.mannequin.profiles import Floats, arc_lengths, convex_girth, scale_to_girth
+from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
+from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["Adjustment", "adjusted_vertices", "blended"]
@@ -48,7 +49,7 @@ class Adjustment:
         }  # fmt: skip
 
 
-def blended(first: Floats, second: Floats, weight: float) -> Floats:
+def blended(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
     """The surface between two forms of one layout; `weight` 0 is the first, 1 the second.
 
     Raises:
@@ -62,8 +63,8 @@ def blended(first: Floats, second: Floats, weight: float) -> Floats:
 
 
 def adjusted_vertices(
-    layout: Layout, vertices: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]] = ()
-) -> Floats:
+    layout: Layout, vertices: FloatArray, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]] = ()
+) -> FloatArray:
     """The body's vertices with some profiles moved; what lies between follows smoothly.
 
     Args:
@@ -92,7 +93,7 @@ def adjusted_vertices(
     return out
 
 
-def _changed(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
+def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
     """A closed level row, #P by 3, after one adjustment."""
     new = row.copy()
     if other is not None:
@@ -115,7 +116,7 @@ def _changed(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
     return new
 
 
-def _bridged(row: Floats) -> Floats:
+def _bridged(row: FloatArray) -> FloatArray:
     """A closed level row with every vertex that lies in a hollow moved to the straight line across it."""
     from scipy.spatial import ConvexHull
 
@@ -128,7 +129,11 @@ def _bridged(row: Floats) -> Floats:
 
 
 def _move_rings(
-    out: Floats, layout: Layout, body: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]]
+    out: FloatArray,
+    layout: Layout,
+    body: FloatArray,
+    profiles: Mapping[str, Adjustment],
+    ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
 
@@ -156,7 +161,9 @@ def _move_rings(
         _rule(out, layout.rings, layout.level_row, pair, RING_LEVELS)
 
 
-def _rule(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str, str], known: Sequence[str]) -> None:
+def _rule(
+    out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], known: Sequence[str]
+) -> None:
     for level in pair:
         if level not in known:
             raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, known)}")
@@ -168,7 +175,7 @@ def _rule(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str, st
     out[grid[a : b + 1]] = first + share[:, None, None] * (last - first)
 
 
-def _move_sheet(out: Floats, layout: Layout, body: Floats, chest: Adjustment | None) -> None:
+def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjustment | None) -> None:
     """Chest and shoulders follow the bust's rows; neckline and shoulder seams stay."""
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
@@ -194,14 +201,18 @@ def _move_sheet(out: Floats, layout: Layout, body: Floats, chest: Adjustment | N
     out[ids[~held]] = body[ids[~held]] + np.asarray(solved).reshape(-1, 3)
 
 
-def _row_normals(row: Floats) -> Floats:
+def _row_normals(row: FloatArray) -> FloatArray:
     tangent = np.gradient(row, axis=0)
     normal = np.column_stack([-tangent[:, 2], np.zeros(len(row)), tangent[:, 0]])
     return normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
 
 
 def _move_arms(
-    out: Floats, layout: Layout, body: Floats, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]]
+    out: FloatArray,
+    layout: Layout,
+    body: FloatArray,
+    profiles: Mapping[str, Adjustment],
+    ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
 
@@ -219,7 +230,7 @@ def _move_arms(
                 _rule_arm(out, grid, layout.arm_row, pair)
 
 
-def _rule_arm(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str, str]) -> None:
+def _rule_arm(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str]) -> None:
     for level in pair:
         if level not in row_of:
             raise InputError(f"form: ruled: arm level {level!r} is unknown: {nearest(level, row_of)}")
@@ -228,7 +239,7 @@ def _rule_arm(out: Floats, grid: Ids, row_of: Mapping[str, int], pair: tuple[str
     out[grid[a : b + 1]] = out[grid[a]] + share[:, None, None] * (out[grid[b]] - out[grid[a]])
 
 
-def _arm_move(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
+def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
     """How an arm's closed row moves: in its own plane, about its middle."""
     middle = row.mean(axis=0)
     length = arc_lengths(row, closed=True)[-1]
@@ -242,6 +253,6 @@ def _arm_move(row: Floats, other: Floats | None, change: Adjustment) -> Floats:
     return middle + factor * shape - row
 
 
-def _move_neck(out: Floats, layout: Layout, body: Floats) -> None:
+def _move_neck(out: FloatArray, layout: Layout, body: FloatArray) -> None:
     share = np.linspace(1.0, 0.0, len(layout.neck))[:, None, None]
     out[layout.neck] = body[layout.neck] + share * (out[layout.neck[0]] - body[layout.neck[0]])

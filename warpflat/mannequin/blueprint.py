@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from warpflat.mannequin.profiles import Floats
+from warpflat.arrays import FloatArray
 
 __all__ = ["ArmCurves", "Blueprint", "Profile", "QuarterCurves"]
 
@@ -24,7 +24,7 @@ class Profile:
         girth: what a tape must read around the finished row [m].
     """
 
-    curve: Floats
+    curve: FloatArray
     centre_front: float
     side_left: float
     centre_back: float
@@ -47,13 +47,13 @@ class QuarterCurves:
         centre: the centre line from the bust level to the neckline.
     """
 
-    neckline: Floats
+    neckline: FloatArray
     bend: float
-    shoulder: Floats
-    armhole: Floats
+    shoulder: FloatArray
+    armhole: FloatArray
     notch: float
-    chest: Floats
-    centre: Floats
+    chest: FloatArray
+    centre: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -64,9 +64,9 @@ class ArmCurves:
         biceps, elbow, wrist: the curves; the first point is on the underarm line, the opposite one on the overarm line.
     """
 
-    biceps: Floats
-    elbow: Floats
-    wrist: Floats
+    biceps: FloatArray
+    elbow: FloatArray
+    wrist: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -89,6 +89,6 @@ class Blueprint:
     quarters: Mapping[str, QuarterCurves]
     arms: Mapping[str, ArmCurves]
     neck: float
-    collar: Floats
-    attract: Callable[[Floats], Floats] | None = None
+    collar: FloatArray
+    attract: Callable[[FloatArray], FloatArray] | None = None
     mirror: bool = False

@@ -11,8 +11,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError, nearest
-from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Ids, Layout
+from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
 
 __all__ = ["TRUNK_LEVELS", "Brick", "brick", "select_bricks"]
 
@@ -34,7 +35,7 @@ class Brick:
     """
 
     name: str
-    vertices: Ids
+    vertices: IntArray
     faces: NDArray[np.int64]
     neighbours: Mapping[str, tuple[str, ...]]
 

@@ -6,9 +6,10 @@ import itertools
 
 import numpy as np
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.mannequin.blueprint import Blueprint, Profile, QuarterCurves
-from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Ids, Layout
-from warpflat.mannequin.profiles import Floats, arc_lengths, convex_girth, resample, scale_to_girth
+from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Layout
+from warpflat.mannequin.profiles import arc_lengths, convex_girth, resample, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["build_vertices", "girth_ring", "quarter_fractions"]
@@ -21,7 +22,7 @@ _ATTRACT = 0.25
 _ATTRACT_ROUNDS = 4
 
 
-def build_vertices(layout: Layout, blueprint: Blueprint) -> Floats:
+def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
     """The grid's vertices on a body.
 
     Returns:
@@ -36,7 +37,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint) -> Floats:
     return _mirrored(vertices, layout) if blueprint.mirror else vertices
 
 
-def _mirrored(vertices: Floats, layout: Layout) -> Floats:
+def _mirrored(vertices: FloatArray, layout: Layout) -> FloatArray:
     """The average of the body and its mirror image, girths kept."""
     other = vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])
     out = 0.5 * (vertices + other)
@@ -45,7 +46,7 @@ def _mirrored(vertices: Floats, layout: Layout) -> Floats:
     return out
 
 
-def quarter_fractions(layout: Layout, princess: float) -> Floats:
+def quarter_fractions(layout: Layout, princess: float) -> FloatArray:
     """Shares of a quarter's arc at which its columns stand, from the centre to the side, both included."""
     n0, n1, n2, n3 = layout.columns
     knots = [0.0, 0.5 * princess, princess, princess + 0.50 * (1.0 - princess), 1.0]
@@ -55,7 +56,7 @@ def quarter_fractions(layout: Layout, princess: float) -> Floats:
     return np.concatenate([*parts, [1.0]])
 
 
-def girth_ring(layout: Layout, profile: Profile, height: float) -> Floats:
+def girth_ring(layout: Layout, profile: Profile, height: float) -> FloatArray:
     """One closed row of the grid, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
     total = arc_lengths(profile.curve, closed=True)[-1]
     ends = (
@@ -65,7 +66,7 @@ def girth_ring(layout: Layout, profile: Profile, height: float) -> Floats:
         profile.side_right,
         total + profile.centre_front,
     )
-    at: list[Floats] = []
+    at: list[FloatArray] = []
     for i, name in enumerate(QUARTERS):
         shares = quarter_fractions(layout, profile.princess[name])
         if name in ("back-left", "front-right"):
@@ -76,7 +77,7 @@ def girth_ring(layout: Layout, profile: Profile, height: float) -> Floats:
     return scale_to_girth(row, profile.girth)
 
 
-def _set_rings(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
+def _set_rings(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     for low, high in itertools.pairwise(RING_LEVELS):
         first, last = layout.level_row[low], layout.level_row[high]
         for row in range(first, last + 1):
@@ -85,14 +86,14 @@ def _set_rings(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
             vertices[layout.rings[row]] = girth_ring(layout, blueprint.profile(height), height)
 
 
-def _pieces(curve: Floats, knots: list[float], counts: list[int]) -> Floats:
+def _pieces(curve: FloatArray, knots: list[float], counts: list[int]) -> FloatArray:
     """Points of a curve: `counts` cells between consecutive `knots` (shares of the length), ends included."""
     spans = zip(knots[:-1], knots[1:], counts, strict=True)
     parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in spans]
     return resample(curve, np.concatenate([*parts, knots[-1:]]))
 
 
-def _quarter_ids(layout: Layout, name: str) -> tuple[Ids, Ids, Ids, Ids, Ids]:
+def _quarter_ids(layout: Layout, name: str) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
     """Vertex ids of one quarter: neckline from the centre, shoulder from the neck, armhole down, chest row, centre."""
     n0 = layout.columns[0]
     k, q = layout.to_arm, layout.quarter
@@ -114,7 +115,7 @@ def _quarter_ids(layout: Layout, name: str) -> tuple[Ids, Ids, Ids, Ids, Ids]:
     return neckline, yoke[-1], armhole, half[0], centre
 
 
-def _set_bounds(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
+def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     """Neckline, shoulder seams and armholes."""
     n0, n1, n2, n3 = layout.columns
     m2, m3 = len(layout.front) - 1, len(layout.yokes["front-left"]) - 1
@@ -134,7 +135,7 @@ def _set_bounds(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
         vertices[armhole] = _pieces(c.armhole, [0.0, yoke, c.notch, 1.0], [m3, m2, n3])
 
 
-def _to_length(loop: Floats, length: float) -> Floats:
+def _to_length(loop: FloatArray, length: float) -> FloatArray:
     """A closed polygon, #P by 3, blown up about its middle until it is `length` [m] long."""
     middle = loop.mean(axis=0)
     return middle + (loop - middle) * (length / arc_lengths(loop, closed=True)[-1])
@@ -150,7 +151,7 @@ def _yoke_share(c: QuarterCurves) -> float:
     return float(np.clip(0.9 * drop / max(upper, 1e-9), 0.22, 0.5))
 
 
-def _set_arms(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
+def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     from scipy.interpolate import PchipInterpolator
 
     for side, grid in layout.arms.items():
@@ -188,7 +189,7 @@ def _set_arms(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
         vertices[grid[1 : rows["biceps"]]] = h00 * hole + h10 * reach * leave + h01 * rings[0] + h11 * reach * axis
 
 
-def _set_neck(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
+def _set_neck(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     base = vertices[layout.neck[0]]
     s = arc_lengths(base, closed=True)
     top = resample(blueprint.collar, s[:-1] / s[-1], closed=True)
@@ -199,7 +200,7 @@ def _set_neck(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
     vertices[layout.neck[1:]] = (1 - t) * base + t * top + swing
 
 
-def _set_sheet(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
+def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
     """Chest, blades and shoulders: the smoothest sheet through the bounds that continues the bust's rows."""
     from scipy import sparse
     from scipy.sparse.linalg import factorized
@@ -243,11 +244,11 @@ def _set_sheet(vertices: Floats, layout: Layout, blueprint: Blueprint) -> None:
     vertices[ids[free]] = position
 
 
-def _guides(vertices: Floats, layout: Layout, blueprint: Blueprint) -> tuple[Ids, Floats]:
+def _guides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> tuple[IntArray, FloatArray]:
     """Vertices of the across-chest rows and the centre lines above the bust, and where they should lie."""
     n0, n1, n2, _ = layout.columns
-    ids: list[Ids] = []
-    places: list[Floats] = []
+    ids: list[IntArray] = []
+    places: list[FloatArray] = []
     for name in QUARTERS:
         c = blueprint.quarters[name]
         _, _, _, chest, centre = _quarter_ids(layout, name)

@@ -5,11 +5,10 @@ from __future__ import annotations
 import itertools
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.mannequin.closest import Closest
-from warpflat.mannequin.profiles import Floats
 
 __all__ = ["Carrier"]
 
@@ -28,7 +27,7 @@ class Carrier:
         InputError: if the arrays do not fit together.
     """
 
-    def __init__(self, positions: Floats, pattern: Floats, faces: NDArray[np.int32]) -> None:
+    def __init__(self, positions: FloatArray, pattern: FloatArray, faces: IntArray) -> None:
         positions, pattern, faces = np.asarray(positions, float), np.asarray(pattern, float), np.asarray(faces)
         if len(positions) != len(pattern) or positions.shape[1:] != (3,) or pattern.shape[1:] != (2,):
             raise InputError(
@@ -44,7 +43,7 @@ class Carrier:
         self._edges = np.unique(np.sort(edges, axis=1), axis=0)
         self._step = 0.25 * float(np.linalg.norm(np.diff(positions[self._edges], axis=1), axis=2).mean())
 
-    def to_body(self, points: Floats, *, tolerance: float = 0.001) -> Floats:
+    def to_body(self, points: FloatArray, *, tolerance: float = 0.001) -> FloatArray:
         """Where points of the pattern lie on the body.
 
         Args:
@@ -59,7 +58,7 @@ class Carrier:
         """
         return self._carried(self._on_pattern, self._positions, points, tolerance, "pattern")
 
-    def to_pattern(self, points: Floats, *, tolerance: float = 0.005) -> Floats:
+    def to_pattern(self, points: FloatArray, *, tolerance: float = 0.005) -> FloatArray:
         """Where points on the body lie in the pattern.
 
         Args:
@@ -74,7 +73,7 @@ class Carrier:
         """
         return self._carried(self._on_body, self._pattern, points, tolerance, "body")
 
-    def polyline_to_body(self, points: Floats, *, tolerance: float = 0.001) -> Floats:
+    def polyline_to_body(self, points: FloatArray, *, tolerance: float = 0.001) -> FloatArray:
         """A polyline drawn on the pattern, on the body: bent wherever it crosses a mesh edge, so it lies on the piece.
 
         Args:
@@ -89,7 +88,7 @@ class Carrier:
         """
         return self.to_body(self._crossings(_checked(points, 2)), tolerance=tolerance)
 
-    def polyline_to_pattern(self, points: Floats, *, tolerance: float = 0.005) -> Floats:
+    def polyline_to_pattern(self, points: FloatArray, *, tolerance: float = 0.005) -> FloatArray:
         """A polyline drawn on the body, in the pattern, followed in steps of a quarter of an edge.
 
         Args:
@@ -112,7 +111,9 @@ class Carrier:
             parts.append((1 - t) * a + t * b)
         return self.to_pattern(np.concatenate([*parts, points[-1:]]), tolerance=np.inf)
 
-    def _carried(self, source: Closest, target: Floats, points: Floats, tolerance: float, where: str) -> Floats:
+    def _carried(
+        self, source: Closest, target: FloatArray, points: FloatArray, tolerance: float, where: str
+    ) -> FloatArray:
         points = _checked(points, source.corners.shape[2])
         triangle, weights, distance = source(points)
         far = np.flatnonzero(distance > tolerance)
@@ -124,11 +125,11 @@ class Carrier:
             )
         return np.asarray(np.einsum("nk,nkd->nd", weights, target[self._triangles[triangle]]))
 
-    def _crossings(self, points: Floats) -> Floats:
+    def _crossings(self, points: FloatArray) -> FloatArray:
         """A polyline in the pattern with a point added wherever it crosses an edge."""
         a, b = self._pattern[self._edges[:, 0]], self._pattern[self._edges[:, 1]]
         along = b - a
-        parts: list[Floats] = []
+        parts: list[FloatArray] = []
         for p, q in itertools.pairwise(points):
             d = q - p
             bottom = d[0] * along[:, 1] - d[1] * along[:, 0]
@@ -142,7 +143,7 @@ class Carrier:
         return np.concatenate([*parts, points[-1:]])
 
 
-def _checked(points: Floats, width: int) -> Floats:
+def _checked(points: FloatArray, width: int) -> FloatArray:
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] != width or len(points) == 0 or not np.isfinite(points).all():
         raise InputError(f"carry: points {points.shape}; #P by {width} finite numbers are needed")

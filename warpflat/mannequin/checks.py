@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.mannequin.profiles import Floats
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["self_intersections"]
 
 
-def self_intersections(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np.int64]:
+def self_intersections(vertices: FloatArray, faces: IntArray) -> NDArray[np.int64]:
     """Pairs of quads that cut through each other.
 
     Quads count as two triangles; triangles that share a vertex (or a place, along a cut) are not compared.
@@ -48,7 +48,7 @@ def self_intersections(vertices: Floats, faces: NDArray[np.int32]) -> NDArray[np
     return np.asarray(found, np.int64)
 
 
-def _pierces(start: Floats, end: Floats, triangle: Floats) -> NDArray[np.bool_]:
+def _pierces(start: FloatArray, end: FloatArray, triangle: FloatArray) -> BoolArray:
     """Whether each segment passes through its triangle (Moeller and Trumbore 1997)."""
     e1, e2 = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
     d = end - start

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.mannequin.profiles import Floats
+from warpflat.arrays import FloatArray
 
 __all__ = ["Closest"]
 
@@ -18,7 +18,7 @@ class Closest:
         triangles: #T by 3.
     """
 
-    def __init__(self, vertices: Floats, triangles: NDArray[np.int64]) -> None:
+    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
         from scipy.spatial import cKDTree
 
         self.corners = vertices[triangles]
@@ -26,7 +26,7 @@ class Closest:
         self.radius = np.linalg.norm(self.corners - self.middles[:, None], axis=2).max(axis=1)
         self.tree = cKDTree(self.middles)
 
-    def __call__(self, points: Floats) -> tuple[NDArray[np.int64], Floats, Floats]:
+    def __call__(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """The nearest triangle of every point.
 
         Args:
@@ -56,8 +56,8 @@ class Closest:
         return triangle, weights, distance
 
     def _best(
-        self, points: Floats, owner: NDArray[np.int64], triangles: NDArray[np.int64]
-    ) -> tuple[NDArray[np.int64], Floats, Floats]:
+        self, points: FloatArray, owner: NDArray[np.int64], triangles: NDArray[np.int64]
+    ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
         """Among pairs of a point and a triangle (sorted by point) the nearest triangle of each point that occurs."""
         weights = _barycentric(self.corners[triangles], points[owner])
         place = np.einsum("nk,nkd->nd", weights, self.corners[triangles])
@@ -68,7 +68,7 @@ class Closest:
         return triangles[chosen], weights[chosen], distance[chosen]
 
 
-def _barycentric(corners: Floats, points: Floats) -> Floats:
+def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
     """Weights of the nearest point of each triangle, #N by 3.
 
     Source: Ericson, Real-Time Collision Detection, 5.1.5, by regions of the triangle's plane.
@@ -76,13 +76,13 @@ def _barycentric(corners: Floats, points: Floats) -> Floats:
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     ab, ac, ap, bp, cp = b - a, c - a, points - a, points - b, points - c
 
-    def dot(u: Floats, v: Floats) -> Floats:
+    def dot(u: FloatArray, v: FloatArray) -> FloatArray:
         return np.asarray(np.einsum("ij,ij->i", u, v))
 
     d1, d2, d3, d4, d5, d6 = dot(ab, ap), dot(ac, ap), dot(ab, bp), dot(ac, bp), dot(ab, cp), dot(ac, cp)
     vc, vb, va = d1 * d4 - d3 * d2, d5 * d2 - d1 * d6, d3 * d6 - d5 * d4
 
-    def ratio(top: Floats, bottom: Floats) -> Floats:
+    def ratio(top: FloatArray, bottom: FloatArray) -> FloatArray:
         return np.clip(
             np.where(np.abs(bottom) > 1e-300, top / np.where(np.abs(bottom) > 1e-300, bottom, 1.0), 0.0), 0.0, 1.0
         )

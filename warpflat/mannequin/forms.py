@@ -9,10 +9,10 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
 from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
-from warpflat.mannequin.profiles import Floats
 from warpflat.names import checked_name, same_file
 from warpflat.words import shown
 
@@ -89,7 +89,7 @@ class FormResult:
     """
 
     name: str
-    vertices: Floats
+    vertices: FloatArray
     pieces: Mapping[str, FormPiece]
     seams: tuple[FormSeam, ...]
 
@@ -168,7 +168,7 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     return Form(name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend)
 
 
-def realise(layout: Layout, vertices: Floats, form: Form, *, half: bool = False) -> FormResult:
+def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = False) -> FormResult:
     """Build a form's surface on a body and cut it into its pieces.
 
     Args:
@@ -186,7 +186,7 @@ def realise(layout: Layout, vertices: Floats, form: Form, *, half: bool = False)
     return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=seams)
 
 
-def _surface(layout: Layout, body: Floats, form: Form) -> Floats:
+def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:
     vertices = adjusted_vertices(layout, body, form.profiles, form.ruled)
     if form.blend is None:
         return vertices

@@ -13,13 +13,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError
 
-__all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Ids", "Layout", "make_layout"]
+__all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 
-Ids = NDArray[np.int32]
 
 #: Closed horizontal levels, bottom up.
 RING_LEVELS = ("ankle", "knee", "thigh", "hip", "abdomen", "waist", "underbust", "bust")
@@ -59,22 +58,22 @@ class Layout:
 
     resolution: float
     columns: tuple[int, int, int, int]
-    rings: Ids
+    rings: IntArray
     level_row: Mapping[str, int]
-    front: Ids
-    back: Ids
-    yokes: Mapping[str, Ids]
-    neck: Ids
-    arms: Mapping[str, Ids]
+    front: IntArray
+    back: IntArray
+    yokes: Mapping[str, IntArray]
+    neck: IntArray
+    arms: Mapping[str, IntArray]
     arm_row: Mapping[str, int]
-    bricks: Mapping[str, Ids]
-    lines: Mapping[str, Ids]
+    bricks: Mapping[str, IntArray]
+    lines: Mapping[str, IntArray]
     vertex_count: int
-    faces: Ids
-    face_brick: Ids
+    faces: IntArray
+    face_brick: IntArray
 
     @property
-    def mirror(self) -> Ids:
+    def mirror(self) -> IntArray:
         """For every vertex the one in its mirror image at the midplane."""
         out = np.full(self.vertex_count, -1, np.int32)
         n = self.rings.shape[1]
@@ -120,7 +119,7 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     k, q, n = n0 + n1 + n2, n0 + n1 + n2 + n3, 4 * (n0 + n1 + n2 + n3)
     counter = itertools.count()
 
-    def fresh(*shape: int) -> Ids:
+    def fresh(*shape: int) -> IntArray:
         size = int(np.prod(shape))
         return np.fromiter(itertools.islice(counter, size), np.int32, size).reshape(shape)
 
@@ -165,7 +164,7 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     )  # fmt: skip
 
 
-def _yokes(front_top: Ids, back_top: Ids, n0: int, k: int, rows: int, fresh: object) -> dict[str, Ids]:
+def _yokes(front_top: IntArray, back_top: IntArray, n0: int, k: int, rows: int, fresh: object) -> dict[str, IntArray]:
     """The four patches under the shoulder seams; front and back share the seam's vertices."""
     assert callable(fresh)
     width = k - n0 + 1
@@ -183,18 +182,18 @@ def _yokes(front_top: Ids, back_top: Ids, n0: int, k: int, rows: int, fresh: obj
     return grids
 
 
-def _grid_faces(grid: Ids) -> Ids:
+def _grid_faces(grid: IntArray) -> IntArray:
     return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
 def _bricks(
-    columns: tuple[int, int, int, int], rings: Ids, level_row: Mapping[str, int], front: Ids, back: Ids,
-    yokes: Mapping[str, Ids], neck: Ids, arms: Mapping[str, Ids], arm_row: Mapping[str, int],
-) -> dict[str, Ids]:  # fmt: skip
+    columns: tuple[int, int, int, int], rings: IntArray, level_row: Mapping[str, int], front: IntArray, back: IntArray,
+    yokes: Mapping[str, IntArray], neck: IntArray, arms: Mapping[str, IntArray], arm_row: Mapping[str, int],
+) -> dict[str, IntArray]:  # fmt: skip
     """Every brick's grid by name, ``upper-lower/column``, from the neck down, then the arms."""
     n0, n1, n2, n3 = columns
     p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
-    bricks: dict[str, Ids] = {}
+    bricks: dict[str, IntArray] = {}
     m3 = len(yokes["front-left"]) - 1
     quarter_neck = n0 + m3
     closed_neck = np.hstack([neck, neck[:, :1]])
@@ -238,14 +237,14 @@ def _bricks(
 
 
 def _lines(
-    columns: tuple[int, int, int, int], rings: Ids, level_row: Mapping[str, int], front: Ids, back: Ids,
-    yokes: Mapping[str, Ids], neck: Ids, arms: Mapping[str, Ids], arm_row: Mapping[str, int],
-) -> dict[str, Ids]:  # fmt: skip
+    columns: tuple[int, int, int, int], rings: IntArray, level_row: Mapping[str, int], front: IntArray, back: IntArray,
+    yokes: Mapping[str, IntArray], neck: IntArray, arms: Mapping[str, IntArray], arm_row: Mapping[str, int],
+) -> dict[str, IntArray]:  # fmt: skip
     """Feature profiles (closed around the body or an arm) and feature lines, bottom up."""
     n0, n1, n2, n3 = columns
     p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
 
-    def loop(ids: Ids) -> Ids:
+    def loop(ids: IntArray) -> IntArray:
         return np.append(ids, ids[:1])
 
     lines = {level: loop(rings[level_row[level]]) for level in RING_LEVELS}

@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
-from warpflat.mannequin.profiles import Floats, arc_lengths, convex_girth
+from warpflat.mannequin.profiles import arc_lengths, convex_girth
 from warpflat.mannequin.table_body import blueprint_from_measurements
 from warpflat.surface.mesh import Surface
 
@@ -59,7 +60,7 @@ class Mannequin:
     """
 
     layout: Layout
-    vertices: Floats
+    vertices: FloatArray
     source: str
     notes: tuple[str, ...] = ()
     sections: Mapping[str, float] = field(default_factory=dict)
@@ -91,7 +92,7 @@ class Mannequin:
 
     @classmethod
     def from_scan(
-        cls, vertices: Floats, faces: Any, *, options: ScanOptions | None = None, resolution_mm: float = 10.0
+        cls, vertices: FloatArray, faces: Any, *, options: ScanOptions | None = None, resolution_mm: float = 10.0
     ) -> Mannequin:
         """A mannequin on a body scan: levels found from the body's shape, hollows bridged as a tape does.
 
@@ -153,7 +154,7 @@ class Mannequin:
         """Names of the bricks that patterns such as ``waist-hip/front-*`` cover."""
         return select_bricks(self.layout, patterns)
 
-    def line(self, name: str) -> Floats:
+    def line(self, name: str) -> FloatArray:
         """#P by 3, positions [m] along a feature profile or line; a closed one repeats its first point.
 
         Raises:
@@ -163,7 +164,7 @@ class Mannequin:
             raise InputError(f"mannequin line {name!r} is unknown: {nearest(name, self.layout.lines)}")
         return self.vertices[self.layout.lines[name]]
 
-    def lines(self) -> dict[str, Floats]:
+    def lines(self) -> dict[str, FloatArray]:
         """Every feature profile and line by name, #P by 3 [m]."""
         return {name: self.vertices[ids] for name, ids in self.layout.lines.items()}
 

@@ -7,11 +7,11 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from warpflat.arrays import FloatArray
 from warpflat.export.atomic import atomic_path
 from warpflat.export.letters import all_letters
 from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.normals import face_normals, vertex_normals
-from warpflat.mannequin.profiles import Floats
 
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
@@ -64,7 +64,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
         figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
-def _turned(vertices: Floats, degrees: float) -> Floats:
+def _turned(vertices: FloatArray, degrees: float) -> FloatArray:
     """Vertices seen by somebody who walked `degrees` around the body to its left; x right, y up, z to the eye."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     x, y, z = vertices.T
@@ -73,7 +73,7 @@ def _turned(vertices: Floats, degrees: float) -> Floats:
     return turned
 
 
-def _draw_body(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+def _draw_body(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     from matplotlib.collections import PolyCollection
 
     faces = mannequin.layout.faces
@@ -91,7 +91,7 @@ def _draw_body(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
     )
 
 
-def _visible(turned: Floats, mannequin: Mannequin, ids: Any) -> Any:
+def _visible(turned: FloatArray, mannequin: Mannequin, ids: Any) -> Any:
     """Which vertices of a line face the viewer and are not behind an arm."""
     from scipy.spatial import cKDTree
 
@@ -106,7 +106,7 @@ def _visible(turned: Floats, mannequin: Mannequin, ids: Any) -> Any:
     return seen
 
 
-def _draw_lines(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+def _draw_lines(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     from matplotlib.collections import LineCollection
 
     segments = []
@@ -117,7 +117,7 @@ def _draw_lines(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
     axes.add_collection(LineCollection(list(np.concatenate(segments)), colors=_LINE, linewidths=0.9))
 
 
-def _label_levels(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
+def _label_levels(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     """Names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
     levels = mannequin.levels()
     names = ["neck", "chest back", *reversed(RING_LEVELS)]
@@ -131,7 +131,7 @@ def _label_levels(axes: Any, turned: Floats, mannequin: Mannequin) -> None:
         axes.text(x, y, f"{words} {levels[name].girth * 100:.1f} cm", fontsize=8, va="center", ha="left", color=_INK)
 
 
-def _spread(wished: Floats, gap: float) -> Floats:
+def _spread(wished: FloatArray, gap: float) -> FloatArray:
     """Heights near the wished ones (high to low), at least `gap` apart."""
     places = wished.copy()
     for i in range(1, len(places)):
@@ -139,7 +139,7 @@ def _spread(wished: Floats, gap: float) -> Floats:
     return places
 
 
-def _label_lines(axes: Any, turned: Floats, mannequin: Mannequin, view: str) -> None:
+def _label_lines(axes: Any, turned: FloatArray, mannequin: Mannequin, view: str) -> None:
     """Names of the vertical lines, written along them where they are seen best, and of shoulder and armhole."""
     rows = mannequin.layout.level_row
     places = {

@@ -9,11 +9,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
-from warpflat.mannequin.layout import Ids, Layout
-from warpflat.mannequin.profiles import Floats
+from warpflat.mannequin.layout import Layout
 from warpflat.surface.mesh import Surface
 
 __all__ = ["FormPiece", "FormSeam", "cut_pieces"]
@@ -38,10 +38,10 @@ class FormPiece:
     """
 
     surface: Surface
-    edges: Mapping[str, Ids]
+    edges: Mapping[str, IntArray]
     datum: str
     fold: str | None
-    grid_vertices: Ids
+    grid_vertices: IntArray
     face_brick: tuple[str, ...]
 
 
@@ -59,11 +59,11 @@ class FormSeam:
     name: str
     pieces: tuple[str, str]
     edges: tuple[str, str]
-    vertices: tuple[Ids, Ids]
+    vertices: tuple[IntArray, IntArray]
 
 
 def cut_pieces(
-    layout: Layout, vertices: Floats, recipes: Recipes, *, half: bool = False
+    layout: Layout, vertices: FloatArray, recipes: Recipes, *, half: bool = False
 ) -> tuple[dict[str, FormPiece], tuple[FormSeam, ...]]:
     """Join bricks into pieces and find their seams.
 
@@ -120,7 +120,13 @@ def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequ
 
 
 def _piece(
-    layout: Layout, vertices: Floats, name: str, bricks: Sequence[str], datum: str, opened: Sequence[str], half: bool
+    layout: Layout,
+    vertices: FloatArray,
+    name: str,
+    bricks: Sequence[str],
+    datum: str,
+    opened: Sequence[str],
+    half: bool,
 ) -> FormPiece:
     folded = half and lies_on_both(bricks)
     if folded:
@@ -158,7 +164,7 @@ def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:
     return edges
 
 
-def _split(faces: Ids, cut: set[tuple[int, int]]) -> tuple[Ids, Ids]:
+def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArray]:
     """Faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
@@ -193,7 +199,7 @@ def _split(faces: Ids, cut: set[tuple[int, int]]) -> tuple[Ids, Ids]:
     return corners.reshape(-1, 4), grid_vertices
 
 
-def _border(corners: Ids, name: str, *, opened: bool) -> NDArray[np.int64]:
+def _border(corners: IntArray, name: str, *, opened: bool) -> NDArray[np.int64]:
     """The one border loop of a disk, counter-clockwise from outside."""
     ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
     key = np.sort(ahead, axis=1)
@@ -229,7 +235,9 @@ def _unique(name: str, taken: Mapping[str, object]) -> str:
     return next(f"{name} {i}" for i in itertools.count(2) if f"{name} {i}" not in taken)
 
 
-def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str, *, opened: bool) -> dict[str, Ids]:
+def _edges(
+    layout: Layout, corners: IntArray, grid_vertices: IntArray, name: str, *, opened: bool
+) -> dict[str, IntArray]:
     loop = _border(corners, name, opened=opened)
     line_of = _line_of_edge(layout)
     on_grid = grid_vertices[loop]
@@ -240,13 +248,15 @@ def _edges(layout: Layout, corners: Ids, grid_vertices: Ids, name: str, *, opene
     # A doubled line turns back on itself at its end, which starts a new edge though the label stays.
     turns = [labels[i] != labels[i - 1] or on_grid[i - 1] == on_grid[(i + 1) % len(loop)] for i in range(len(loop))]
     starts = [i for i, t in enumerate(turns) if t] or [0]
-    edges: dict[str, Ids] = {}
+    edges: dict[str, IntArray] = {}
     for a, b in zip(starts, [*starts[1:], starts[0] + len(loop)], strict=True):
         edges[_unique(labels[a], edges)] = loop[np.arange(a, b + 1) % len(loop)].astype(np.int32)
     return edges
 
 
-def _lines(layout: Layout, corners: Ids, grid_vertices: Ids, edges: Mapping[str, Ids]) -> dict[str, Ids]:
+def _lines(
+    layout: Layout, corners: IntArray, grid_vertices: IntArray, edges: Mapping[str, IntArray]
+) -> dict[str, IntArray]:
     """Every edge and, as vertex indices of the piece, the runs of feature lines inside it, the longest of a line first.
 
     Where an edge goes on inside as the same line, its name means both.
@@ -282,7 +292,7 @@ def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[in
     return run, next((name for name in edges if name in joined), None)
 
 
-def _inner_runs(layout: Layout, corners: Ids, grid_vertices: Ids) -> dict[str, list[list[int]]]:
+def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> dict[str, list[list[int]]]:
     """By feature line its runs inside the piece, off the border, as vertex indices of the piece."""
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     mesh_edges, faces = np.unique(ends, axis=0, return_counts=True)

@@ -6,16 +6,11 @@ import functools
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 
-__all__ = [
-    "Floats", "Section", "arc_lengths", "convex_girth", "resample", "scale_to_girth", "section_curve",
-    "superellipse_exponent",
-]  # fmt: skip
-
-Floats = NDArray[np.float64]
+__all__ = ["Section", "arc_lengths", "convex_girth", "resample", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -45,7 +40,7 @@ class Section:
     bump_width: float = 0.05
 
 
-def section_curve(section: Section, samples: int = 720) -> Floats:
+def section_curve(section: Section, samples: int = 720) -> FloatArray:
     """The closed curve of a section.
 
     Returns:
@@ -88,7 +83,7 @@ def superellipse_exponent(area: float) -> float:
     return float(brentq(miss, 1.1, 12.0))
 
 
-def arc_lengths(points: Floats, *, closed: bool = False) -> Floats:
+def arc_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
     """Arc length [m] at every point of a polyline, and the whole length at the end if it is closed.
 
     Args:
@@ -99,7 +94,7 @@ def arc_lengths(points: Floats, *, closed: bool = False) -> Floats:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
 
 
-def resample(points: Floats, fractions: Floats, *, closed: bool = False) -> Floats:
+def resample(points: FloatArray, fractions: FloatArray, *, closed: bool = False) -> FloatArray:
     """Points of a polyline at fractions of its length.
 
     Args:
@@ -115,7 +110,7 @@ def resample(points: Floats, fractions: Floats, *, closed: bool = False) -> Floa
     return np.column_stack([np.interp(at, s, around[:, i]) for i in range(points.shape[1])])
 
 
-def convex_girth(points: Floats) -> float:
+def convex_girth(points: FloatArray) -> float:
     """Length [m] of a tape around points: the perimeter of their convex hull.
 
     Args:
@@ -133,7 +128,7 @@ def convex_girth(points: Floats) -> float:
         raise InputError("profile: its points lie on one line, a girth needs a closed curve") from error
 
 
-def scale_to_girth(points: Floats, girth: float) -> Floats:
+def scale_to_girth(points: FloatArray, girth: float) -> FloatArray:
     """Points of a level profile blown up or shrunk about their middle until a tape around them reads `girth` [m].
 
     Args:

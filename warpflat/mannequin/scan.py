@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
-from warpflat.mannequin.profiles import Floats, arc_lengths
+from warpflat.mannequin.profiles import arc_lengths
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, upright
@@ -41,7 +42,7 @@ class ScanFound:
     sections: Mapping[str, float]
 
 
-def blueprint_from_scan(vertices: Floats, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
+def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
     """Slice a body scan into the curves that the grid is laid on.
 
     Args:
@@ -71,7 +72,7 @@ def blueprint_from_scan(vertices: Floats, faces: NDArray[np.int64], options: Sca
     )
 
 
-def _ray_radii(hull: Floats, middle: Floats, count: int) -> Floats:
+def _ray_radii(hull: FloatArray, middle: FloatArray, count: int) -> FloatArray:
     """Distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x."""
     corners = hull - middle
     angle = np.arctan2(corners[:, 0], corners[:, 1]) % (2.0 * np.pi)
@@ -118,7 +119,7 @@ def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float]
         at = float(np.clip(np.interp(height, y, np.arange(len(y))), 0.0, len(y) - 1.001))
         i, f = int(at), at - int(at)
 
-        def mix(values: Floats) -> Floats:
+        def mix(values: FloatArray) -> FloatArray:
             return np.asarray((1.0 - f) * values[i] + f * values[i + 1])
 
         curve = mix(radii)[:, None] * outward + np.array([0.0, float(mix(start))])
@@ -143,7 +144,7 @@ def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float]
     return profile
 
 
-def _where(values: Floats, s: Floats, i: int, wished: float) -> float:
+def _where(values: FloatArray, s: FloatArray, i: int, wished: float) -> float:
     """Arc length near sample `i` at which `values` pass `wished`."""
     a, b = values[i - 1], values[i + 1]
     if abs(b - a) < 1e-9:
@@ -152,7 +153,7 @@ def _where(values: Floats, s: Floats, i: int, wished: float) -> float:
     return float((1.0 - f) * s[i - 1] + f * s[i + 1])
 
 
-def _share(quarter: Floats, wished: float) -> float:
+def _share(quarter: FloatArray, wished: float) -> float:
     """Share of a quarter's length, from its centre line to its side, at which it is `wished` [m] off the midplane."""
     s = arc_lengths(quarter)
     rising = np.maximum.accumulate(np.abs(quarter[:, 0]))
@@ -161,7 +162,7 @@ def _share(quarter: Floats, wished: float) -> float:
 
 def _attractor(
     slicer: Slicer, levels: Mapping[str, float], armpits: Mapping[str, tuple[float, float, float]]
-) -> Callable[[Floats], Floats]:
+) -> Callable[[FloatArray], FloatArray]:
     """The nearest place on the scan for every point, hollows between bust points and along the spine bridged.
 
     As tape and cloth bridge them: all the way at the bust, less and less up to the pit of the neck.
@@ -184,7 +185,7 @@ def _attractor(
     front = RegularGridInterpolator((y, x), fronts, bounds_error=False, fill_value=None)
     back = RegularGridInterpolator((y, x), backs, bounds_error=False, fill_value=None)
 
-    def attract(where: Floats) -> Floats:
+    def attract(where: FloatArray) -> FloatArray:
         triangle, weights, _ = closest(where)
         place = np.asarray(np.einsum("nk,nkd->nd", weights, closest.corners[triangle]))
         at = place[:, [1, 0]]
@@ -200,7 +201,7 @@ def _attractor(
     return attract
 
 
-def _upper_hull(points: Floats, x: Floats) -> Floats:
+def _upper_hull(points: FloatArray, x: FloatArray) -> FloatArray:
     """The upper side of the convex hull of points (x, z), at `x`."""
     from scipy.spatial import ConvexHull, QhullError
 

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
-from warpflat.mannequin.profiles import Floats
 from warpflat.mannequin.scan_pose import Slicer
 
 __all__ = ["TrunkSections", "find_levels", "trunk_sections"]
@@ -37,18 +37,18 @@ class TrunkSections:
     """
 
     stature: float
-    y: Floats
-    girth: Floats
-    length: Floats
-    area: Floats
-    left: Floats
-    right: Floats
-    front: Floats
-    back: Floats
-    front_centre: Floats
-    back_centre: Floats
-    apex: Floats
-    hulls: tuple[Floats, ...]
+    y: FloatArray
+    girth: FloatArray
+    length: FloatArray
+    area: FloatArray
+    left: FloatArray
+    right: FloatArray
+    front: FloatArray
+    back: FloatArray
+    front_centre: FloatArray
+    back_centre: FloatArray
+    apex: FloatArray
+    hulls: tuple[FloatArray, ...]
     crotch: float
     armpits: Mapping[str, tuple[float, float, float]]
 
@@ -64,7 +64,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     stature = float(slicer.vertices[:, 1].max())
     heights = np.arange(0.04, 0.93, 0.0025) * stature
     rows: list[list[float]] = []
-    hulls: list[Floats] = []
+    hulls: list[FloatArray] = []
     crotch = 0.0
     reach = 0.13 * stature
     for y in heights:
@@ -101,7 +101,9 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     )  # fmt: skip
 
 
-def _armpit(slicer: Slicer, y: Floats, reach: Floats, side: float, stature: float) -> tuple[float, float, float]:
+def _armpit(
+    slicer: Slicer, y: FloatArray, reach: FloatArray, side: float, stature: float
+) -> tuple[float, float, float]:
     """Where an arm joins the trunk: (height, x, z) just below the join."""
     window = np.flatnonzero((y > 0.66 * stature) & (y < 0.84 * stature))
     jump = next((i for i in window if reach[i + 1] > 1.22 * reach[i]), None)
@@ -182,7 +184,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     return levels, notes
 
 
-def _smooth(values: Floats, sigma: float) -> Floats:
+def _smooth(values: FloatArray, sigma: float) -> FloatArray:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
@@ -235,7 +237,7 @@ def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:
     window = (t.y > 0.80 * t.stature) & (t.y < 0.91 * t.stature)
     narrow = float(t.y[window][np.argmin(_smooth(t.area, 1.0)[window])])
 
-    def corner(values: Floats, low: float, high: float) -> float:
+    def corner(values: FloatArray, low: float, high: float) -> float:
         rows = (t.y >= low) & (t.y <= high)
         y, v = t.y[rows], _smooth(values, 1.0)[rows]
         chord = v[0] + (v[-1] - v[0]) * (y - y[0]) / (y[-1] - y[0])

@@ -7,10 +7,11 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
-from warpflat.mannequin.profiles import Floats, arc_lengths, resample
+from warpflat.mannequin.profiles import arc_lengths, resample
 from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
 
@@ -24,7 +25,7 @@ _NOTCH = 0.22
 
 def neck_and_arms(
     slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], profile: Callable[[float], Profile]
-) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, Floats]:
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray]:
     """The curves above the bust.
 
     Args:
@@ -73,7 +74,9 @@ def neck_and_arms(
     return {name: quarters[name] for name in QUARTERS}, arms, length, collar
 
 
-def _loop(points: Floats, origin: Floats, first: Floats, second: Floats, harmonics: int, count: int = 360) -> Floats:
+def _loop(
+    points: FloatArray, origin: FloatArray, first: FloatArray, second: FloatArray, harmonics: int, count: int = 360
+) -> FloatArray:
     """A smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3."""
     from scipy.spatial import ConvexHull
 
@@ -95,7 +98,7 @@ def _loop(points: Floats, origin: Floats, first: Floats, second: Floats, harmoni
     return np.asarray(origin + np.outer(plane[:, 0], first) + np.outer(plane[:, 1], second))
 
 
-def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tuple[Floats, Floats]:
+def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
     """Neck base and collar, from the front over the left."""
     front = np.array([0.0, levels["front_neck"], float(np.interp(levels["front_neck"], t.y, t.front_centre))])
     side_z = 0.5 * float(
@@ -107,7 +110,7 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     ahead = np.array([0.0, -slope, 1.0]) / np.hypot(1.0, slope)
     left = np.array([1.0, 0.0, 0.0])
 
-    def ring(lift: float) -> Floats:
+    def ring(lift: float) -> FloatArray:
         parts = [p for p in slicer.cut(normal, float(front @ normal) + lift)
                  if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]  # fmt: skip
         if not parts:
@@ -126,7 +129,7 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     return base, top
 
 
-def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> Floats:
+def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> FloatArray:
     """The closed armhole in the leaning plane through the armpit, from the underarm forward."""
     y, x, z = t.armpits[side]
     normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
@@ -143,7 +146,7 @@ def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> Floats
     return _loop(points, points.mean(axis=0), -up, ahead, _HARMONICS)
 
 
-def _shoulder(slicer: Slicer, neck: Floats, tip: Floats) -> Floats:
+def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
     """The seam from the side neck point to the shoulder point, on the scan's upper side."""
     flat = tip - neck
     normal = np.cross(flat, np.array([0.0, 1.0, 0.0]))
@@ -167,7 +170,7 @@ def _shoulder(slicer: Slicer, neck: Floats, tip: Floats) -> Floats:
     return straight
 
 
-def _row(slicer: Slicer, notch: Floats, face: str) -> Floats:
+def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
     """The across-chest row on the scan, from the midplane to the armhole's notch."""
     sign = 1.0 if face == "front" else -1.0
     points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
@@ -183,7 +186,7 @@ def _row(slicer: Slicer, notch: Floats, face: str) -> Floats:
     return np.column_stack([side * x, np.full_like(x, notch[1]), z])
 
 
-def _centre(slicer: Slicer, bottom: Floats, chest: Floats, top: Floats, face: str) -> Floats:
+def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArray, face: str) -> FloatArray:
     """The centre line from the bust to the neckline on the scan."""
     sign = 1.0 if face == "front" else -1.0
     y = np.linspace(bottom[1], top[1], 24)
@@ -198,7 +201,7 @@ def _centre(slicer: Slicer, bottom: Floats, chest: Floats, top: Floats, face: st
     return np.column_stack([np.zeros_like(y), y, z])
 
 
-def _arm(slicer: Slicer, hole: Floats, sign: float, side: str) -> ArmCurves:
+def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
     """Biceps, elbow and wrist from planes across the arm."""
     points, triangles = slicer.vertices, slicer.triangles
     middle = hole.mean(axis=0)
@@ -214,7 +217,7 @@ def _arm(slicer: Slicer, hole: Floats, sign: float, side: str) -> ArmCurves:
     ahead = np.cross(axis, up)
     ahead *= np.sign(ahead[2])
 
-    def ring(share: float) -> Floats:
+    def ring(share: float) -> FloatArray:
         parts = [p for p in slicer.cut(axis, float(middle @ axis) + share * reach.max()) if len(p.points) > 6]
         # The arm may be bent, so its section lies anywhere near the axis; the trunk's and the legs' lie further off.
         centre = middle + share * reach.max() * axis
@@ -237,7 +240,9 @@ def _arm(slicer: Slicer, hole: Floats, sign: float, side: str) -> ArmCurves:
     return ArmCurves(biceps=ring(biceps), elbow=ring(biceps + 0.44 * (wrist - biceps)), wrist=ring(wrist))
 
 
-def _beyond(points: Floats, triangles: NDArray[np.int64], normal: Floats, offset: float, near: Floats) -> Floats:
+def _beyond(
+    points: FloatArray, triangles: NDArray[np.int64], normal: FloatArray, offset: float, near: FloatArray
+) -> FloatArray:
     """The vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

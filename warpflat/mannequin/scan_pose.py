@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
-from warpflat.mannequin.profiles import Floats
 from warpflat.surface.stray import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
@@ -76,14 +76,14 @@ class Slice:
         length: summed length of the section's segments [m].
     """
 
-    points: Floats
+    points: FloatArray
     length: float
 
 
 class Slicer:
     """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
 
-    def __init__(self, vertices: Floats, triangles: NDArray[np.int64]) -> None:
+    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
         ends = np.sort(ends, axis=1).astype(np.int64)
         keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
@@ -92,7 +92,7 @@ class Slicer:
         self.vertices = vertices
         self.triangles = triangles
 
-    def cut(self, normal: Floats, offset: float) -> list[Slice]:
+    def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
         """The parts of the section where normal . x = offset, largest first by length."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
@@ -124,8 +124,8 @@ class Slicer:
 
 
 def upright(
-    vertices: Floats, faces: NDArray[np.int64], options: ScanOptions
-) -> tuple[Floats, NDArray[np.int64], list[str]]:
+    vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
+) -> tuple[FloatArray, NDArray[np.int64], list[str]]:
     """A scan in metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
     Args:
@@ -183,7 +183,7 @@ def upright(
     return new, triangles, notes
 
 
-def _welded(vertices: Floats, faces: NDArray[np.int64]) -> tuple[Floats, NDArray[np.int64]]:
+def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
     if vertices.ndim != 2 or vertices.shape[1] != 3 or faces.ndim != 2 or faces.shape[1] not in (3, 4):
         raise InputError(
             f"scan: vertices {vertices.shape} and faces {faces.shape}; #V by 3 and #F by 3 or 4 are needed"
@@ -226,7 +226,7 @@ def _unit_of(height: float) -> str:
     )
 
 
-def _hull_area_and_middle(points: Floats) -> tuple[float, Floats]:
+def _hull_area_and_middle(points: FloatArray) -> tuple[float, FloatArray]:
     """Area and centroid of the convex hull of plane points; the same however the plane's axes lie."""
     from scipy.spatial import ConvexHull, QhullError
 
@@ -242,7 +242,7 @@ def _hull_area_and_middle(points: Floats) -> tuple[float, Floats]:
     return float(hull.volume), np.asarray((ring + after).T @ wedge / (6.0 * hull.volume))
 
 
-def _plane_axes(up: Floats) -> Floats:
+def _plane_axes(up: FloatArray) -> FloatArray:
     """Two axes across `up`, 2 by 3."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = first - up * (first @ up)
@@ -250,13 +250,13 @@ def _plane_axes(up: Floats) -> Floats:
     return np.array([first, np.cross(up, first)])
 
 
-def _legs(slicer: Slicer, up: Floats) -> tuple[float, Floats | None]:
+def _legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]:
     """How much like a standing body the mesh is if `up` is up (0 to 1), and the direction from leg to leg."""
     points = slicer.vertices
     low, high = float((points @ up).min()), float((points @ up).max())
     across = _plane_axes(up)
 
-    def parts(share: float) -> list[tuple[float, Floats]]:
+    def parts(share: float) -> list[tuple[float, FloatArray]]:
         found = []
         for part in slicer.cut(up, low + share * (high - low)):
             found.append(_hull_area_and_middle(part.points @ across.T))
@@ -289,7 +289,7 @@ def _legs(slicer: Slicer, up: Floats) -> tuple[float, Floats | None]:
     return score, direction @ across
 
 
-def _facing(slicer: Slicer, up: Floats, ahead: Floats) -> float:
+def _facing(slicer: Slicer, up: FloatArray, ahead: FloatArray) -> float:
     """+1 if the body looks along `ahead`, -1 if the other way.
 
     Feet reach forward from the ankles; the seat stands out behind the waist more than anything stands out in front.
@@ -298,7 +298,7 @@ def _facing(slicer: Slicer, up: Floats, ahead: Floats) -> float:
     low, high = float((points @ up).min()), float((points @ up).max())
     size = high - low
 
-    def band(a: float, b: float) -> Floats:
+    def band(a: float, b: float) -> FloatArray:
         share = (points @ up - low) / size
         return points[(share >= a) & (share <= b)] @ ahead
 

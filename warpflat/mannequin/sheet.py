@@ -7,12 +7,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.mannequin.layout import Ids, Layout
+from warpflat.arrays import IntArray
+from warpflat.mannequin.layout import Layout
 
 __all__ = ["sheet_laplacian"]
 
 
-def sheet_laplacian(layout: Layout, first_row: int) -> tuple[Ids, Any, NDArray[np.int64]]:
+def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
     """The umbrella operator of the sheet.
 
     Args:

@@ -6,11 +6,12 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables
-from warpflat.mannequin.profiles import Floats, Section, arc_lengths, resample, section_curve
+from warpflat.mannequin.profiles import Section, arc_lengths, resample, section_curve
 
 __all__ = ["PRINCESS", "blueprint_from_measurements"]
 
@@ -54,7 +55,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
     y = np.array([*h, above])
     size = m.lengths["bust"]
 
-    def column(key: str, top: float, scale: float) -> Floats:
+    def column(key: str, top: float, scale: float) -> FloatArray:
         values = [sections[level][key] * scale for level in RING_LEVELS]
         return np.array([*values, values[-1] * top])
 
@@ -127,16 +128,16 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
         "back": _chest_row(start_back, under[2] + reach["back"], 0.5 * m.lengths["back_width"], -0.010 * size),
     }
 
-    def armhole(face: str) -> tuple[Floats, float]:
+    def armhole(face: str) -> tuple[FloatArray, float]:
         notch = chest[face][-1]
         other = chest["back" if face == "front" else "front"][-1]
 
-        def scoop(point: Floats) -> Floats:
+        def scoop(point: FloatArray) -> FloatArray:
             at = 0.62 * point + 0.38 * under
             at[1] = under[1] + 0.24 * (point[1] - under[1])
             return at
 
-        def brow(point: Floats) -> Floats:
+        def brow(point: FloatArray) -> FloatArray:
             at = 0.60 * point + 0.40 * tip
             at[2] = under[2] + 1.06 * (point[2] - under[2])
             return at
@@ -173,13 +174,13 @@ def _mirrored(curves: QuarterCurves) -> QuarterCurves:
     )  # fmt: skip
 
 
-def _chest_row(start: Floats, end_z: float, length: float, swell: float) -> Floats:
+def _chest_row(start: FloatArray, end_z: float, length: float, swell: float) -> FloatArray:
     """The level row from the centre to the notch, exactly `length` long; `swell` [m] is added at the blade."""
     from scipy.optimize import brentq
 
     t = np.linspace(0.0, 1.0, 200)
 
-    def row(width: float) -> Floats:
+    def row(width: float) -> FloatArray:
         z = start[2] + (end_z - start[2]) * t**2.6 + swell * np.sin(np.pi * np.clip(t / 0.9, 0.0, 1.0)) ** 2
         return np.column_stack([width * t, np.full_like(t, start[1]), z])
 
@@ -192,7 +193,7 @@ def _chest_row(start: Floats, end_z: float, length: float, swell: float) -> Floa
     return row(float(width))
 
 
-def _neckline(m: Measurements) -> Floats:
+def _neckline(m: Measurements) -> FloatArray:
     """The closed neck base, from centre front over the left; its length is the neck measurement."""
     from scipy.optimize import brentq
 
@@ -203,14 +204,14 @@ def _neckline(m: Measurements) -> Floats:
     c1, c2 = 0.5 * (front - back), 0.5 * (0.5 * (front + back) - side)
     y = side + c2 + c1 * np.cos(t) + c2 * np.cos(2.0 * t)
 
-    def loop(width: float) -> Floats:
+    def loop(width: float) -> FloatArray:
         return np.column_stack([0.5 * width * np.sin(t), y, middle + 0.5 * depth * np.cos(t)])
 
     width = brentq(lambda w: arc_lengths(loop(w), closed=True)[-1] - neck, 0.15 * neck, 0.6 * neck)
     return loop(float(width))
 
 
-def _collar(m: Measurements) -> Floats:
+def _collar(m: Measurements) -> FloatArray:
     """The upper end of the neck: a slighter, flatter curve above the neck base."""
     base = _neckline(m)
     middle = base.mean(axis=0)
@@ -232,7 +233,7 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     length = m.lengths["arm_length"]
     t = np.linspace(0.0, 2.0 * np.pi, 240, endpoint=False)
 
-    def ring(at: float, girth: float, flat: float, forward: float) -> Floats:
+    def ring(at: float, girth: float, flat: float, forward: float) -> FloatArray:
         # From the underarm (-up) forward; `flat` is the depth over the height of the section.
         shape = np.outer(-np.cos(t), up) + flat * np.outer(np.sin(t), ahead)
         scale = girth / arc_lengths(shape, closed=True)[-1]

@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.pieces import FOLD_STRAIGHT
@@ -22,7 +22,6 @@ if TYPE_CHECKING:
 
 __all__ = ["CutOutline", "Side", "Wedge", "cut_hole", "cut_outline"]
 
-Vector = NDArray[np.float64]
 
 #: Precision [m] to which the union is snapped, far below what any cutter resolves.
 GRID = 1e-7
@@ -50,7 +49,7 @@ class Side:
     """
 
     name: str
-    points: Vector
+    points: FloatArray
     width: float
     kind: str
 
@@ -64,16 +63,16 @@ class Wedge:
     """A dart that is folded, not cut: its legs (both #P by 2 [m], left from the border, right to the border)."""
 
     name: str
-    left: Vector
-    right: Vector
+    left: FloatArray
+    right: FloatArray
     fold_to: str
 
     @property
-    def tip(self) -> Vector:
+    def tip(self) -> FloatArray:
         return self.left[-1]
 
     @property
-    def middle(self) -> Vector:
+    def middle(self) -> FloatArray:
         """Unit vector from the tip along the line on which the wedge is folded."""
         both = _unit(self.left[0] - self.tip) + _unit(self.right[-1] - self.tip)
         return _unit(both)
@@ -92,9 +91,9 @@ class CutOutline:
     `prolonged` has, by dart, the unit vectors in which its left and its right leg run on through the allowance.
     """
 
-    points: Vector
+    points: FloatArray
     notes: tuple[str, ...]
-    prolonged: Mapping[str, tuple[Vector, Vector]] = field(default_factory=dict)
+    prolonged: Mapping[str, tuple[FloatArray, FloatArray]] = field(default_factory=dict)
 
 
 def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
@@ -115,7 +114,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     body = shapely.Polygon(np.concatenate([_leading(side) for side in sides]))
     parts: list[Geometry] = [body]
     strips = [_strip(side, body) if isinstance(side, Side) else shapely.Polygon() for side in sides]
-    prolonged: dict[str, tuple[Vector, Vector]] = {}
+    prolonged: dict[str, tuple[FloatArray, FloatArray]] = {}
     count = len(sides)
     for index, side in enumerate(sides):
         before, after = (index - 1) % count, (index + 1) % count
@@ -146,7 +145,7 @@ def cut_outline(sides: Sequence[Side | Wedge]) -> CutOutline:
     return CutOutline(points=points, notes=tuple(notes), prolonged=prolonged)
 
 
-def cut_hole(ring: Vector, width: float) -> Vector | None:
+def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:
     """The line along which a hole is cut, its allowance inwards of the sewing line.
 
     Args:
@@ -168,7 +167,7 @@ def cut_hole(ring: Vector, width: float) -> Vector | None:
     return np.asarray(shapely.orient_polygons(shapely.simplify(inner, 2e-6)).exterior.coords)[:-1]
 
 
-def _leading(side: Side | Wedge) -> Vector:
+def _leading(side: Side | Wedge) -> FloatArray:
     """Points of the outline without the last one."""
     return np.concatenate([side.left[:-1], side.right[:-1]]) if isinstance(side, Wedge) else side.points[:-1]
 
@@ -231,7 +230,7 @@ def _areas(geometry: Geometry) -> Geometry:
     return shapely.MultiPolygon([p for p in shapely.get_parts(geometry) if p.geom_type == "Polygon"])
 
 
-def _touching(strip: Geometry, line: Vector) -> Geometry:
+def _touching(strip: Geometry, line: FloatArray) -> Geometry:
     """The parts of a strip that lie along its edge: a wide strip may pass through a narrow piece and come out again."""
     import shapely
 
@@ -243,7 +242,7 @@ def _touching(strip: Geometry, line: Vector) -> Geometry:
     return _union(kept)
 
 
-def _corner_fill(corner: Vector, a: Vector, b: Vector, width_a: float, width_b: float) -> Polygon | None:
+def _corner_fill(corner: FloatArray, a: FloatArray, b: FloatArray, width_a: float, width_b: float) -> Polygon | None:
     """The cloth between two strips where the outline turns left from direction `a` to `b` (unit vectors).
 
     The outer lines of the strips run on until they meet. Where that is too far they are squared off; where a strip is
@@ -313,9 +312,9 @@ def _cloth(sides: Sequence[Side | Wedge], strips: Sequence[Geometry], index: int
 
 
 def _folded_hem(
-    corner: Vector,
-    inwards: Vector,
-    beyond: Vector,
+    corner: FloatArray,
+    inwards: FloatArray,
+    beyond: FloatArray,
     hem: int,
     seam: int,
     width: float,
@@ -350,7 +349,7 @@ def _folded_hem(
 
 def _dart_parts(
     sides: Sequence[Side | Wedge], strips: list[Geometry], index: int, before: int, after: int, body: Polygon
-) -> tuple[tuple[Vector, Vector], list[Geometry], list[str]]:
+) -> tuple[tuple[FloatArray, FloatArray], list[Geometry], list[str]]:
     """How the legs run on, and the cap over a dart: the neighbour's cut line mirrored on the leg, then on the fold.
 
     So it folds flat. A note says where the cap would have to reach too far for that.
@@ -382,7 +381,7 @@ def _dart_parts(
     return (on_left, on_right), [end_left, end_right, *lobes, cap, _reflect(cap, wedge.tip, wedge.middle)], notes
 
 
-def _prolonged(wedge: Wedge, left: Side, right: Side) -> tuple[Vector, Vector]:
+def _prolonged(wedge: Wedge, left: Side, right: Side) -> tuple[FloatArray, FloatArray]:
     """Unit vectors in which the legs run on through the allowance: straight, but bent at a hem so that it folds up flat.
 
     What is turned up is then as long, from side to side, as what it lies on. Both legs bend alike, so that the wedge can
@@ -401,7 +400,7 @@ def _prolonged(wedge: Wedge, left: Side, right: Side) -> tuple[Vector, Vector]:
 
 
 def _cap(
-    wedge: Wedge, body: Polygon, covered: Geometry, mouth: Vector, beyond: Vector, radius: float
+    wedge: Wedge, body: Polygon, covered: Geometry, mouth: FloatArray, beyond: FloatArray, radius: float
 ) -> tuple[Geometry, bool]:
     """Half a dart's wedge: what it covers, mirrored on the leg at `mouth` and, past it, on its course `beyond`.
 
@@ -424,7 +423,7 @@ def _cap(
     return cap, cap.distance(shapely.LineString(ends)) > GRID
 
 
-def _lobes(leg: Vector) -> Geometry:
+def _lobes(leg: FloatArray) -> Geometry:
     """What lies between a leg and its chord, on either side."""
     import shapely
 
@@ -436,7 +435,7 @@ def _lobes(leg: Vector) -> Geometry:
 
 
 def _at_leg(
-    strip: Geometry, width: float, mouth: Vector, leg: Vector, along: Vector, other_mouth: Vector
+    strip: Geometry, width: float, mouth: FloatArray, leg: FloatArray, along: FloatArray, other_mouth: FloatArray
 ) -> tuple[Geometry, Geometry]:
     """A strip that ends on the prolonged leg of a dart: what is trimmed, and what is added.
 
@@ -455,12 +454,16 @@ def _at_leg(
     return trimmed, _without_beyond(run_on, mouth, leg, inwards, 3 * width)
 
 
-def _without_beyond(area: Geometry, point: Vector, direction: Vector, side: Vector, radius: float) -> Geometry:
+def _without_beyond(
+    area: Geometry, point: FloatArray, direction: FloatArray, side: FloatArray, radius: float
+) -> Geometry:
     """`area` without what lies within `radius` of `point` on the `side` of the line through it along `direction`."""
     return _minus(area, _box(point, direction, (-radius, radius), side, (0, radius)))
 
 
-def _box(point: Vector, along: Vector, reach: tuple[float, float], side: Vector, depth: tuple[float, float]) -> Polygon:
+def _box(
+    point: FloatArray, along: FloatArray, reach: tuple[float, float], side: FloatArray, depth: tuple[float, float]
+) -> Polygon:
     """The parallelogram from `point` over `reach` [m] along one unit vector and over `depth` [m] along another."""
     import shapely
 
@@ -468,7 +471,7 @@ def _box(point: Vector, along: Vector, reach: tuple[float, float], side: Vector,
     return shapely.Polygon([point + a * along + d * side for a, d in corners])
 
 
-def _reflect(area: Geometry, point: Vector, direction: Vector) -> Geometry:
+def _reflect(area: Geometry, point: FloatArray, direction: FloatArray) -> Geometry:
     """Mirror image on the line through `point` along the unit vector `direction`."""
     import shapely
     from shapely.affinity import affine_transform
@@ -479,7 +482,7 @@ def _reflect(area: Geometry, point: Vector, direction: Vector) -> Geometry:
     return shapely.set_precision(affine_transform(area, [*matrix.reshape(-1).tolist(), *shift.tolist()]), GRID)
 
 
-def _half_plane(start: Vector, end: Vector, body: Polygon) -> Polygon:
+def _half_plane(start: FloatArray, end: FloatArray, body: Polygon) -> Polygon:
     """The side of the fold on which the piece lies, large enough for the piece and its allowances."""
     import shapely
 
@@ -491,23 +494,23 @@ def _half_plane(start: Vector, end: Vector, body: Polygon) -> Polygon:
     return shapely.Polygon([a, b, b + size * inwards, a + size * inwards])
 
 
-def _secant(line: Vector, length: float) -> Vector:
+def _secant(line: FloatArray, length: float) -> FloatArray:
     """Unit vector from a line's first point to that at `length` [m] along it, or its last."""
     arc = arc_lengths(line)
     return _unit(np.array([np.interp(length, arc, line[:, k]) for k in (0, 1)]) - line[0])
 
 
-def _between(a: Vector, b: Vector) -> float:
+def _between(a: FloatArray, b: FloatArray) -> float:
     """Angle [rad] between two unit vectors."""
     return float(np.arccos(np.clip(a @ b, -1.0, 1.0)))
 
 
-def _turned(vector: Vector, angle: float) -> Vector:
+def _turned(vector: FloatArray, angle: float) -> FloatArray:
     """Counter-clockwise by `angle` [rad]."""
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([cosine * vector[0] - sine * vector[1], sine * vector[0] + cosine * vector[1]])
 
 
-def _unit(vector: Vector) -> Vector:
+def _unit(vector: FloatArray) -> FloatArray:
     length = float(np.linalg.norm(vector))
     return vector / length if length > 1e-12 else np.array([1.0, 0.0])

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IndexArray
 from warpflat.pattern.spline_lengths import with_lengths
 
 __all__ = ["Curve", "arc_lengths", "chords", "fit_curve", "turning_angles"]
@@ -40,10 +40,10 @@ class Curve:
         straight: #S, segments that are straight lines.
     """
 
-    bezier: NDArray[np.float64]
-    straight: NDArray[np.bool_]
+    bezier: FloatArray
+    straight: BoolArray
 
-    def sample(self, tolerance: float = CHORD) -> NDArray[np.float64]:
+    def sample(self, tolerance: float = CHORD) -> FloatArray:
         """#P by 2 [m]: points on the curve whose chords stray at most `tolerance` [m]; ends and joints are exact."""
         parts = []
         for control, straight in zip(self.bezier, self.straight, strict=True):
@@ -62,11 +62,11 @@ class Curve:
         return float(arc_lengths(self.sample(1e-6))[-1])
 
     @property
-    def nodes(self) -> NDArray[np.float64]:
+    def nodes(self) -> FloatArray:
         """#S + 1 by 2 [m], the ends of the segments."""
         return np.concatenate([self.bezier[:, 0], self.bezier[-1:, 3]])
 
-    def transformed(self, matrix: NDArray[np.float64]) -> Curve:
+    def transformed(self, matrix: FloatArray) -> Curve:
         """The curve under a 2 by 3 affine matrix."""
         return Curve(bezier=self.bezier @ matrix[:, :2].T + matrix[:, 2], straight=self.straight)
 
@@ -75,12 +75,12 @@ class Curve:
         return Curve(bezier=self.bezier[::-1, ::-1], straight=self.straight[::-1])
 
 
-def arc_lengths(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def arc_lengths(points: FloatArray) -> FloatArray:
     """#P, the length [m] along a polyline up to each of its points."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def turning_angles(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def turning_angles(points: FloatArray) -> FloatArray:
     """#P - 2, the signed angle [rad] by which an open polyline turns at each inner point, to the left positive."""
     step = np.diff(points, axis=0)
     cross = step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0]
@@ -88,10 +88,10 @@ def turning_angles(points: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def fit_curve(
-    points: NDArray[np.float64],
+    points: FloatArray,
     tolerance: float = TOLERANCE,
     *,
-    lengths: NDArray[np.float64] | None = None,
+    lengths: FloatArray | None = None,
     near: bool = False,
 ) -> Curve:
     """A smooth curve near the points, of few segments, that is as long as the line of chords through them.
@@ -131,7 +131,7 @@ def fit_curve(
     return whole.reversed() if late else whole
 
 
-def _bends_late(points: NDArray[np.float64]) -> bool:
+def _bends_late(points: FloatArray) -> bool:
     """Whether a line bends more in its second half, and is to be taken from its other end.
 
     FITPACK places its knots from one end to the other, and left and right of a piece run against each other.
@@ -140,7 +140,7 @@ def _bends_late(points: NDArray[np.float64]) -> bool:
     return bool(np.abs(turning_angles(points)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
 
 
-def _corners(points: NDArray[np.float64], tolerance: float) -> list[int]:
+def _corners(points: FloatArray, tolerance: float) -> list[int]:
     """Inner points that are corners; along a zigzag only those that are so over a longer stretch too."""
     sharp = CORNER if tolerance <= TOLERANCE else CORNER_SMOOTHED
     found: list[int] = (np.flatnonzero(np.abs(turning_angles(points)) > sharp) + 1).tolist()
@@ -158,12 +158,12 @@ def _corners(points: NDArray[np.float64], tolerance: float) -> list[int]:
     return corners
 
 
-def _distinct(points: NDArray[np.float64]) -> NDArray[np.intp]:
+def _distinct(points: FloatArray) -> IndexArray:
     keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])
     return np.flatnonzero(keep) if keep.sum() > 1 else np.array([0, len(points) - 1])
 
 
-def _nearer(curve: Curve, points: NDArray[np.float64], tolerance: float) -> Curve:
+def _nearer(curve: Curve, points: FloatArray, tolerance: float) -> Curve:
     """The curve, or one that is as much longer as it takes to keep within the tolerance of the points."""
     # Measured on the chords by which the curve is drawn.
     room = tolerance - CHORD / 2
@@ -174,7 +174,7 @@ def _nearer(curve: Curve, points: NDArray[np.float64], tolerance: float) -> Curv
     return curve
 
 
-def _lengths_inside(points: NDArray[np.float64], depth: float) -> NDArray[np.float64]:
+def _lengths_inside(points: FloatArray, depth: float) -> FloatArray:
     """#P, the lengths [m] of a curve that runs no more than `depth` [m] inside the points.
 
     Over a chord h an arc that turns by t is longer by h t^2 / 24, and by t for each metre that it runs farther outside.
@@ -186,9 +186,9 @@ def _lengths_inside(points: NDArray[np.float64], depth: float) -> NDArray[np.flo
 
 
 def _fit_run(
-    points: NDArray[np.float64],
+    points: FloatArray,
     tolerance: float,
-    lengths: NDArray[np.float64] | None = None,
+    lengths: FloatArray | None = None,
     *,
     room: float | None = None,
 ) -> Curve:
@@ -233,8 +233,8 @@ def _fit_run(
 
 
 def _length_keeping_spline(
-    points: NDArray[np.float64], arc: NDArray[np.float64], smoothing: float, tolerance: float, weighed: float
-) -> tuple[NDArray[np.float64], float] | None:
+    points: FloatArray, arc: FloatArray, smoothing: float, tolerance: float, weighed: float
+) -> tuple[FloatArray, float] | None:
     """Control points (#S by 4 by 2) of a spline, and by how much [m] its length up to some point is off."""
     from scipy.interpolate import BSpline, splprep
 
@@ -269,13 +269,13 @@ def _length_keeping_spline(
     return result, off
 
 
-def _elevated(control: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _elevated(control: FloatArray) -> tuple[FloatArray, FloatArray]:
     """A parabola as a cubic: knots and control points."""
     a, b, c = control
     return np.repeat([0.0, 1.0], 4), np.stack([a, (a + 2 * b) / 3, (2 * b + c) / 3, c])
 
 
-def chords(points: NDArray[np.float64]) -> Curve:
+def chords(points: FloatArray) -> Curve:
     """The straight lines from point to point."""
     a, b = points[:-1], points[1:]
     return Curve(
@@ -283,20 +283,20 @@ def chords(points: NDArray[np.float64]) -> Curve:
     )
 
 
-def _chord_distance(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _chord_distance(points: FloatArray) -> FloatArray:
     import shapely
 
     chord = shapely.LineString(points[[0, -1]])
     return np.asarray(shapely.distance(chord, shapely.points(points)), dtype=np.float64)
 
 
-def _stray(line: NDArray[np.float64], points: NDArray[np.float64]) -> float:
+def _stray(line: FloatArray, points: FloatArray) -> float:
     import shapely
 
     return float(np.max(shapely.distance(shapely.LineString(line), shapely.points(points))))
 
 
-def _evaluate(control: NDArray[np.float64], t: NDArray[np.float64]) -> NDArray[np.float64]:
+def _evaluate(control: FloatArray, t: FloatArray) -> FloatArray:
     s = 1 - t
     weights = np.stack([s**3, 3 * s**2 * t, 3 * s * t**2, t**3], axis=1)
     return weights @ control

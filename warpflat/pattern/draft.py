@@ -9,8 +9,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
@@ -40,7 +40,6 @@ __all__ = [
     "nest_label",
 ]
 
-Vector = NDArray[np.float64]
 
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
 ALONG_GRAIN = np.radians(1.0)
@@ -66,9 +65,9 @@ class DraftedEdge:
 
     edge: Edge
     curve: Curve
-    line: Vector
+    line: FloatArray
     width: float
-    places: Vector
+    places: FloatArray
     fit_error: float
     tolerance: float
 
@@ -91,8 +90,8 @@ class DraftedDart:
     """A dart's lines: the legs are edges; `fold` is #P by 2 [m], from the tip to the cut line (None where it is cut)."""
 
     dart: Dart
-    tip: Vector
-    fold: Vector | None
+    tip: FloatArray
+    fold: FloatArray | None
     fold_to: str
     opening: float
 
@@ -101,8 +100,8 @@ class DraftedDart:
 class DraftedCutout:
     """A hole that is cut out: its sewing and its cutting line (#P by 2 [m], closed), one if its allowance is 0 [m]."""
 
-    sew_line: Vector
-    cut_line: Vector
+    sew_line: FloatArray
+    cut_line: FloatArray
     width: float
 
 
@@ -111,7 +110,7 @@ class DrillHole:
     """A point [m] marked through the cloth."""
 
     name: str
-    at: Vector
+    at: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -132,16 +131,16 @@ class DraftedPiece:
     """
 
     piece: Piece
-    frame: Vector
+    frame: FloatArray
     edges: tuple[DraftedEdge, ...]
-    cut_line: Vector
+    cut_line: FloatArray
     darts: tuple[DraftedDart, ...]
     drill_holes: tuple[DrillHole, ...]
     notches: tuple[Notch, ...]
-    internal_lines: Mapping[str, Vector]
+    internal_lines: Mapping[str, FloatArray]
     cutouts: Mapping[str, DraftedCutout]
-    fisheyes: Mapping[str, Vector]
-    grain: Vector
+    fisheyes: Mapping[str, FloatArray]
+    grain: FloatArray
     label: Label
     notes: tuple[str, ...]
 
@@ -154,7 +153,7 @@ class DraftedPiece:
         return self.piece.size
 
     @property
-    def sew_line(self) -> Vector:
+    def sew_line(self) -> FloatArray:
         """#P by 2 [m], the closed sewing line, dart legs included, first point not repeated."""
         return np.concatenate([edge.line[:-1] for edge in self.edges])
 
@@ -289,7 +288,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     )
 
 
-def _frame(piece: Piece) -> Vector:
+def _frame(piece: Piece) -> FloatArray:
     """Turns the grain upwards and brings the fixed point of grading into the origin.
 
     The fixed point is the lower end of the fold, else of the longest straight edge along the grain (a centre back),
@@ -317,7 +316,7 @@ def _frame(piece: Piece) -> Vector:
     return np.column_stack([turn, -anchor])
 
 
-def _moved(points: Vector, frame: Vector) -> Vector:
+def _moved(points: FloatArray, frame: FloatArray) -> FloatArray:
     return points @ frame[:, :2].T + frame[:, 2]
 
 
@@ -325,7 +324,7 @@ def _fitted(
     pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None
 ) -> dict[str, tuple[DraftedEdge, ...]]:
     """The edges of all pieces as curves, by piece."""
-    lines: dict[tuple[str, str], Vector] = {}
+    lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
@@ -338,7 +337,7 @@ def _fitted(
     }
 
 
-def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: Vector) -> DraftedEdge:
+def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: FloatArray) -> DraftedEdge:
     import shapely
 
     line, marks = curve.sample(), shapely.points(points)
@@ -381,7 +380,7 @@ def _mouth(left: DraftedEdge, right: DraftedEdge) -> float:
     return float(np.linalg.norm(left.line[0] - right.line[-1]))
 
 
-def _fold_to(left: Vector, right: Vector) -> str:
+def _fold_to(left: FloatArray, right: FloatArray) -> str:
     tip = left[-1]
     away = (left[0] + right[-1]) / 2 - tip
     if abs(away[0]) > abs(away[1]):
@@ -412,7 +411,7 @@ def _sides(piece: Piece, edges: tuple[DraftedEdge, ...], wedges: Mapping[str, We
 
 
 def _dart_lines(
-    dart: Dart, wedges: Mapping[str, Wedge], edges: tuple[DraftedEdge, ...], cut_line: Vector
+    dart: Dart, wedges: Mapping[str, Wedge], edges: tuple[DraftedEdge, ...], cut_line: FloatArray
 ) -> DraftedDart:
     import shapely
 
@@ -433,7 +432,7 @@ def _dart_lines(
     return DraftedDart(dart=dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=opening)
 
 
-def _between(first: Vector, second: Vector) -> Vector:
+def _between(first: FloatArray, second: FloatArray) -> FloatArray:
     """The middle line of two lines with one start, by shares of their lengths."""
     shares = np.linspace(0.0, 1.0, MIDDLE)
     sides = [
@@ -443,11 +442,11 @@ def _between(first: Vector, second: Vector) -> Vector:
     return np.asarray((sides[0] + sides[1]) / 2)
 
 
-def _line(edges: tuple[DraftedEdge, ...], name: str) -> Vector:
+def _line(edges: tuple[DraftedEdge, ...], name: str) -> FloatArray:
     return next(edge.line for edge in edges if edge.name == name)
 
 
-def eye_legs(line: Vector) -> tuple[Vector, Vector]:
+def eye_legs(line: FloatArray) -> tuple[FloatArray, FloatArray]:
     """The two sides (#P by 2 [m]) of a fish-eye dart's closed line, both from its lower tip to its upper one."""
     distance = np.linalg.norm(line[:, None] - line[None], axis=2)
     a, b = sorted(map(int, np.unravel_index(int(distance.argmax()), distance.shape)))
@@ -457,7 +456,7 @@ def eye_legs(line: Vector) -> tuple[Vector, Vector]:
     return first, second[::-1]
 
 
-def _cutout(hole: Hole, points: Vector) -> DraftedCutout:
+def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
     line = cut_hole(points, hole.width)
     if line is None:
         return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
@@ -475,7 +474,7 @@ def nest_label(pieces: Sequence[DraftedPiece]) -> Label:
     return replace(middle.label, at=middle.label.at + away, leader=np.stack([start + away, end]))
 
 
-def _fisheye(points: Vector, tolerance: float | None) -> Vector:
+def _fisheye(points: FloatArray, tolerance: float | None) -> FloatArray:
     """Its closed line with both sides as clean curves, the first point not repeated."""
     first, second = (fit_curve(leg, tolerance or TOLERANCE).sample() for leg in eye_legs(points))
     return np.concatenate([first[:-1], second[:0:-1]])

@@ -7,8 +7,8 @@ from functools import lru_cache
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
 from warpflat.pattern.draft import DraftedEdge, DraftedPiece, eye_legs, nest_label
 from warpflat.pattern.label import Label
@@ -20,7 +20,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Drawing", "Stroke", "Words", "draw_nest", "draw_piece", "grain_strokes"]
 
-Vector = NDArray[np.float64]
 
 #: Arrow heads: length and half width [m].
 ARROW, BARB = 0.006, 0.002
@@ -50,7 +49,7 @@ class Stroke:
 
     role: str
     name: str
-    points: Vector
+    points: FloatArray
     closed: bool = False
     curve: Curve | None = None
     hidden: bool = False
@@ -237,7 +236,7 @@ def _ground(words: Words) -> Polygon:
     return shapely.Polygon(words.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ turn.T)
 
 
-def _words_along(name: str, line: Vector, share: float, half: float, *, inwards: bool) -> Words:
+def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
     """A name beside a line, upright: above it, or to its left as the line runs, where a border has the piece."""
     length = max(float(arc_lengths(line)[-1]), 1e-12)
     near, far = _at_share(line, share - half / length), _at_share(line, share + half / length)
@@ -254,7 +253,7 @@ def _words_along(name: str, line: Vector, share: float, half: float, *, inwards:
     return Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
 
 
-def grain_strokes(grain: Vector) -> list[Stroke]:
+def grain_strokes(grain: FloatArray) -> list[Stroke]:
     """The grain line (2 by 2 [m]) with an arrow at either end."""
     low, high = grain
     strokes = [Stroke(role="grain", name="grain", points=grain)]
@@ -262,7 +261,7 @@ def grain_strokes(grain: Vector) -> list[Stroke]:
     return strokes
 
 
-def _arrow(tip: Vector, direction: Vector, role: str) -> Stroke:
+def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
     along = direction / max(float(np.linalg.norm(direction)), 1e-12)
     across = np.array([-along[1], along[0]])
     points = np.stack([tip - ARROW * along + BARB * across, tip, tip - ARROW * along - BARB * across])
@@ -333,6 +332,6 @@ def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[W
     return words
 
 
-def _at_share(line: Vector, share: float) -> Vector:
+def _at_share(line: FloatArray, share: float) -> FloatArray:
     arc = arc_lengths(line)
     return np.array([np.interp(share * arc[-1], arc, line[:, k]) for k in (0, 1)])

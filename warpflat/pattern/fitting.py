@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
 from warpflat.pattern.notches import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 from warpflat.pattern.pieces import SAME_POINT, Piece, Seam, SeamSide
 
 __all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy", "smooth_line"]
 
-Vector = NDArray[np.float64]
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
 Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
@@ -36,7 +35,7 @@ SAFE = 0.8
 
 
 def fit_edges(
-    pieces: Sequence[Piece], lines: Mapping[EdgeKey, Vector], seams: Sequence[Seam], tolerance: float | None
+    pieces: Sequence[Piece], lines: Mapping[EdgeKey, FloatArray], seams: Sequence[Seam], tolerance: float | None
 ) -> dict[EdgeKey, tuple[Curve, float]]:
     """A curve for every edge, and how far [m] it was allowed to keep from the points.
 
@@ -69,7 +68,7 @@ def fit_edges(
     return fitted
 
 
-def smooth_line(line: Vector) -> Vector:
+def smooth_line(line: FloatArray) -> FloatArray:
     """A line inside a piece without the teeth in which it runs along the mesh, within an edge of it; its ends stay.
 
     One that is clean stays as it is. Unlike a border it may lose the length of its teeth: nothing is sewn along it.
@@ -99,7 +98,7 @@ def smooth_line(line: Vector) -> Vector:
     return smooth
 
 
-def _clean(line: Vector, tolerance: float | None) -> tuple[Curve, float]:
+def _clean(line: FloatArray, tolerance: float | None) -> tuple[Curve, float]:
     if tolerance is not None:
         return fit_curve(line, tolerance), tolerance
     for tried in TOLERANCES:
@@ -129,7 +128,7 @@ def is_wavy(curve: Curve) -> bool:
 
 def _keep_near(
     pieces: Sequence[Piece],
-    lines: Mapping[EdgeKey, Vector],
+    lines: Mapping[EdgeKey, FloatArray],
     seams: Sequence[Seam],
     fitted: dict[EdgeKey, tuple[Curve, float]],
     tolerance: float | None,
@@ -156,8 +155,8 @@ def _keep_near(
 
 
 def _both(
-    seam: tuple[Sides, float], lines: Mapping[EdgeKey, Vector], curves: Mapping[EdgeKey, tuple[Curve, float]]
-) -> tuple[Vector, Vector, float]:
+    seam: tuple[Sides, float], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> tuple[FloatArray, FloatArray, float]:
     """The lengths along both sides of a seam at their points, and the second's ease."""
     (first, second), ease = seam
     return _places(first, lines, curves), _places(second, lines, curves), ease
@@ -174,8 +173,8 @@ def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Side
 
 
 def _places(
-    side: Sequence[SeamSide], lines: Mapping[EdgeKey, Vector], curves: Mapping[EdgeKey, tuple[Curve, float]]
-) -> Vector:
+    side: Sequence[SeamSide], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> FloatArray:
     """The length [m] along one side of a seam at each of its points, joints once."""
     rows = [np.zeros(1)]
     for part in side:
@@ -185,7 +184,7 @@ def _places(
     return np.concatenate(rows)
 
 
-def _apart(first: Vector, second: Vector, ease: float) -> float:
+def _apart(first: FloatArray, second: FloatArray, ease: float) -> float:
     """How much the sides of a seam differ, over what they may."""
     near = worst_difference(first, second, ease)
     whole = abs(second[-1] - first[-1] * (1 + ease)) / SEAM_TOLERANCE
@@ -208,7 +207,7 @@ def _pairs(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Edg
 
 
 def _together(
-    first: Vector, second: Vector, against: bool, ease: float
+    first: FloatArray, second: FloatArray, against: bool, ease: float
 ) -> tuple[tuple[Curve, float], tuple[Curve, float]]:
     """Both sides of a ragged seam, smoothed, with the lengths up to each point of the one that is shorter then."""
     sides = [first, second[::-1] if against else second]
@@ -231,7 +230,7 @@ def _together(
     return (found[0], used), (found[1].reversed() if against else found[1], used)
 
 
-def _reached(curve: Curve, points: Vector) -> Vector:
+def _reached(curve: Curve, points: FloatArray) -> FloatArray:
     """#P, the length [m] along the curve at each of the points."""
     import shapely
 
@@ -241,7 +240,7 @@ def _reached(curve: Curve, points: Vector) -> Vector:
     return np.asarray(places)
 
 
-def _uncross(piece: Piece, lines: Mapping[EdgeKey, Vector], fitted: dict[EdgeKey, tuple[Curve, float]]) -> None:
+def _uncross(piece: Piece, lines: Mapping[EdgeKey, FloatArray], fitted: dict[EdgeKey, tuple[Curve, float]]) -> None:
     import shapely
 
     keys = [(piece.name, edge.name) for edge in piece.edges]

@@ -12,8 +12,8 @@ from itertools import pairwise
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS, FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
@@ -38,8 +38,6 @@ __all__ = [
     "unused",
 ]
 
-Vector = NDArray[np.float64]
-Ids = NDArray[np.int32]
 Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
 
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
@@ -300,7 +298,7 @@ def pattern_of_garment(
     return Garment(name=name, pieces=pieces, seams=seams, sample_size=sample_size), notes
 
 
-def grain_of(outline: Vector, flat: Flattening, datum: Vector | None = None) -> Vector:
+def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
     """2 by 2 [m], along the warp: on the datum (#P by 2 [m]) where that is straight, else through the widest place."""
     from warpflat.fabric import grain_axes
 
@@ -315,7 +313,7 @@ def grain_of(outline: Vector, flat: Flattening, datum: Vector | None = None) -> 
     return default_grain(outline @ turn.T) @ turn
 
 
-def inner_lines(lines: Mapping[str, Any], border: Sequence[Ids], flat: Vector) -> dict[str, Vector]:
+def inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
     """The stretches of feature lines inside a piece, #P by 2 [m], without what runs along its border.
 
     Args:
@@ -324,7 +322,7 @@ def inner_lines(lines: Mapping[str, Any], border: Sequence[Ids], flat: Vector) -
         flat: #V by 2 [m].
     """
     edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
-    found: dict[str, Vector] = {}
+    found: dict[str, FloatArray] = {}
     for name, line in lines.items():
         runs: list[list[int]] = [[]]
         for a, b in pairwise(np.asarray(line).tolist()):
@@ -357,7 +355,7 @@ def _runs(form: FormResult) -> list[tuple[_Run, _Run]]:
     return runs
 
 
-def _found(ids: Ids, vertices: Ids) -> list[int]:
+def _found(ids: IntArray, vertices: IntArray) -> list[int]:
     """Where in an edge a row of vertices lies."""
     count = len(vertices)
     return [i for i in range(len(ids) - count + 1) if np.array_equal(ids[i : i + count], vertices)]

@@ -6,8 +6,9 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IndexArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
@@ -15,8 +16,6 @@ from warpflat.surface.topology import border_loops
 
 __all__ = ["line_labels", "piece_from_mesh"]
 
-Vector = NDArray[np.float64]
-Ids = NDArray[np.intp]
 
 #: A corner is measured over this much border [m] on either side: single steps of a ragged border turn anywhere.
 WINDOW = 0.012
@@ -29,7 +28,7 @@ LEGS = 0.05
 
 
 def piece_from_mesh(
-    faces: NDArray[np.int32],
+    faces: IntArray,
     positions: ArrayLike,
     *,
     name: str,
@@ -111,7 +110,7 @@ def piece_from_mesh(
     )
 
 
-def _holes(flat: Vector, loops: Sequence[NDArray[np.int32]], eyes: Mapping[str, ArrayLike]) -> list[Hole]:
+def _holes(flat: FloatArray, loops: Sequence[IntArray], eyes: Mapping[str, ArrayLike]) -> list[Hole]:
     """The border loops inside, counter-clockwise: those of cracks by their names, the others numbered."""
     cracks = {name: np.unique(np.asarray(vertices)) for name, vertices in eyes.items()}
     holes = []
@@ -122,12 +121,12 @@ def _holes(flat: Vector, loops: Sequence[NDArray[np.int32]], eyes: Mapping[str, 
     return holes
 
 
-def _area(ring: Vector) -> float:
+def _area(ring: FloatArray) -> float:
     following = np.roll(ring, -1, axis=0)
     return float((ring[:, 0] * following[:, 1] - ring[:, 1] * following[:, 0]).sum() / 2)
 
 
-def _turns(ring: Vector) -> Vector:
+def _turns(ring: FloatArray) -> FloatArray:
     """#P, by how much [rad] the border turns at each vertex, over the window on either side, but at least a step."""
     walk = _Walk(ring)
     return walk.turns(walk.back(walk.here, walk.window), walk.here, walk.on(walk.here, walk.window))
@@ -142,7 +141,7 @@ class _Walk:
         along: the length [m] up to each place.
     """
 
-    def __init__(self, ring: Vector) -> None:
+    def __init__(self, ring: FloatArray) -> None:
         step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
         self.ring, self.count = ring, len(ring)
         self.length = float(step.sum())
@@ -150,15 +149,15 @@ class _Walk:
         self.here = np.arange(self.count, 2 * self.count)
         self.along = np.concatenate([[0.0], np.cumsum(np.tile(step, 3))])[: 3 * self.count]
 
-    def back(self, places: Ids, reach: float | Vector) -> Ids:
+    def back(self, places: IndexArray, reach: float | FloatArray) -> IndexArray:
         """The farthest places within `reach` [m] before others, but at least a step."""
         return np.minimum(np.searchsorted(self.along, self.along[places] - reach - 1e-12), places - 1)
 
-    def on(self, places: Ids, reach: float | Vector) -> Ids:
+    def on(self, places: IndexArray, reach: float | FloatArray) -> IndexArray:
         """Likewise after them."""
         return np.maximum(np.searchsorted(self.along, self.along[places] + reach + 1e-12, side="right") - 1, places + 1)
 
-    def turns(self, before: Ids, at: Ids, after: Ids) -> Vector:
+    def turns(self, before: IndexArray, at: IndexArray, after: IndexArray) -> FloatArray:
         """By how much [rad] the way from places `before` over those `at` to those `after` turns, to the left positive."""
         a, b, c = (self.ring[places % self.count] for places in (before, at, after))
         arrive, leave = b - a, c - b
@@ -171,7 +170,7 @@ class _Walk:
         return min(between, self.length - between)
 
 
-def _corners(ring: Vector, angle: float) -> set[int]:
+def _corners(ring: FloatArray, angle: float) -> set[int]:
     """Vertices at which the border turns by more than `angle` [rad], and most within the window around them."""
     walk, turns = _Walk(ring), np.abs(_turns(ring))
     corners = _narrow_ends(walk, angle)
@@ -210,7 +209,7 @@ def _narrow_ends(walk: _Walk, angle: float) -> list[int]:
     return corners
 
 
-def line_labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]) -> list[str]:
+def line_labels(loop: IntArray, curves: Mapping[str, IntArray]) -> list[str]:
     """For each border edge, from loop[i] to loop[i + 1], the feature line along it, or ""."""
     label: dict[tuple[int, int], str] = {}
     for key, curve in curves.items():
@@ -221,7 +220,7 @@ def line_labels(loop: NDArray[np.int32], curves: Mapping[str, NDArray[np.int32]]
 
 
 def _dart_places(
-    loop: NDArray[np.int32], darts: Mapping[str, tuple[int, int, int]], name: str
+    loop: IntArray, darts: Mapping[str, tuple[int, int, int]], name: str
 ) -> dict[str, tuple[int, int, int]]:
     """Places in the loop of each dart's left mouth, tip and right mouth."""
     where = {vertex: place for place, vertex in enumerate(loop.tolist())}
@@ -239,7 +238,7 @@ def _dart_places(
     return places
 
 
-def _cracks(ring: Vector, corners: set[int], known: set[int]) -> list[tuple[int, int, int]]:
+def _cracks(ring: FloatArray, corners: set[int], known: set[int]) -> list[tuple[int, int, int]]:
     """Sharp inward tips between two legs of equal length that end in the nearest corners."""
     turns = _turns(ring)
     step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
@@ -265,8 +264,8 @@ def _between(places: tuple[int, int, int], count: int) -> set[int]:
 
 
 def _edges(
-    flat: Vector,
-    loop: NDArray[np.int32],
+    flat: FloatArray,
+    loop: IntArray,
     splits: Sequence[int],
     labels: Sequence[str],
     darts: Mapping[str, tuple[int, int, int]],
@@ -277,7 +276,7 @@ def _edges(
     legs = {places[0]: f"{key}.left" for key, places in darts.items()}
     legs |= {places[1]: f"{key}.right" for key, places in darts.items()}
     count, used, plain = len(loop), dict[str, int](), 0
-    stretches: list[tuple[str, NDArray[np.int32]]] = []
+    stretches: list[tuple[str, IntArray]] = []
     for start, end in zip(splits, [*splits[1:], splits[0] + count], strict=True):
         vertices = loop[np.arange(start, end + 1) % count]
         title = legs.get(start, labels[start])
@@ -304,13 +303,13 @@ def _edges(
 
 
 def _internal(
-    flat: Vector, faces: NDArray[np.int32], loops: Sequence[NDArray[np.int32]], curves: Mapping[str, NDArray[np.int32]]
-) -> dict[str, Vector]:
+    flat: FloatArray, faces: IntArray, loops: Sequence[IntArray], curves: Mapping[str, IntArray]
+) -> dict[str, FloatArray]:
     """The stretches of feature lines that do not run along a border."""
     border = {
         (min(a, b), max(a, b)) for loop in loops for a, b in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
     }
-    internal: dict[str, Vector] = {}
+    internal: dict[str, FloatArray] = {}
     for key, curve in curves.items():
         runs: list[list[int]] = [[]]
         for a, b in zip(curve[:-1].tolist(), curve[1:].tolist(), strict=True):
@@ -323,7 +322,7 @@ def _internal(
     return internal
 
 
-def _grain(flat: Vector, loop: NDArray[np.int32], line: NDArray[np.int32], key: str, name: str) -> Vector:
+def _grain(flat: FloatArray, loop: IntArray, line: IntArray, key: str, name: str) -> FloatArray:
     """Along the line's ends, but inside the piece: a datum line is often its border."""
     span = flat[line[-1]] - flat[line[0]]
     length = float(np.linalg.norm(span))

@@ -8,8 +8,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.darts import seam_kind
 from warpflat.errors import InputError
 from warpflat.pattern.from_garment import EdgeRules, grain_of, unused
@@ -27,8 +27,6 @@ if TYPE_CHECKING:
 
 __all__ = ["check_edge_names", "pattern_of_surface"]
 
-Vector = NDArray[np.float64]
-Ids = NDArray[np.int32]
 
 #: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
@@ -149,7 +147,7 @@ def _piece(result: Flattening, size: str) -> Piece:
     return replace(piece, darts=drawn, grain=grain)
 
 
-def _beside(grain: Vector, piece: Piece) -> Vector:
+def _beside(grain: FloatArray, piece: Piece) -> FloatArray:
     """The grain line, moved aside as far as it takes to keep off holes and fish-eye darts."""
     import shapely
 
@@ -173,7 +171,7 @@ def _drawn_back(piece: Piece, title: str, tip_back: float) -> Piece:
     return replace(piece, edges=edges)
 
 
-def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: Vector, tip_back: float) -> Piece:
+def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: FloatArray, tip_back: float) -> Piece:
     """Likewise with both ends of a fish-eye dart."""
     station = fish_eye_measure(positions, seam.left, seam.right).station
     left, right = pull_back_eye(positions[seam.left], positions[seam.right], station, tip_back)
@@ -181,7 +179,7 @@ def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: Vector, tip_
     return replace(piece, holes=[replace(h, points=ring) if h.name == title else h for h in piece.holes])
 
 
-def _dart_places(loops: Sequence[Ids], cut: Cut) -> tuple[int, int, int] | None:
+def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | None:
     """Left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
     at_end = cut.left[-1] == cut.right[-1]
     tip = int(cut.left[-1] if at_end else cut.left[0])
@@ -238,7 +236,7 @@ def _seams(
     results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
 ) -> tuple[Seam, ...]:
     """Edges that are one curve in space are sewn together, besides those that are named."""
-    ends: dict[tuple[bytes, ...], list[tuple[SeamSide, Vector]]] = {}
+    ends: dict[tuple[bytes, ...], list[tuple[SeamSide, FloatArray]]] = {}
     done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
     for result, piece in zip(results, pieces, strict=True):
         vertices = result.network.surface.vertices

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.lettering import Words, text_width, wrapped
 from warpflat.pattern.pieces import Piece
 from warpflat.words import size_words
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["LEADING", "Label", "default_grain", "fit_label", "label_lines", "place_label"]
 
-Vector = NDArray[np.float64]
 
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
@@ -50,10 +49,10 @@ class Label:
         leader: where it stands beside its piece, 2 by 2 [m] from the label to the cloth; None where it stands on it.
     """
 
-    at: Vector
+    at: FloatArray
     lines: tuple[tuple[str, float], ...]
     angle: float = 0.0
-    leader: Vector | None = None
+    leader: FloatArray | None = None
 
     @property
     def rows(self) -> list[tuple[str, float, bool]]:
@@ -71,7 +70,7 @@ class Label:
         return max(text_width(text, height, bold=bold) for text, height, bold in self.rows)
 
     @property
-    def box(self) -> Vector:
+    def box(self) -> FloatArray:
         """4 by 2 [m], the corners of the block."""
         half = np.array([self.width, self.height]) / 2
         return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ _turn(self.angle).T
@@ -124,10 +123,10 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
 def place_label(
     piece: Piece,
     garment: str,
-    lines: tuple[Vector, Vector],
-    holes: Sequence[Vector],
-    obstacles: Sequence[Vector],
-    folds: Sequence[Vector],
+    lines: tuple[FloatArray, FloatArray],
+    holes: Sequence[FloatArray],
+    obstacles: Sequence[FloatArray],
+    folds: Sequence[FloatArray],
 ) -> Label:
     """The label on the widest free place of the piece, smaller where there is little room, beside it where none is.
 
@@ -202,7 +201,7 @@ def _ways(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]
                 yield Label(at=np.zeros(2), lines=rows), harder * BROKEN**breaks
 
 
-def _corners(label: Label) -> Vector:
+def _corners(label: Label) -> FloatArray:
     """Of the boxes of its rows [m]."""
     corners = []
     for words in label.words():
@@ -211,7 +210,7 @@ def _corners(label: Label) -> Vector:
     return np.concatenate(corners)
 
 
-def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, Vector, float]]:
+def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:
     """Centres of widest ellipses with the polygon that they lie in and the angle of lines along them: those that lie
     flat before those that stand, the roomiest first."""
     import shapely
@@ -226,7 +225,7 @@ def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, Vector, float]]
                 yield parts[number], np.asarray(circles[number].coords[0]) / squeeze, angle
 
 
-def _largest(part: Polygon, shape: Vector, at: Vector, floor: float) -> float:
+def _largest(part: Polygon, shape: FloatArray, at: FloatArray, floor: float) -> float:
     """How large, of its size and at most 1, a convex shape (#P by 2 [m]) fits in around a place; 0 below `floor`."""
     import shapely
 
@@ -267,12 +266,12 @@ def _beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
     )
 
 
-def _turn(angle: float) -> Vector:
+def _turn(angle: float) -> FloatArray:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine], [sine, cosine]])
 
 
-def default_grain(sew_line: Vector, holes: Sequence[Vector] = ()) -> Vector:
+def default_grain(sew_line: FloatArray, holes: Sequence[FloatArray] = ()) -> FloatArray:
     """2 by 2 [m], upwards through the widest place, two thirds of the height there."""
     import shapely
 

@@ -6,13 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.draft import DraftedGarment, DraftedPiece, nest_label
 
 __all__ = ["Placed", "Sheet", "lay_out", "nests", "taken_by"]
-
-Vector = NDArray[np.float64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -20,8 +18,8 @@ class Placed:
     """A piece in one or more sizes, shifted by `offset` [m]; `box` is its lower left and upper right on the sheet."""
 
     pieces: tuple[DraftedPiece, ...]
-    offset: Vector
-    box: Vector
+    offset: FloatArray
+    box: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,8 +30,8 @@ class Sheet:
     """
 
     placed: tuple[Placed, ...]
-    size: Vector
-    reserved: Vector | None = None
+    size: FloatArray
+    reserved: FloatArray | None = None
 
 
 def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
@@ -42,7 +40,7 @@ def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
     return [garment.all_sizes(piece.name) for piece in first]
 
 
-def taken_by(group: Sequence[DraftedPiece]) -> Vector:
+def taken_by(group: Sequence[DraftedPiece]) -> FloatArray:
     """#P by 2 [m], the cut lines of pieces that lie upon each other, and the corners of a label beside them."""
     label = nest_label(group)
     return np.concatenate([*(piece.cut_line for piece in group), *([] if label.leader is None else [label.box])])
@@ -90,7 +88,7 @@ def lay_out(
     return Sheet(placed=tuple(placed), size=total, reserved=corners.get(len(groups)))
 
 
-def _rows(extents: Sequence[Vector], width: float, gap: float) -> list[list[tuple[int, float]]]:
+def _rows(extents: Sequence[FloatArray], width: float, gap: float) -> list[list[tuple[int, float]]]:
     """Rows of (box, left edge): boxes by falling height, each in the first row with room (first fit decreasing)."""
     rows: list[list[tuple[int, float]]] = []
     ends: list[float] = []

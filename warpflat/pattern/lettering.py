@@ -6,8 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-import numpy as np
-from numpy.typing import NDArray
+from warpflat.arrays import FloatArray
 
 __all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrapped"]
 
@@ -26,7 +25,7 @@ class Words:
     """
 
     text: str
-    at: NDArray[np.float64]
+    at: FloatArray
     height: float
     angle: float = 0.0
     bold: bool = False

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError, nearest
 from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label
@@ -17,7 +17,6 @@ from warpflat.words import size_words
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
-Vector = NDArray[np.float64]
 
 #: Copies are nested as polygons that are larger by up to this [m], with far fewer corners.
 SIMPLER = 1e-3
@@ -62,13 +61,13 @@ class Copy:
     piece: DraftedPiece
     mirrored: bool
     turned: bool
-    matrix: Vector
-    cut_line: Vector
-    cutouts: tuple[Vector, ...]
-    fold_lines: tuple[Vector, ...]
-    grain: Vector
+    matrix: FloatArray
+    cut_line: FloatArray
+    cutouts: tuple[FloatArray, ...]
+    fold_lines: tuple[FloatArray, ...]
+    grain: FloatArray
     name: Label | None
-    notches: tuple[Vector, ...]
+    notches: tuple[FloatArray, ...]
 
     @property
     def label(self) -> str:
@@ -198,7 +197,7 @@ def _check(marker: Marker) -> None:
             raise RuntimeError(f"the nesting puts {copy.label} beyond the cloth")
 
 
-def unfolded(piece: DraftedPiece) -> Vector:
+def unfolded(piece: DraftedPiece) -> FloatArray:
     """#P by 2 [m], the cut line of the whole piece: a half is joined to its mirror image along the fold."""
     import shapely
 
@@ -211,7 +210,7 @@ def unfolded(piece: DraftedPiece) -> Vector:
     return np.asarray(shapely.orient_polygons(shapely.Polygon(whole.exterior)).exterior.coords)[:-1]
 
 
-def _mirror(edge: DraftedEdge) -> Callable[[Vector], Vector]:
+def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
     """The mirror on the line of a fold, for #P by 2 points."""
     start = edge.line[0]
     x, y = (edge.line[-1] - start) / np.linalg.norm(edge.line[-1] - start)
@@ -219,12 +218,12 @@ def _mirror(edge: DraftedEdge) -> Callable[[Vector], Vector]:
     return lambda points: (points - start) @ turn.T + start
 
 
-def _slits(piece: DraftedPiece) -> list[Vector]:
+def _slits(piece: DraftedPiece) -> list[FloatArray]:
     """Every notch, 2 by 2 [m], from the cut line inwards."""
     return [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
 
 
-def _of_both_halves(piece: DraftedPiece, lines: list[Vector]) -> list[Vector]:
+def _of_both_halves(piece: DraftedPiece, lines: list[FloatArray]) -> list[FloatArray]:
     """Lines (#P by 2 [m]) of a piece, and of a half on the fold their mirror images."""
     for edge in piece.fold_edges:
         lines = lines + [_mirror(edge)(line) for line in lines]
@@ -250,12 +249,12 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
     return copies
 
 
-def _onto_cloth(mirrored: bool) -> Vector:
+def _onto_cloth(mirrored: bool) -> FloatArray:
     """2 by 2: the grain, upwards in a drafted piece, comes to lie along x."""
     return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
-def _simpler(cut: Vector) -> Vector:
+def _simpler(cut: FloatArray) -> FloatArray:
     """A polygon with few corners that contains the cut line."""
     import shapely
 
@@ -266,13 +265,13 @@ def _simpler(cut: Vector) -> Vector:
 
 
 def _placed(
-    piece: DraftedPiece, mirrored: bool, linear: Vector, degrees: float, shift: tuple[float, float], margin: float
+    piece: DraftedPiece, mirrored: bool, linear: FloatArray, degrees: float, shift: tuple[float, float], margin: float
 ) -> Copy:
     angle = np.radians(degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
 
-    def moved(points: Vector) -> Vector:
+    def moved(points: FloatArray) -> FloatArray:
         return points @ matrix[:, :2].T + matrix[:, 2]
 
     return Copy(

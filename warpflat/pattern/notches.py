@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.pattern.allowance import CutOutline, Wedge
 from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 
 __all__ = ["Notch", "SeamReport", "cut_darts", "dart_notches", "seam_notches", "seam_reports", "worst_difference"]
 
-Vector = NDArray[np.float64]
 
 #: Notches are cut this deep [m], and never deeper than this share of the allowance.
 DEPTH, SHARE = 0.005, 0.6
@@ -54,9 +53,9 @@ class Notch:
     seam: str
     edge: str
     length: float
-    at: Vector
-    base: tuple[Vector, ...]
-    direction: Vector
+    at: FloatArray
+    base: tuple[FloatArray, ...]
+    direction: FloatArray
     depth: float
 
     @property
@@ -112,7 +111,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     return reports
 
 
-def worst_difference(first: Vector, second: Vector, ease: float) -> float | None:
+def worst_difference(first: FloatArray, second: FloatArray, ease: float) -> float | None:
     """How far [m] two sides of a seam differ over the worst `STRETCH` of it; None if they do not share their vertices.
 
     Args:
@@ -153,9 +152,9 @@ class _Chain:
         return float(self.joints[-1])
 
     @property
-    def places(self) -> Vector:
+    def places(self) -> FloatArray:
         """The length at each point of the edges as they came in, joints once."""
-        rows: list[Vector] = []
+        rows: list[FloatArray] = []
         for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
             along = edge.length - edge.places[::-1] if side.reversed else edge.places
             rows.append(start + along[bool(rows) :])
@@ -189,7 +188,7 @@ class _Chain:
         depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
-    def _frame(self, index: int, length: float) -> tuple[Vector, Vector]:
+    def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
         """Point on the sewing line and unit normal into the piece."""
         line, arc = self.lines[index], self.arcs[index]
         length = float(np.clip(length, 0.0, arc[-1]))
@@ -296,7 +295,7 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> 
     return tuple(notches)
 
 
-def _base(at: Vector, inwards: Vector, width: float, cut_line: Vector) -> Vector | None:
+def _base(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArray) -> FloatArray | None:
     """Where the cut line is met, straight out from a point of the sewing line; None if it is not, within twice the width."""
     import shapely
 

@@ -8,8 +8,9 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.names import checked_label
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
@@ -56,10 +57,10 @@ class Edge:
     """
 
     name: str
-    points: NDArray[np.float64]
+    points: FloatArray
     kind: str = "seam"
     allowance: float | None = None
-    vertices: NDArray[np.int32] | None = None
+    vertices: IntArray | None = None
 
     def __post_init__(self) -> None:
         if self.kind not in EDGE_KINDS:
@@ -120,7 +121,7 @@ class Hole:
     """
 
     name: str
-    points: NDArray[np.float64]
+    points: FloatArray
     kind: str = "cutout"
     allowance: float | None = None
 
@@ -165,8 +166,8 @@ class Piece:
     quantity: int = 1
     edges: Sequence[Edge]
     darts: Sequence[Dart] = ()
-    internal_lines: Mapping[str, NDArray[np.float64]] = field(default_factory=dict)
-    grain: NDArray[np.float64] | None = None
+    internal_lines: Mapping[str, FloatArray] = field(default_factory=dict)
+    grain: FloatArray | None = None
     holes: Sequence[Hole] = ()
     paired: bool = True
 
@@ -196,7 +197,7 @@ class Piece:
         return any(edge.kind == "fold" for edge in self.edges)
 
     @property
-    def outline(self) -> NDArray[np.float64]:
+    def outline(self) -> FloatArray:
         """#P by 2 [m], the closed outline along all edges, dart legs included, first point not repeated."""
         return np.concatenate([edge.points[:-1] for edge in self.edges])
 
@@ -340,7 +341,7 @@ def unknown_size(garment: str, size: str, sizes: Iterable[str]) -> InputError:
     return InputError(f"garment {garment!r} has no size {size!r}; {nearest(size, sizes)}")
 
 
-def _points(points: ArrayLike, where: str, *, at_least: int) -> NDArray[np.float64]:
+def _points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < at_least:
         raise InputError(f"{where}: points have shape {array.shape}; they must be #P by 2 with #P at least {at_least}")

@@ -9,8 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.export.pattern_json import SCHEMA
 from warpflat.pattern.curves import Curve
@@ -31,8 +31,6 @@ from warpflat.toml_file import check_table
 from warpflat.words import shown
 
 __all__ = ["pattern_from_json", "read_pattern_json"]
-
-Vector = NDArray[np.float64]
 
 
 def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
@@ -165,7 +163,7 @@ def _cutout(data: PieceEntry, name: str) -> DraftedCutout:
     )
 
 
-def _edge(data: EdgeEntry, frame: Vector) -> Edge:
+def _edge(data: EdgeEntry, frame: FloatArray) -> Edge:
     return Edge(
         name=data.name,
         points=_back(np.array(data.line), frame),
@@ -204,7 +202,7 @@ def _notch(data: NotchEntry) -> Notch:
     )
 
 
-def _back(points: Vector, frame: Vector) -> Vector:
+def _back(points: FloatArray, frame: FloatArray) -> FloatArray:
     """From the drafted piece's coordinates to those of the flat mesh."""
     turn = frame[:, :2]
     return (points - frame[:, 2]) @ turn

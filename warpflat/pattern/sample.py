@@ -8,14 +8,12 @@ from __future__ import annotations
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]
-
-Vector = NDArray[np.float64]
 
 
 def sample_dress(sizes: tuple[str, ...] = ("38",)) -> Garment:
@@ -42,7 +40,7 @@ def sample_dress(sizes: tuple[str, ...] = ("38",)) -> Garment:
     return Garment(name="Sample dress", pieces=pieces, seams=_seams())
 
 
-def _curve(*control: tuple[float, float], count: int = 24) -> Vector:
+def _curve(*control: tuple[float, float], count: int = 24) -> FloatArray:
     """Points along a Bézier, as a mesh border would give them."""
     t = np.linspace(0, 1, count)[:, None]
     points = [np.array(c, dtype=np.float64)[None] for c in control]
@@ -51,7 +49,7 @@ def _curve(*control: tuple[float, float], count: int = 24) -> Vector:
     return points[0]
 
 
-def _line(*points: tuple[float, float]) -> Vector:
+def _line(*points: tuple[float, float]) -> FloatArray:
     return np.array(points, dtype=np.float64)
 
 
@@ -139,7 +137,7 @@ def _side_end(waist: float, bust: float, length: float) -> tuple[float, float]:
 def _sleeve(size: str, grow: float, cap: float) -> Piece:
     wrist, length = 0.115 + 0.004 * grow, 0.43
 
-    def cap_line(width: float) -> Vector:
+    def cap_line(width: float) -> FloatArray:
         return np.concatenate(
             [
                 _curve(

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
+
 __all__ = ["with_lengths"]
 
 #: A control point's way from where the fit put it weighs as much as this share of the same error in a point's place.
@@ -17,13 +19,13 @@ _QUADRATURE = np.polynomial.legendre.leggauss(GAUSS)
 
 
 def with_lengths(
-    knots: NDArray[np.float64],
-    control: NDArray[np.float64],
-    points: NDArray[np.float64],
-    arc: NDArray[np.float64],
+    knots: FloatArray,
+    control: FloatArray,
+    points: FloatArray,
+    arc: FloatArray,
     tolerance: float,
     weighed: float,
-) -> tuple[NDArray[np.float64], float]:
+) -> tuple[FloatArray, float]:
     """Control points moved as little as gives the curve, up to each of the points, the length `arc`.
 
     Gauss-Newton on places, lengths and, softly, the control points themselves. The second value is by how much [m] the
@@ -50,11 +52,11 @@ class _Fit:
     """A spline on its way to its lengths: what is minimised, how far it is from the points (in tolerances), how much longer [m] than it
     should be between each two of them, and the slopes there are in the quadrature, over their sizes, with the weights."""
 
-    control: NDArray[np.float64]
+    control: FloatArray
     objective: float
-    away: NDArray[np.float64]
-    longer: NDArray[np.float64]
-    rate: NDArray[np.float64]
+    away: FloatArray
+    longer: FloatArray
+    rate: FloatArray
 
 
 class _LengthSystem:
@@ -67,10 +69,10 @@ class _LengthSystem:
 
     def __init__(
         self,
-        knots: NDArray[np.float64],
-        control: NDArray[np.float64],
-        points: NDArray[np.float64],
-        arc: NDArray[np.float64],
+        knots: FloatArray,
+        control: FloatArray,
+        points: FloatArray,
+        arc: FloatArray,
         tolerance: float,
         weighed: float,
     ) -> None:
@@ -127,7 +129,7 @@ class _LengthSystem:
         """Where entries are in the flattened band that `scipy.linalg.solve_banded` takes."""
         return (self._band + row - column) * self._size + column
 
-    def at(self, control: NDArray[np.float64]) -> _Fit:
+    def at(self, control: FloatArray) -> _Fit:
         """How a spline with these control points fits; the ends are the start's."""
         tangent = np.einsum("qk,qkd->qd", self._slope, control[self._beside])
         speed = np.maximum(np.hypot(tangent[:, 0], tangent[:, 1]), 1e-12)
@@ -143,7 +145,7 @@ class _LengthSystem:
             rate=(self._weights / speed)[:, None] * tangent,
         )
 
-    def move(self, fit: _Fit) -> NDArray[np.float64]:
+    def move(self, fit: _Fit) -> FloatArray:
         """#control by 2, the step of Gauss-Newton from here; the ends stay."""
         from scipy.linalg import solve_banded
 
@@ -163,9 +165,7 @@ class _LengthSystem:
         return move
 
 
-def _cubics(
-    knots: NDArray[np.float64], at: NDArray[np.float64]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], NDArray[np.float64]]:
+def _cubics(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
     """The four cubic B-splines that are not zero at each place: #N by 4 each, their numbers, values and slopes."""
     from scipy.interpolate import BSpline
 

@@ -6,8 +6,8 @@ A waistband or a binding goes around the body, and a plane may cut it crosswise 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.surface.geodesic import distance_from
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import EdgeGraph, path_length
@@ -15,8 +15,6 @@ from warpflat.surface.topology import border_loops, corner_triangles, half_edges
 
 __all__ = ["line_along_band"]
 
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 # A line is short against its piece below this share of the way between the places of the border that are furthest apart.
 _SHORT = 0.5

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import FloatArray, IndexArray, IntArray
 from warpflat.errors import InputError, nearest
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths import as_vertex
@@ -35,7 +36,7 @@ _APART = 0.1
 _PLAINLY = 0.9
 
 
-def viewing_frame(surface: Surface) -> NDArray[np.float64]:
+def viewing_frame(surface: Surface) -> FloatArray:
     """3 by 3, rows: right, up and towards the viewer, for somebody who looks at the piece from outside.
 
     Outside is where the faces are wound counter-clockwise. Up is Y; a piece that faces up or down is seen with +Z, the
@@ -61,7 +62,7 @@ def line_on_border(
     end: int | ArrayLike | None = None,
     direction: Literal["shortest", "with", "against"] = "shortest",
     as_read: bool = False,
-) -> NDArray[np.int32]:
+) -> IntArray:
     """A stretch of the border.
 
     Give a `side`, or `start` and `end`. Sides are those that a viewer sees from outside (see :func:`viewing_frame`):
@@ -96,12 +97,12 @@ def line_on_border(
     return _stretch(surface, loops, start, end, direction, as_read)
 
 
-def _between(loop: NDArray[np.int32], i: int, j: int) -> NDArray[np.int32]:
+def _between(loop: IntArray, i: int, j: int) -> IntArray:
     """The loop from position i to position j, both included; the whole of it, closed, if they are one."""
     return np.roll(loop, -i)[np.arange((j - i - 1) % len(loop) + 2) % len(loop)]
 
 
-def _side(surface: Surface, loop: NDArray[np.int32], side: str) -> NDArray[np.int32]:
+def _side(surface: Surface, loop: IntArray, side: str) -> IntArray:
     if side not in SIDES:
         raise InputError(f"unknown side {side!r} of the border; {nearest(str(side), SIDES)}")
     at = _corners(surface, loop, side)
@@ -111,7 +112,7 @@ def _side(surface: Surface, loop: NDArray[np.int32], side: str) -> NDArray[np.in
     return line[::-1].copy() if side in ("left", "top") else line
 
 
-def _corners(surface: Surface, loop: NDArray[np.int32], side: str) -> dict[str, int]:
+def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
     """Positions in the loop of the corners "bl", "br", "tr" and "tl".
 
     Raises:
@@ -145,7 +146,7 @@ def _corners(surface: Surface, loop: NDArray[np.int32], side: str) -> dict[str, 
     return at
 
 
-def _corner_near(surface: Surface, loop: NDArray[np.int32], turn: NDArray[np.float64], place: int) -> int:
+def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int) -> int:
     """The position in the loop where the border turns most, not far from one: where a side curls a little out of sight, the outermost
     point that is seen lies beside the corner."""
     points = surface.vertices[np.append(loop, loop[0])]
@@ -155,7 +156,7 @@ def _corner_near(surface: Surface, loop: NDArray[np.int32], turn: NDArray[np.flo
     return int(np.argmax(np.where(near, turn, -np.inf)))
 
 
-def _four_sharpest(turn: NDArray[np.float64]) -> NDArray[np.intp] | None:
+def _four_sharpest(turn: FloatArray) -> IndexArray | None:
     """Positions of the four corners of a border that turns at these and hardly anywhere else, in order; None of any other."""
     order = np.argsort(-turn, kind="stable")
     least = float(turn[order[3]]) if len(turn) > 3 else 0.0
@@ -164,7 +165,7 @@ def _four_sharpest(turn: NDArray[np.float64]) -> NDArray[np.intp] | None:
     return np.sort(order[:4])
 
 
-def _named(surface: Surface, loop: NDArray[np.int32], at: NDArray[np.intp], side: str) -> dict[str, int]:
+def _named(surface: Surface, loop: IntArray, at: IndexArray, side: str) -> dict[str, int]:
     """The four corners by name, such that the sides between them lie where their names say.
 
     Raises:
@@ -189,7 +190,7 @@ def _named(surface: Surface, loop: NDArray[np.int32], at: NDArray[np.intp], side
     )
 
 
-def _standing(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:
     """Right and up for somebody who stands before the piece, whether or not it faces up or down."""
     towards, up = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
     size = float(np.linalg.norm(towards))
@@ -197,7 +198,7 @@ def _standing(surface: Surface) -> tuple[NDArray[np.float64], NDArray[np.float64
     return right, up
 
 
-def _turned_away(surface: Surface, towards: NDArray[np.float64]) -> float:
+def _turned_away(surface: Surface, towards: FloatArray) -> float:
     """Share of the border's length beside which the surface turns away from the viewer."""
     triangles, face = triangulate(surface.faces)
     p = surface.vertices[triangles]
@@ -210,7 +211,7 @@ def _turned_away(surface: Surface, towards: NDArray[np.float64]) -> float:
     return float(length[away[sides.face[border]]].sum() / length.sum())
 
 
-def _turns(surface: Surface, loop: NDArray[np.int32]) -> NDArray[np.float64]:
+def _turns(surface: Surface, loop: IntArray) -> FloatArray:
     """By how much [rad] the border turns at each of its vertices, on the surface: half a turn less the angles of the faces there."""
     sides = half_edges_of(surface)
     x, ahead, before = surface.vertices, sides.head, np.empty_like(sides.tail)
@@ -222,12 +223,12 @@ def _turns(surface: Surface, loop: NDArray[np.int32]) -> NDArray[np.float64]:
 
 def _stretch(
     surface: Surface,
-    loops: list[NDArray[np.int32]],
+    loops: list[IntArray],
     start: int | ArrayLike,
     end: int | ArrayLike,
     direction: str,
     as_read: bool,
-) -> NDArray[np.int32]:
+) -> IntArray:
     border = np.unique(np.concatenate(loops))
     a, b = (as_vertex(surface, place, as_read=as_read, among=border) for place in (start, end))
     for vertex in (a, b):

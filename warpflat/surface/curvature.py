@@ -5,8 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.kernels.curvature import fit_curvature
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_surface
@@ -22,7 +22,7 @@ _BLOCK = 32_768
 
 
 @once_per_surface
-def curvature_tensors(surface: Surface) -> NDArray[np.float64]:
+def curvature_tensors(surface: Surface) -> FloatArray:
     """Second fundamental form at each vertex, as a tensor in space: d . II . d is the curvature along a unit tangent d.
 
     Positive where the surface bulges to the outside. Around each vertex, normal and curvature are fitted to two rings of

@@ -17,6 +17,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, IndexArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import HalfEdges, components_of, half_edges, join_labels
@@ -36,9 +37,9 @@ class Seam:
         right: #P, those on the right. At the tip of a dart left and right are the same vertex.
     """
 
-    path: NDArray[np.int32]
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
+    path: IntArray
+    left: IntArray
+    right: IntArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,12 +60,12 @@ class Cut:
         of_faces: what has been worked out of the faces, for a surface that has them (see `warpflat.surface.mesh.once_per_faces`).
     """
 
-    faces: NDArray[np.int32]
-    vertex_origin: NDArray[np.int32]
+    faces: IntArray
+    vertex_origin: IntArray
     kind: CutKind
     seams: tuple[Seam, ...]
-    tips: NDArray[np.int32]
-    face_component: NDArray[np.int32]
+    tips: IntArray
+    face_component: IntArray
     component_count: int
     components_before: int
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
@@ -81,22 +82,22 @@ class Cut:
         return self.seams[0]
 
     @property
-    def path(self) -> NDArray[np.int32]:
+    def path(self) -> IntArray:
         """#P, the old vertices along a plain cut."""
         return self.seam.path
 
     @property
-    def left(self) -> NDArray[np.int32]:
+    def left(self) -> IntArray:
         """#P, the new vertices along the left side of a plain cut."""
         return self.seam.left
 
     @property
-    def right(self) -> NDArray[np.int32]:
+    def right(self) -> IntArray:
         """#P, the new vertices along the right side of a plain cut."""
         return self.seam.right
 
     @property
-    def vertex_component(self) -> NDArray[np.int32]:
+    def vertex_component(self) -> IntArray:
         """#W, the connected piece of each new vertex; -1 for a vertex that no face uses."""
         labels = np.full(len(self.vertex_origin), -1, dtype=np.int32)
         used = self.faces >= 0
@@ -104,7 +105,7 @@ class Cut:
         return labels
 
 
-def cut_along(faces: NDArray[np.int32], path: ArrayLike, *, vertex_count: int) -> Cut:
+def cut_along(faces: IntArray, path: ArrayLike, *, vertex_count: int) -> Cut:
     """Cut a mesh along one path of edges.
 
     Args:
@@ -122,7 +123,7 @@ def cut_along(faces: NDArray[np.int32], path: ArrayLike, *, vertex_count: int) -
     return cut_along_many(faces, [path], vertex_count=vertex_count)
 
 
-def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
+def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count: int) -> Cut:
     """Cut a mesh along several paths at once; they may meet, branch and cross in vertices, but share no edge.
 
     Arguments, result and errors are those of :func:`cut_along`. Paths that end on one another need be given in no
@@ -181,7 +182,7 @@ def cut_along_many(faces: NDArray[np.int32], paths: Sequence[ArrayLike], *, vert
     )
 
 
-def faces_at(faces: NDArray[np.int32], vertices: NDArray[np.int32]) -> NDArray[np.int64]:
+def faces_at(faces: IntArray, vertices: IntArray) -> NDArray[np.int64]:
     """The faces (of #F by 4) that have one of these vertices, rising."""
     # With room for the -1 of triangles at its end.
     there = np.zeros(max(int(faces.max(initial=0)), int(vertices.max(initial=0))) + 2, dtype=bool)
@@ -191,7 +192,7 @@ def faces_at(faces: NDArray[np.int32], vertices: NDArray[np.int32]) -> NDArray[n
     return np.flatnonzero(first | second | third | fourth)
 
 
-def _mesh_of(faces: NDArray[np.int32]) -> Surface:
+def _mesh_of(faces: IntArray) -> Surface:
     """A surface of which nothing but the faces is known."""
     nowhere = np.empty((0, 3))
     return Surface(
@@ -199,7 +200,7 @@ def _mesh_of(faces: NDArray[np.int32]) -> Surface:
     )
 
 
-def glue(cut: Cut) -> NDArray[np.int32]:
+def glue(cut: Cut) -> IntArray:
     """#F by 4, the faces before the cut, bit for bit: every copy of a vertex becomes the old vertex again."""
     faces = cut.faces.copy()
     used = faces >= 0
@@ -207,11 +208,11 @@ def glue(cut: Cut) -> NDArray[np.int32]:
     return faces
 
 
-def _edge(chain: NDArray[np.int32], index: int) -> str:
+def _edge(chain: IntArray, index: int) -> str:
     return f"{int(chain[index])}-{int(chain[index + 1])}"
 
 
-def _checked_path(path: ArrayLike, vertex_count: int) -> NDArray[np.int32]:
+def _checked_path(path: ArrayLike, vertex_count: int) -> IntArray:
     """The path as integers, once it is known to be one: long enough, in range, no vertex visited twice."""
     chain = np.asarray(path)
     if chain.ndim != 1 or (chain.size and chain.dtype.kind not in "iu"):
@@ -237,18 +238,18 @@ def _checked_path(path: ArrayLike, vertex_count: int) -> NDArray[np.int32]:
 
 
 def _sides(
-    chain: NDArray[np.int32],
+    chain: IntArray,
     he: HalfEdges,
     forward: NDArray[np.int64],
-    order: NDArray[np.intp],
+    order: IndexArray,
     stride: np.int64,
-) -> tuple[NDArray[np.intp], NDArray[np.intp]]:
+) -> tuple[IndexArray, IndexArray]:
     """For each edge of the path the half-edge on its left (runs along) and on its right (runs against)."""
     a, b = chain[:-1].astype(np.int64), chain[1:].astype(np.int64)
     if len(order) == 0:
         raise InputError(f"cut path: vertex {int(a[0])} belongs to no face")
 
-    def find(key: NDArray[np.int64]) -> tuple[NDArray[np.intp], NDArray[np.bool_]]:
+    def find(key: NDArray[np.int64]) -> tuple[IndexArray, BoolArray]:
         at = order[np.minimum(np.searchsorted(forward, key, sorter=order), len(order) - 1)]
         return at, forward[at] == key
 
@@ -275,11 +276,11 @@ def _sides(
 
 def _double(
     he: HalfEdges,
-    marked: NDArray[np.bool_],
-    on_path: NDArray[np.int32],
-    left: Sequence[NDArray[np.intp]],
+    marked: BoolArray,
+    on_path: IntArray,
+    left: Sequence[IndexArray],
     vertex_count: int,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[int, int]]:
+) -> tuple[IntArray, IntArray, dict[int, int]]:
     """Give each fan of faces around a vertex on a path a vertex of its own.
 
     Args:
@@ -321,7 +322,7 @@ def _double(
     return vertex, np.append(np.arange(vertex_count), copies).astype(np.int32), fans
 
 
-def _seams(chain: NDArray[np.int32], left_ends: NDArray[np.int32], right_ends: NDArray[np.int32]) -> list[Seam]:
+def _seams(chain: IntArray, left_ends: IntArray, right_ends: IntArray) -> list[Seam]:
     """The path as stretches along which both sides run on without a break."""
     count = len(left_ends)
     joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
@@ -344,10 +345,10 @@ def _seams(chain: NDArray[np.int32], left_ends: NDArray[np.int32], right_ends: N
 
 
 def _kind(
-    chains: Sequence[NDArray[np.int32]],
-    faces: NDArray[np.int32],
-    labels: NDArray[np.int32],
-    touched: NDArray[np.int32],
+    chains: Sequence[IntArray],
+    faces: IntArray,
+    labels: IntArray,
+    touched: IntArray,
     parted: bool,
     fans: dict[int, int],
 ) -> CutKind:

@@ -12,8 +12,9 @@ from itertools import pairwise
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.drawn_legs import check_tip_back
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
@@ -31,7 +32,6 @@ __all__ = [
     "shape_fish_eye",
 ]
 
-Point = NDArray[np.float64]
 
 _BLEND = 0.05
 _BLEND_PER_SHIFT = 8.0
@@ -98,17 +98,17 @@ class DrawnDart:
         moved_to: #M by 2, where to [m].
     """
 
-    tip: Point
-    left_end: Point
-    right_end: Point
+    tip: FloatArray
+    left_end: FloatArray
+    right_end: FloatArray
     leg_length: float
     angle: float
     intake: float
-    fold_point: Point
-    left: NDArray[np.int32]
-    right: NDArray[np.int32]
-    moved: NDArray[np.int32]
-    moved_to: NDArray[np.float64]
+    fold_point: FloatArray
+    left: IntArray
+    right: IntArray
+    moved: IntArray
+    moved_to: FloatArray
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -122,10 +122,10 @@ class DrawnFishEye:
         first_leg, last_leg: length of the legs that meet in the first and in the last tip [m].
     """
 
-    first_tip: Point
-    last_tip: Point
-    left_point: Point
-    right_point: Point
+    first_tip: FloatArray
+    last_tip: FloatArray
+    left_point: FloatArray
+    right_point: FloatArray
     intake: float
     first_leg: float
     last_leg: float
@@ -199,7 +199,7 @@ def shape_dart(
     if blend is None:
         # A cosine fade is steepest in its middle: pi/2 times shift over blend.
         blend = max(_BLEND, _BLEND_PER_SHIFT * abs(legs[0] - leg))
-    moved: dict[int, Point] = {}
+    moved: dict[int, FloatArray] = {}
     beside = []
     for side, end in zip((a, b), ends, strict=True):
         run = _outwards(outline, side)
@@ -232,7 +232,7 @@ def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float
         raise InputError(f"fold is 'left' or 'right', got {fold!r}")
 
 
-def _faded(points: NDArray[np.float64], end: Point, blend: float) -> tuple[NDArray[np.float64], NDArray[np.bool_]]:
+def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
     """A line with its first point moved to `end` and the next ones along with it, less and less; which ones moved."""
     reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
     fade = (
@@ -246,7 +246,7 @@ def _faded(points: NDArray[np.float64], end: Point, blend: float) -> tuple[NDArr
 
 def draw_outline(
     positions: ArrayLike, outline: ArrayLike, darts: Sequence[DrawnDart], *, folded: bool = False
-) -> NDArray[np.float64]:
+) -> FloatArray:
     """The outline with cracks replaced by drawn darts.
 
     Args:
@@ -261,7 +261,7 @@ def draw_outline(
     """
     x = np.array(positions, dtype=float)
     loop = np.asarray(outline).tolist()
-    corner: dict[int, Point] = {}
+    corner: dict[int, FloatArray] = {}
     dropped: set[int] = set()
     for dart in darts:
         x[dart.moved] = dart.moved_to
@@ -339,9 +339,7 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
     )
 
 
-def mouth_first(
-    positions: ArrayLike, left: ArrayLike, right: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
+def mouth_first(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[FloatArray, IntArray, IntArray]:
     """The layout and both sides running from the border to the tip; turned round, left and right change places.
 
     Args and errors are those of :func:`dart_measure`.
@@ -355,9 +353,7 @@ def mouth_first(
     return (x, b[::-1], a[::-1]) if starts else (x, a, b)
 
 
-def _sides(
-    positions: ArrayLike, left: ArrayLike, right: ArrayLike
-) -> tuple[NDArray[np.float64], NDArray[np.int32], NDArray[np.int32]]:
+def _sides(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[FloatArray, IntArray, IntArray]:
     x = np.asarray(positions, dtype=float)
     a, b = np.asarray(left, dtype=np.int32), np.asarray(right, dtype=np.int32)
     if x.ndim != 2 or x.shape[1] != 2:
@@ -371,7 +367,7 @@ def _sides(
     return x, a, b
 
 
-def _outwards(outline: ArrayLike, side: NDArray[np.int32]) -> NDArray[np.int32]:
+def _outwards(outline: ArrayLike, side: IntArray) -> IntArray:
     """The outline from a crack's end on the border away from the crack, half way round at most."""
     loop = np.asarray(outline, dtype=np.int32)
     at = np.flatnonzero(loop == side[0])
@@ -385,7 +381,9 @@ def _outwards(outline: ArrayLike, side: NDArray[np.int32]) -> NDArray[np.int32]:
     return rolled[: len(rolled) // 2]
 
 
-def _fold_point(tip: Point, ends: Sequence[Point], leg: float, beside: NDArray[np.float64], end: Point) -> Point:
+def _fold_point(
+    tip: FloatArray, ends: Sequence[FloatArray], leg: float, beside: FloatArray, end: FloatArray
+) -> FloatArray:
     """Where the fold line must end so that the folded cloth is cut off at the outline beside the dart.
 
     Pressed to one side, half of the dart lies mirrored in that leg on the cloth beside it; the mirrored fold line ends
@@ -409,17 +407,17 @@ def _fold_point(tip: Point, ends: Sequence[Point], leg: float, beside: NDArray[n
     return tip + reach * fold
 
 
-def _angle(u: Point, v: Point) -> float:
+def _angle(u: FloatArray, v: FloatArray) -> float:
     """From u to v [rad], counterclockwise positive."""
     return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
 
 
-def _unit(v: Point) -> Point:
+def _unit(v: FloatArray) -> FloatArray:
     length = float(np.linalg.norm(v))
     if length <= 0:
         raise InputError("the two legs of the dart point in opposite directions; it has no bisector")
     return v / length
 
 
-def _length(points: NDArray[np.float64]) -> float:
+def _length(points: FloatArray) -> float:
     return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

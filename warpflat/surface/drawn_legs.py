@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 
 __all__ = ["are_curved", "check_tip_back", "pull_back", "pull_back_eye"]
 
-Line = NDArray[np.float64]
 
 #: Legs are straight if they stray from their chord by no more than this [m], or this share of its length.
 STRAIGHT, STRAIGHT_SHARE = 2e-3, 0.04
 
 
-def are_curved(*legs: Line) -> bool:
+def are_curved(*legs: FloatArray) -> bool:
     """Whether one of some legs (#P by 2 [m] each) leaves its chord so far that the wedge cannot be folded."""
     import shapely
 
@@ -34,7 +33,7 @@ def check_tip_back(tip_back: float, room: float, of: str = "dart's length") -> N
         )
 
 
-def pull_back(left: Line, right: Line, tip_back: float) -> tuple[Line, Line]:
+def pull_back(left: FloatArray, right: FloatArray, tip_back: float) -> tuple[FloatArray, FloatArray]:
     """Both legs of a dart with their tip moved back towards the border.
 
     Each is turned and shrunk about its end on the border, both by one share: legs of one length stay so, and a curved
@@ -65,7 +64,7 @@ def pull_back(left: Line, right: Line, tip_back: float) -> tuple[Line, Line]:
     return _ending_at(left, moved), _ending_at(right, moved)
 
 
-def pull_back_eye(left: Line, right: Line, station: int, tip_back: float) -> tuple[Line, Line]:
+def pull_back_eye(left: FloatArray, right: FloatArray, station: int, tip_back: float) -> tuple[FloatArray, FloatArray]:
     """Both sides of a fish-eye dart with their tips moved towards each other, as wide as before.
 
     Args:
@@ -82,7 +81,7 @@ def pull_back_eye(left: Line, right: Line, station: int, tip_back: float) -> tup
     widest = float((0.5 * (left[station] + right[station]) - first) @ axis)
     check_tip_back(tip_back, min(widest, length - widest), "shorter half")
 
-    def shortened(side: Line) -> Line:
+    def shortened(side: FloatArray) -> FloatArray:
         reach = (side - first) @ axis
         short = np.where(
             reach < widest,
@@ -94,7 +93,7 @@ def pull_back_eye(left: Line, right: Line, station: int, tip_back: float) -> tup
     return shortened(left), shortened(right)
 
 
-def _ending_at(leg: Line, tip: Line) -> Line:
+def _ending_at(leg: FloatArray, tip: FloatArray) -> FloatArray:
     """A line turned and scaled about its first point so that it ends at `tip`."""
     plane = leg[:, 0] + 1j * leg[:, 1]
     goal = complex(tip[0], tip[1])

@@ -5,14 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.surface.topology import mesh_edges
 
 __all__ = ["faded"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 def faded(

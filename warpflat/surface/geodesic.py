@@ -17,6 +17,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
 from warpflat.surface.lines import line_from_curve
@@ -36,7 +37,7 @@ from warpflat.surface.vectors import cross, dot, norm, points_at
 __all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
 
 
-def distance_from(surface: Surface, line: ArrayLike) -> NDArray[np.float64]:
+def distance_from(surface: Surface, line: ArrayLike) -> FloatArray:
     """#V, the distance [m] along the surface from a line.
 
     Args:
@@ -49,7 +50,7 @@ def distance_from(surface: Surface, line: ArrayLike) -> NDArray[np.float64]:
     return _Ways(surface, _short_triangles(surface), path).distance
 
 
-def _short_triangles(surface: Surface) -> NDArray[np.int32]:
+def _short_triangles(surface: Surface) -> IntArray:
     """#T by 3, quads split along their shorter diagonal."""
     if not surface.is_quad.any():
         return np.ascontiguousarray(surface.faces[:, :3])
@@ -61,7 +62,7 @@ def _short_triangles(surface: Surface) -> NDArray[np.int32]:
 
 def signed_distance_and_station(
     surface: Surface, line: ArrayLike, *, extend: bool = True
-) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+) -> tuple[FloatArray, FloatArray]:
     """Coordinates of a first layout: how far each vertex lies from a line, and beside which place of it.
 
     Where the nearest point of the line is one of its ends and the way to it is not at right angles to the line,
@@ -106,7 +107,7 @@ def signed_distance_and_station(
     return (x if sides is None else sides * np.abs(x)), y
 
 
-def extend_to_border(surface: Surface, line: NDArray[np.int32]) -> tuple[NDArray[np.int32], int]:
+def extend_to_border(surface: Surface, line: IntArray) -> tuple[IntArray, int]:
     """The line carried on straight ahead, along edges, from each end that is inside to the border.
 
     Returns:
@@ -169,7 +170,7 @@ class _Ways:
         distance: #V [m].
     """
 
-    def __init__(self, surface: Surface, triangles: NDArray[np.int32], line: NDArray[np.int64]) -> None:
+    def __init__(self, surface: Surface, triangles: IntArray, line: NDArray[np.int64]) -> None:
         # Ways along edges are no shorter, and nearly in the right order: in here vertices are numbered by these.
         along_edges = _along_edges(surface, line)
         order = np.argsort(along_edges, kind="stable").astype(np.int32)
@@ -203,7 +204,7 @@ class _Ways:
         self._order, self._straight = self._order_of_ways()
         self.distance = self._carry(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
 
-    def _order_of_ways(self) -> tuple[NDArray[np.int32], bool]:
+    def _order_of_ways(self) -> tuple[IntArray, bool]:
         """The vertices, each after those that its way leads to, as far as ways do not go in circles; whether none does."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import connected_components
@@ -220,7 +221,7 @@ class _Ways:
         straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
         return order_by(label, parts)[0], straight
 
-    def _carry(self, fixed: NDArray[np.int32], value: NDArray[np.float64], *, grows: float) -> NDArray[np.float64]:
+    def _carry(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
         """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
         change = np.empty(value.shape[1])
         for _ in range(_MOST_ROUNDS):
@@ -236,7 +237,7 @@ class _Ways:
                 break
         return value
 
-    def carry(self, known: NDArray[np.int64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    def carry(self, known: NDArray[np.int64], values: FloatArray) -> FloatArray:
         """#V (by #K), the values (#N, or #N by #K) of `known` vertices, the line's among them, carried to all others."""
         fixed, at = self._on_line.copy(), self._rank[known]
         fixed[at] = 1
@@ -245,7 +246,7 @@ class _Ways:
         return self._carry(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
 
 
-def _along_edges(surface: Surface, line: NDArray[np.int64]) -> NDArray[np.float64]:
+def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
     """#V, the distance [m] from the line along edges."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
@@ -261,8 +262,8 @@ def _along_edges(surface: Surface, line: NDArray[np.int64]) -> NDArray[np.float6
 
 
 def _directions_at_line(
-    surface: Surface, triangles: NDArray[np.int32], path: NDArray[np.int32]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], tuple[NDArray[np.float64], NDArray[np.float64]]]:
+    surface: Surface, triangles: IntArray, path: IntArray
+) -> tuple[NDArray[np.int64], FloatArray, tuple[FloatArray, FloatArray]]:
     """The vertices of the line and those joined to it, and where they lie.
 
     Returns:
@@ -297,8 +298,8 @@ def _directions_at_line(
 
 
 def _around(
-    vertices: NDArray[np.float64], triangles: NDArray[np.int32], path: NDArray[np.int32]
-) -> tuple[NDArray[np.int32], NDArray[np.float64], NDArray[np.float64], NDArray[np.int32]]:
+    vertices: FloatArray, triangles: IntArray, path: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
     """The triangles around each vertex of a line, one after the other.
 
     Returns:
@@ -317,7 +318,7 @@ def _around(
     return np.ascontiguousarray(corner[:, 1:]), angle, np.stack([norm(u), norm(v)], axis=1), offset
 
 
-def _sides(surface: Surface, path: NDArray[np.int32]) -> NDArray[np.float64] | None:
+def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
     """#V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
     he = half_edges_of(surface)
     position = np.full(len(surface.vertices), -2, dtype=np.int64)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, IntArray
 from warpflat.kernels.lattice import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
@@ -15,8 +15,6 @@ from warpflat.surface.topology import border_of, half_edges_of, twins_of
 
 __all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
 
-BoolArray = NDArray[np.bool_]
-IntArray = NDArray[np.int32]
 
 # A rectangle around a piece may have so many times its places to be counted one by one.
 _DENSE = 8

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.names import checked_label
 from warpflat.surface.mesh import Surface
@@ -33,7 +34,7 @@ _ON_VERTEX = 0.2
 _OFF_PIECE = 2.0
 
 
-def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = False) -> NDArray[np.int32]:
+def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = False) -> IntArray:
     """A line given vertex by vertex.
 
     Args:
@@ -65,15 +66,13 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
     return line
 
 
-def _are_neighbors(surface: Surface, a: NDArray[np.int32], b: NDArray[np.int32]) -> NDArray[np.bool_]:
+def _are_neighbors(surface: Surface, a: IntArray, b: IntArray) -> BoolArray:
     """Whether edges join them (#N each)."""
     numbered = row_by_row(surface)
     return are_joined(half_edges_of(surface).edges, a, b) if numbered is None else numbered.are_joined(a, b)
 
 
-def line_between(
-    surface: Surface, start: int | ArrayLike, end: int | ArrayLike, *, as_read: bool = False
-) -> NDArray[np.int32]:
+def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike, *, as_read: bool = False) -> IntArray:
     """The shortest path along edges between two places; of paths of one length, the one closest to the straight line.
 
     Args:
@@ -92,7 +91,7 @@ def line_between(
     return graph.path(a, b, graph.length * (1 + _TIE * off[graph.edges].mean(axis=1)))
 
 
-def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> NDArray[np.int32]:
+def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntArray:
     """The chain of edges that follows the section with a plane most closely.
 
     Of several sections the longest counts. One that runs from border to border gives an open line, one that runs around
@@ -143,8 +142,8 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> NDAr
 
 
 def _longest_section(
-    surface: Surface, height: NDArray[np.float64], above: NDArray[np.bool_]
-) -> tuple[NDArray[np.int64], NDArray[np.float64], bool]:
+    surface: Surface, height: FloatArray, above: BoolArray
+) -> tuple[NDArray[np.int64], FloatArray, bool]:
     """The edges that the longest section crosses, in order; the arc length at each [m]; whether it is closed."""
     he = half_edges_of(surface)
     up = above[he.tail] & ~above[he.head]
@@ -182,11 +181,11 @@ def _longest_section(
 def _around(
     graph: EdgeGraph,
     crossing: NDArray[np.int64],
-    station: NDArray[np.float64],
-    inside: NDArray[np.bool_],
-    weight: NDArray[np.float64],
-    height: NDArray[np.float64],
-) -> NDArray[np.int32]:
+    station: FloatArray,
+    inside: BoolArray,
+    weight: FloatArray,
+    height: FloatArray,
+) -> IntArray:
     """The closed path that goes around once with a closed section.
 
     The band of edges along the section is laid out twice, one turn after the other; the path runs from a vertex to its
@@ -213,7 +212,7 @@ def _around(
     return (path % graph.size).astype(np.int32)
 
 
-def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> NDArray[np.int32]:
+def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> IntArray:
     """The path along edges that follows a drawn curve most closely.
 
     Points that lie on vertices are kept; between them the path is drawn to the curve.
@@ -258,9 +257,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
     return np.array(line, dtype=np.int32)
 
 
-def _along(
-    surface: Surface, graph: EdgeGraph, curve: NDArray[np.float64], start: int, end: int, edge: float
-) -> list[int]:
+def _along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, end: int, edge: float) -> list[int]:
     """The vertices after `start` on the path to `end` that keeps to a stretch of a curve."""
     from scipy.spatial import cKDTree
 

@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.names import checked_label, checked_name
 from warpflat.surface.mesh import Surface
@@ -48,13 +49,13 @@ _SMALLEST, _LARGEST = 1e-20, 1e20
 class _Mesh:
     """What is being mended: faces over the rows as they were read, until vertices are renumbered at the end."""
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    origin: NDArray[np.int32]
-    index: NDArray[np.int32]
+    vertices: FloatArray
+    faces: IntArray
+    origin: IntArray
+    index: IntArray
     notes: list[str] = field(default_factory=list)
 
-    def keep(self, which: NDArray[np.bool_]) -> None:
+    def keep(self, which: BoolArray) -> None:
         self.faces, self.origin = self.faces[which], self.origin[which]
 
 
@@ -133,7 +134,7 @@ def _make(
     return _finish(mesh, kept_lines, name, positions, tolerance)
 
 
-def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
+def checked_positions(vertices: ArrayLike) -> FloatArray:
     """Vertices as #V by 3 numbers.
 
     Raises:
@@ -166,7 +167,7 @@ def checked_positions(vertices: ArrayLike) -> NDArray[np.float64]:
     return positions
 
 
-def _checked_faces(positions: NDArray[np.float64], polygons: ArrayLike | Sequence[Sequence[int]]) -> _Mesh:
+def _checked_faces(positions: FloatArray, polygons: ArrayLike | Sequence[Sequence[int]]) -> _Mesh:
     padded = padded_polygons(polygons)
     real = padded >= 0
     gaps = np.flatnonzero((~real[:, :3]).any(axis=1) | (np.diff(real.astype(np.int8), axis=1) > 0).any(axis=1))
@@ -215,7 +216,7 @@ def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
     return path.astype(np.int64)
 
 
-def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> NDArray[np.int32]:
+def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> IntArray:
     """Join vertices at the same place where that is asked for or plainly meant; the map that was applied."""
     place, note = welding(mesh.vertices, mesh.faces, weld=weld, split_corners=split_corners, part_chosen=chosen)
     if note:
@@ -331,7 +332,7 @@ def _drop_unused(mesh: _Mesh) -> None:
     mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
 
 
-def _renumber_lines(mesh: _Mesh, paths: Mapping[str, NDArray[np.int32]]) -> dict[str, list[int]]:
+def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, list[int]]:
     """Lines given in input rows, in the mesh's own vertices; one off the component is left out with a note."""
     if not paths:
         return {}
@@ -372,7 +373,7 @@ def _trace_line(
     return line
 
 
-def _check_border(faces: NDArray[np.int32]) -> None:
+def _check_border(faces: IntArray) -> None:
     loops = border_loops(faces)
     if not loops:
         raise InputError(
@@ -387,9 +388,7 @@ def _check_border(faces: NDArray[np.int32]) -> None:
         )
 
 
-def _finish(
-    mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: NDArray[np.float64], tolerance: float
-) -> Surface:
+def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: FloatArray, tolerance: float) -> Surface:
     """Merge slivers, drop the vertices that this leaves over, and put the surface together."""
     mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
     if len(cut):

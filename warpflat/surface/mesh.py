@@ -10,7 +10,8 @@ from typing import Any, TypeVar
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["Surface", "forget", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
 
@@ -37,12 +38,12 @@ class Surface:
         of_faces: what has been worked out of the faces (see `once_per_faces`).
     """
 
-    vertices: NDArray[np.float64]
-    faces: NDArray[np.int32]
-    lines: Mapping[str, NDArray[np.int32]] = field(default_factory=dict)
+    vertices: FloatArray
+    faces: IntArray
+    lines: Mapping[str, IntArray] = field(default_factory=dict)
     name: str = "piece"
-    input_vertices: NDArray[np.float64]
-    input_index: NDArray[np.int32]
+    input_vertices: FloatArray
+    input_index: IntArray
     notes: tuple[str, ...] = ()
     sources: tuple[Path, ...] = ()
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
@@ -52,7 +53,7 @@ class Surface:
         return {**vars(self), "of_faces": {}}
 
     @property
-    def is_quad(self) -> NDArray[np.bool_]:
+    def is_quad(self) -> BoolArray:
         """#F, true for quads."""
         return self.faces[:, 3] >= 0
 
@@ -105,9 +106,7 @@ def forget(surface: Surface, measure: Callable[[Surface], Any]) -> None:
     surface.of_faces.pop(_name(measure), None)
 
 
-def known_of_faces(
-    faces: NDArray[np.int32], results: Mapping[Callable[[Surface], Any], Any] | None = None
-) -> dict[str, Any]:
+def known_of_faces(faces: IntArray, results: Mapping[Callable[[Surface], Any], Any] | None = None) -> dict[str, Any]:
     """`Surface.of_faces` for surfaces that have these faces (#F by 4): what functions `once_per_faces` would find out of them."""
     return {"faces": faces} | {_name(measure): result for measure, result in (results or {}).items()}
 

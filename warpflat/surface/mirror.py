@@ -6,15 +6,15 @@ from collections import deque
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError
 from warpflat.surface.topology import half_edges
 
 __all__ = ["mirror_partners"]
 
 
-def mirror_partners(faces: NDArray[np.int32], axis: NDArray[np.int32], *, vertex_count: int) -> NDArray[np.int32]:
+def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> IntArray:
     """#V, for each vertex its partner across a line; itself on the line, -1 for vertices that no face uses.
 
     Only how faces hang together counts, not where they lie: a scan's grid has partners too, though the body leans.

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpflat.arrays import FloatArray
 
 __all__ = ["OVERLAP", "overlap_width", "overlapping"]
 
@@ -11,7 +12,7 @@ __all__ = ["OVERLAP", "overlap_width", "overlapping"]
 OVERLAP = 5e-4
 
 
-def overlap_width(ring: NDArray[np.float64]) -> float:
+def overlap_width(ring: FloatArray) -> float:
     """Width [m] of the widest place in which the cloth around a hole lies on itself; 0 if it does so nowhere.
 
     Args:
@@ -33,7 +34,7 @@ def overlapping(width: float) -> str:
     )
 
 
-def _turns_around(ring: NDArray[np.float64], point: NDArray[np.float64]) -> int:
+def _turns_around(ring: FloatArray, point: FloatArray) -> int:
     """How often a closed line runs round a point, counter-clockwise."""
     spoke = ring - point
     ahead = np.roll(spoke, -1, axis=0)

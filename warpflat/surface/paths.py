@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import half_edges_of, mesh_edges
@@ -22,7 +23,7 @@ _NEAR_SHARE = 0.1
 _NEAR_EDGES = 2.0
 
 
-def are_joined(edges: NDArray[np.int32], a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
+def are_joined(edges: IntArray, a: ArrayLike, b: ArrayLike) -> BoolArray:
     """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`topology.mesh_edges`)."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     begin, end = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
@@ -46,11 +47,11 @@ class EdgeGraph:
         self.size = len(surface.vertices)
         self.length = _edge_lengths(surface)
 
-    def are_joined(self, a: ArrayLike, b: ArrayLike) -> NDArray[np.bool_]:
+    def are_joined(self, a: ArrayLike, b: ArrayLike) -> BoolArray:
         """Whether edges a-b exist."""
         return are_joined(self.edges, a, b)
 
-    def matrix(self, weight: NDArray[np.float64]) -> csr_matrix:
+    def matrix(self, weight: FloatArray) -> csr_matrix:
         """#V by #V, the weight of each edge."""
         from scipy.sparse import coo_matrix
 
@@ -60,13 +61,13 @@ class EdgeGraph:
         safe = np.maximum(np.concatenate([weight, weight]), np.finfo(float).tiny)
         return coo_matrix((safe, both), shape=(self.size, self.size)).tocsr()
 
-    def path(self, start: int, end: int, weight: NDArray[np.float64] | None = None) -> NDArray[np.int32]:
+    def path(self, start: int, end: int, weight: FloatArray | None = None) -> IntArray:
         """The path of least weight (by default: of least length) from `start` to `end`."""
         return path_in(self.matrix(self.length if weight is None else weight), start, end)
 
 
 @once_per_surface
-def _edge_lengths(surface: Surface) -> NDArray[np.float64]:
+def _edge_lengths(surface: Surface) -> FloatArray:
     """#E [m]."""
     a, b = half_edges_of(surface).edges.T
     length = np.asarray(np.linalg.norm(surface.vertices[b] - surface.vertices[a], axis=1))
@@ -74,7 +75,7 @@ def _edge_lengths(surface: Surface) -> NDArray[np.float64]:
     return length
 
 
-def path_in(matrix: csr_matrix, start: int, end: int) -> NDArray[np.int32]:
+def path_in(matrix: csr_matrix, start: int, end: int) -> IntArray:
     """The path of least weight in a matrix of weights, or an empty array if there is none."""
     from scipy.sparse.csgraph import dijkstra
 
@@ -88,9 +89,7 @@ def path_in(matrix: csr_matrix, start: int, end: int) -> NDArray[np.int32]:
     return np.array(path[::-1], dtype=np.int32)
 
 
-def as_vertex(
-    surface: Surface, place: int | ArrayLike, *, as_read: bool = False, among: NDArray[np.int32] | None = None
-) -> int:
+def as_vertex(surface: Surface, place: int | ArrayLike, *, as_read: bool = False, among: IntArray | None = None) -> int:
     """The vertex that a user means by an index or by a point.
 
     Args:
@@ -142,7 +141,7 @@ def _by_index(surface: Surface, place: object, as_read: bool) -> int:
     return int(at[0])
 
 
-def chain_positions(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def chain_positions(points: FloatArray) -> FloatArray:
     """#P, the arc length [m] at each point of a polyline."""
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 

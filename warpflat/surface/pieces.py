@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import IntArray
 from warpflat.errors import InputError
 from warpflat.surface.cut import Cut, faces_at
 from warpflat.surface.mesh import Surface
@@ -31,9 +31,9 @@ class Piece:
     """
 
     surface: Surface
-    vertex_index: NDArray[np.int32]
-    vertex_origin: NDArray[np.int32]
-    face_index: NDArray[np.int32]
+    vertex_index: IntArray
+    vertex_origin: IntArray
+    face_index: IntArray
 
 
 def apply_cut(surface: Surface, cut: Cut) -> Surface:
@@ -53,9 +53,7 @@ def apply_cut(surface: Surface, cut: Cut) -> Surface:
     )
 
 
-def carry_lines(
-    lines: Mapping[str, NDArray[np.int32]], faces: NDArray[np.int32], cut: Cut
-) -> dict[str, NDArray[np.int32]]:
+def carry_lines(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) -> dict[str, IntArray]:
     """Feature lines in the numbering of the cut mesh.
 
     What lies along the cut becomes two lines, NAME.left and NAME.right (of the line's own direction, seen from
@@ -73,7 +71,7 @@ def carry_lines(
     old, new = (zip(*(end.tolist() for end in sides_of(of[near])), strict=True) for of in (faces, cut.faces))
     ends = dict(zip(old, new, strict=True))
     touched = set(doubled.tolist())
-    carried: dict[str, NDArray[np.int32]] = {}
+    carried: dict[str, IntArray] = {}
     taken = set(lines)
     for name, line in lines.items():
         if len(line) > 1 and touched.isdisjoint(line.tolist()):
@@ -102,7 +100,7 @@ def carry_lines(
     return carried
 
 
-def _runs(stream: Sequence[tuple[int, int] | None]) -> list[NDArray[np.int32]]:
+def _runs(stream: Sequence[tuple[int, int] | None]) -> list[IntArray]:
     """The edges of a line as unbroken chains of vertices; a gap (None) or a doubled vertex ends a chain."""
     chains: list[list[int]] = []
     previous: tuple[int, int] | None = None
@@ -163,9 +161,7 @@ def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = No
     return tuple(pieces)
 
 
-def _plain_names(
-    lines: Mapping[str, NDArray[np.int32]], before: Mapping[str, NDArray[np.int32]]
-) -> dict[str, NDArray[np.int32]]:
+def _plain_names(lines: Mapping[str, IntArray], before: Mapping[str, IntArray]) -> dict[str, IntArray]:
     """Drop .left, .right, .1 ... that the cut has added wherever the plain name is unambiguous."""
     plain = [name if name in before else _PART.sub("", name.rstrip("'")) for name in lines]
     return {

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IndexArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.vectors import cross, dot, points_at
 
@@ -81,7 +82,7 @@ def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.i
     return out
 
 
-def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.bool_], NDArray[np.bool_]]:
+def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], BoolArray, BoolArray]:
     """Polygons without corners that repeat the one before.
 
     A quad with two equal neighbouring corners is a triangle; what keeps fewer than three corners, or the same vertex
@@ -104,9 +105,7 @@ def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], ND
     return out, keep, lost
 
 
-def split_polygons(
-    vertices: NDArray[np.float64], polygons: NDArray[np.int64]
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
     """#F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
 
     Polygons of more than four corners are cut into triangles in their mean plane, as fat ones as their corners allow.
@@ -133,12 +132,12 @@ def split_polygons(
     return np.concatenate(parts)[order], index[order]
 
 
-def _newell(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _newell(points: FloatArray) -> FloatArray:
     """Twice the vector area of a closed polygon."""
     return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
 
 
-def _triangulated(points: NDArray[np.float64], row: int) -> NDArray[np.int64]:
+def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
     """Triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
     import shapely
 
@@ -158,7 +157,7 @@ def _triangulated(points: NDArray[np.float64], row: int) -> NDArray[np.int64]:
     return triangles
 
 
-def _plane_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
+def _plane_axes(normal: FloatArray) -> FloatArray:
     """2 by 3, two unit vectors at right angles to each other and to `normal`, so that all three make a right-handed frame."""
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first = np.cross(axis, normal)
@@ -167,8 +166,8 @@ def _plane_axes(normal: NDArray[np.float64]) -> NDArray[np.float64]:
 
 
 def split_non_convex_quads(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], origin: NDArray[np.int32], tolerance: float
-) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.int32]]:
+    vertices: FloatArray, faces: IntArray, origin: IntArray, tolerance: float
+) -> tuple[IntArray, IntArray, IntArray]:
     """Quads with a straight or inward corner, cut into two triangles from that corner.
 
     The corner triangle there would have no area, or less: no measure by corners could tell it from a flipped one.
@@ -206,14 +205,14 @@ def split_non_convex_quads(
     return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]
 
 
-def crossed_quads(vertices: NDArray[np.float64], faces: NDArray[np.int32], tolerance: float = 1e-3) -> NDArray[np.intp]:
+def crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
     """Which faces (#F by 4) are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
     doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]
     return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
 
 
-def _may_cross(vertices: NDArray[np.float64], quads: NDArray[np.int32], tolerance: float) -> NDArray[np.bool_]:
+def _may_cross(vertices: FloatArray, quads: IntArray, tolerance: float) -> BoolArray:
     """#Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
     p = points_at(vertices, quads.T)
     side, diagonal = np.roll(p, -1, axis=1) - p, p[:, 2:] - p[:, :2]
@@ -223,7 +222,7 @@ def _may_cross(vertices: NDArray[np.float64], quads: NDArray[np.int32], toleranc
     return np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))
 
 
-def _quad_corners(p: NDArray[np.float64], tolerance: float) -> tuple[NDArray[Any], ...]:
+def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
     """Of quads, #Q by 4 by 3: #Q by 4, the height of each corner over the diagonal before it, and whether it is straight or inward; #Q,
     which are slivers; #Q, whose sides cross."""
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])

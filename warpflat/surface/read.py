@@ -13,6 +13,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError, expect, nearest
 from warpflat.inputs import listening_to_reads, note_read, noting_resolver
 from warpflat.names import checked_name, fitted_name, plain_label
@@ -44,12 +45,12 @@ _USUAL = (0.02, 5.0)
 class _Raw:
     """What any format comes down to. `scale` is metres per unit, None where the file does not say."""
 
-    vertices: NDArray[np.float64]
+    vertices: FloatArray
     polygons: NDArray[np.int64]
     scale: float | None
     split_corners: bool = False
     name: str | None = None
-    curves: dict[str, NDArray[np.float64]] = field(default_factory=dict)
+    curves: dict[str, FloatArray] = field(default_factory=dict)
     chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
     notes: list[str] = field(default_factory=list)
 
@@ -119,7 +120,7 @@ def read_surface(
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
-def read_scan(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
     """Read any mesh as it stands, closed or in several parts, such as the scan of a body.
 
     Returns:
@@ -254,7 +255,7 @@ def _trimesh_scene(file: Path) -> Any:
         ) from error
 
 
-def _instances(scene: Any) -> Iterator[tuple[str, NDArray[np.float64], NDArray[np.int64]]]:
+def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:
     """The meshes of a trimesh scene: node, world positions, triangles."""
     import trimesh
 
@@ -284,7 +285,7 @@ def _refuse_stray_vertex(raw: _Raw, file: Path) -> None:
             raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
 
 
-def _extent(points: NDArray[np.float64], scale: float) -> str:
+def _extent(points: FloatArray, scale: float) -> str:
     return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
 
 
@@ -312,7 +313,7 @@ def _check_size(surface: Surface, file: Path, scale: float) -> None:
     )
 
 
-def _snap_curves(surface: Surface, curves: dict[str, NDArray[np.float64]]) -> Surface:
+def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:
     """Curves as feature lines; those that do not lie on the piece are left out with a note."""
     if not curves:
         return surface

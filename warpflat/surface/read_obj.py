@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.surface.polygons import filled_up
 
@@ -33,7 +34,7 @@ class ObjMesh:
         split_corners: the exporter wrote one `v` per texture coordinate.
     """
 
-    vertices: NDArray[np.float64]
+    vertices: FloatArray
     polygons: NDArray[np.int64]
     lines: dict[str, list[list[int]]] = field(default_factory=dict)
     split_corners: bool = False
@@ -118,7 +119,7 @@ def _collect(text: str) -> _Statements:
     return found
 
 
-def _numbers(found: _Statements) -> NDArray[np.float64]:
+def _numbers(found: _Statements) -> FloatArray:
     """#V by 3; a fourth weight or colours after the position are left out."""
     rows = [text.split(None, 3)[:3] for text in found.vertices]
     try:

@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray
 from warpflat.errors import InputError
 from warpflat.surface.polygons import filled_up
 
@@ -20,7 +21,7 @@ __all__ = ["read_off"]
 _HEADER = re.compile(r"\s*(ST)?(C)?(N)?OFF\b[ \t]*")
 
 
-def read_off(path: Path) -> tuple[NDArray[np.float64], NDArray[np.int64]]:
+def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
     """Read a file.
 
     Returns:

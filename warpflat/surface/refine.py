@@ -8,6 +8,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.trace import Place
 
@@ -28,9 +29,7 @@ class Refinement:
         positions: for each new vertex its position [m].
     """
 
-    def __init__(
-        self, vertices: NDArray[np.float64], triangles: NDArray[np.int32], around: Iterable[int], snap: float
-    ) -> None:
+    def __init__(self, vertices: FloatArray, triangles: IntArray, around: Iterable[int], snap: float) -> None:
         """
         Args:
             vertices: #V by 3, positions [m].
@@ -272,7 +271,7 @@ class Refinement:
         return math.acos(min(1.0, max(-1.0, cosine)))
 
 
-def _rows(index: NDArray[np.int64], triangles: NDArray[np.int32]) -> Iterable[tuple[int, list[int]]]:
+def _rows(index: NDArray[np.int64], triangles: IntArray) -> Iterable[tuple[int, list[int]]]:
     return zip(index.tolist(), triangles.tolist(), strict=True)
 
 

@@ -10,8 +10,8 @@ from functools import cached_property
 
 import numpy as np
 import warp as wp
-from numpy.typing import NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.kernels.lattice import (
     is_row_by_row,
     list_corners,
@@ -24,9 +24,6 @@ from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces
 
 __all__ = ["RowByRow", "row_by_row"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -121,7 +118,7 @@ class RowByRow:
         """#E."""
         return self.rows * (self.columns - 1) + (self.rows - 1) * self.columns
 
-    def are_joined(self, a: IntArray, b: IntArray) -> NDArray[np.bool_]:
+    def are_joined(self, a: IntArray, b: IntArray) -> BoolArray:
         """#N, whether there are edges from `a` to `b` (#N each)."""
         (i, j), (k, m) = (np.divmod(vertex, self.columns) for vertex in (a, b))
         return np.abs(i - k) + np.abs(j - m) == 1

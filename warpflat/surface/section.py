@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.trace import (
@@ -81,7 +82,7 @@ def plane_path(
 
 
 def _nearest_curve(
-    surface: Surface, origin: NDArray[np.float64], axis: NDArray[np.float64], triangles: NDArray[np.int32]
+    surface: Surface, origin: FloatArray, axis: FloatArray, triangles: IntArray
 ) -> tuple[float, list[Place], bool] | None:
     """Of the curves in which a plane meets the surface the nearest to its origin: how far [m], its places, whether it is closed."""
     height = (surface.vertices - origin) @ axis
@@ -101,14 +102,14 @@ def _nearest_curve(
     return best
 
 
-def _direction(value: ArrayLike, what: str) -> NDArray[np.float64]:
+def _direction(value: ArrayLike, what: str) -> FloatArray:
     vector = np.asarray(value, dtype=float)
     if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
         raise InputError(f"{what} is three finite numbers, not all zero, got {value!r}")
     return vector / np.linalg.norm(vector)
 
 
-def _crossing(edge: tuple[int, int], height: NDArray[np.float64]) -> Place:
+def _crossing(edge: tuple[int, int], height: FloatArray) -> Place:
     """Where the plane crosses an edge whose ends lie above (or in) and below it."""
     a, b = edge
     share = float(height[a] / (height[a] - height[b]))
@@ -117,7 +118,7 @@ def _crossing(edge: tuple[int, int], height: NDArray[np.float64]) -> Place:
     return {a: 1.0 - share, b: share}
 
 
-def _chains(triangles: NDArray[np.int32], above: NDArray[np.bool_]) -> list[tuple[list[tuple[int, int]], bool]]:
+def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int, int]], bool]]:
     """The crossed edges, each as (upper, lower) vertex, in rows from border to border or round; true where closed."""
     crossed = triangles[above[triangles].any(axis=1) & ~above[triangles].all(axis=1)]
     beside: dict[tuple[int, int], list[int]] = {}
@@ -150,7 +151,7 @@ def _chains(triangles: NDArray[np.int32], above: NDArray[np.bool_]) -> list[tupl
     return chains
 
 
-def _distances(surface: Surface, places: list[Place], closed: bool, origin: NDArray[np.float64]) -> NDArray[np.float64]:
+def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:
     """Distance [m] from a point to each segment of a row of places."""
     points = make_path(surface, places).points
     ends = np.roll(points, -1, axis=0) if closed else points[1:]
@@ -165,9 +166,9 @@ def _inwards(
     surface: Surface,
     places: list[Place],
     start: Place,
-    origin: NDArray[np.float64],
-    towards: NDArray[np.float64],
-    triangles: NDArray[np.int32],
+    origin: FloatArray,
+    towards: FloatArray,
+    triangles: IntArray,
 ) -> list[Place]:
     """The half of an open row of places that leaves `start` in a direction, turned round so that it ends at `start`."""
     segment = int(np.argmin(_distances(surface, places, False, origin)))

@@ -14,8 +14,8 @@ from collections.abc import Iterable, Sequence
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.surface.topology import half_edges
 
 __all__ = ["degenerate_faces", "merge_degenerate_faces"]
@@ -31,7 +31,7 @@ _TOO_MANY, _TOO_LARGE_A_SHARE = 200, 0.25
 _MOST_ROUNDS = 20
 
 
-def _vertex_scale(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> NDArray[np.float64]:
+def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
     """#V, the mean length [m] of the edges at each vertex."""
     edges = half_edges(faces).edges
     length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
@@ -40,7 +40,7 @@ def _vertex_scale(vertices: NDArray[np.float64], faces: NDArray[np.int32]) -> ND
     return total / np.maximum(count, 1)
 
 
-def _width(points: NDArray[np.float64]) -> NDArray[np.float64]:
+def _width(points: FloatArray) -> FloatArray:
     """The least width [m] of faces given as (..., 3 or 4, 3): a triangle's altitude; a quad's also by its edges."""
     sides = np.linalg.norm(np.roll(points, -1, axis=-2) - points, axis=-1)
     if points.shape[-2] == 3:
@@ -56,9 +56,7 @@ def _width(points: NDArray[np.float64]) -> NDArray[np.float64]:
     return np.minimum(sides.min(axis=-1), area2 / np.where(longest > 0, longest, 1.0))
 
 
-def degenerate_faces(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], tolerance: float = 1e-3
-) -> NDArray[np.int32]:
+def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IntArray:
     """The faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
 
     The width of a triangle is its smallest altitude; of a quad, its shortest edge or its area over its longer diagonal.
@@ -74,11 +72,11 @@ def degenerate_faces(
 
 
 def merge_degenerate_faces(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
+    vertices: FloatArray,
+    faces: IntArray,
     lines: dict[str, list[int]],
     tolerance: float = 1e-3,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[str, list[int]], NDArray[np.int32], NDArray[np.int32]]:
+) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray, IntArray]:
     """Merge away what :func:`degenerate_faces` finds.
 
     Args:
@@ -110,12 +108,12 @@ def merge_degenerate_faces(
 
 
 def _merge_once(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
+    vertices: FloatArray,
+    faces: IntArray,
     lines: dict[str, list[int]],
-    found: NDArray[np.int32],
+    found: IntArray,
     tolerance: float,
-) -> tuple[NDArray[np.int32], NDArray[np.int32], dict[str, list[int]], NDArray[np.int32]]:
+) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray]:
     """One round, with the scale as it stands: faces, the face of each before, lines, and the faces that remain."""
     patch = _Patch(vertices, faces, lines, tolerance)
     waiting = sorted(found.tolist(), key=patch.width)
@@ -137,9 +135,7 @@ def _merge_once(
 class _Patch:
     """A mesh that changes in few places: only faces near a change leave the arrays."""
 
-    def __init__(
-        self, vertices: NDArray[np.float64], faces: NDArray[np.int32], lines: dict[str, list[int]], tolerance: float
-    ) -> None:
+    def __init__(self, vertices: FloatArray, faces: IntArray, lines: dict[str, list[int]], tolerance: float) -> None:
         self.vertices = vertices
         self.faces = faces
         self.lines = {name: list(line) for name, line in lines.items()}
@@ -185,7 +181,7 @@ class _Patch:
         ring = self.corners(face)
         return float(_width(self.vertices[list(ring)])) if ring else np.inf
 
-    def normal(self, ring: Iterable[int]) -> NDArray[np.float64]:
+    def normal(self, ring: Iterable[int]) -> FloatArray:
         p = self.vertices[list(ring)]
         return np.cross(p[2] - p[0], p[-1] - p[1] if len(p) == 4 else p[2] - p[1])
 
@@ -376,7 +372,7 @@ class _Patch:
         ring = self.corners(face)
         return ring[(ring.index(a) + 1) % len(ring)] == b
 
-    def result(self) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+    def result(self) -> tuple[IntArray, IntArray]:
         """All faces in the order of the faces they come from, and those."""
         total = self.next_face
         faces = np.full((total, 4), -1, dtype=np.int32)

@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.refine import Refinement
@@ -34,10 +34,10 @@ class SplitSurface:
     """
 
     surface: Surface
-    path: NDArray[np.int32]
-    vertex_support: NDArray[np.int32]
-    vertex_weights: NDArray[np.float64]
-    face_origin: NDArray[np.int32]
+    path: IntArray
+    vertex_support: IntArray
+    vertex_weights: FloatArray
+    face_origin: IntArray
 
 
 def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1) -> SplitSurface:
@@ -102,7 +102,7 @@ def _snapped(surface: Surface, path: SurfacePath, snap: float) -> list[Place]:
     return places
 
 
-def _edge_length(surface: Surface, support: NDArray[np.int32]) -> float:
+def _edge_length(surface: Surface, support: IntArray) -> float:
     corners = surface.vertices[support[support >= 0]]
     return float(np.linalg.norm(corners - corners[0], axis=1).max())
 
@@ -119,9 +119,7 @@ def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> P
     return place
 
 
-def _result(
-    surface: Surface, refined: Refinement, face_of: NDArray[np.int32], chain: NDArray[np.int32]
-) -> SplitSurface:
+def _result(surface: Surface, refined: Refinement, face_of: IntArray, chain: IntArray) -> SplitSurface:
     old = len(surface.vertices)
     count = old + len(refined.new_places)
     support = np.full((count, 3), -1, dtype=np.int32)
@@ -167,7 +165,7 @@ def _result(
     )
 
 
-def _through(line: NDArray[np.int32], refined: Refinement) -> NDArray[np.int32]:
+def _through(line: IntArray, refined: Refinement) -> IntArray:
     """A feature line with the new vertices on its edges put in."""
     vertices = line[:1].tolist()
     for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+
+from warpflat.arrays import FloatArray
 
 __all__ = ["stray_vertex", "stray_words"]
 
@@ -11,14 +12,14 @@ __all__ = ["stray_vertex", "stray_words"]
 _FAR = 50.0
 
 
-def stray_vertex(points: NDArray[np.float64]) -> int | None:
+def stray_vertex(points: FloatArray) -> int | None:
     """The one of #P by 3 finite points that lies farthest from their middle, if that is far beyond nine of ten others."""
     distance = np.abs(points - np.median(points, axis=0)).max(axis=1)
     farthest = int(np.argmax(distance))
     return farthest if distance[farthest] > _FAR * np.quantile(distance, 0.9, method="lower") else None
 
 
-def stray_words(vertex: int, place: NDArray[np.float64]) -> str:
+def stray_words(vertex: int, place: FloatArray) -> str:
     """What a message says of it."""
     x, y, z = place.tolist()
     return (

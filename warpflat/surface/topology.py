@@ -14,6 +14,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.kernels.surface_cells import unfold_diagonals
 from warpflat.launching import launch_each
@@ -69,36 +70,36 @@ class HalfEdges:
         count: #E, how many faces lie at each edge.
     """
 
-    faces: NDArray[np.int32]
-    edge: NDArray[np.int32]
-    edges: NDArray[np.int32]
-    count: NDArray[np.int32]
+    faces: IntArray
+    edge: IntArray
+    edges: IntArray
+    count: IntArray
 
     # What follows from the faces is made when it is first asked for: together it takes twice the memory of the rest.
 
     @cached_property
-    def tail(self) -> NDArray[np.int32]:
+    def tail(self) -> IntArray:
         """#H."""
         return _fixed(sides_of(self.faces)[0])
 
     @cached_property
-    def head(self) -> NDArray[np.int32]:
+    def head(self) -> IntArray:
         """#H."""
         return _fixed(sides_of(self.faces)[1])
 
     @cached_property
-    def face(self) -> NDArray[np.int32]:
+    def face(self) -> IntArray:
         """#H."""
         return _fixed(np.repeat(np.arange(len(self.faces), dtype=np.int32), _side_counts(self.faces)))
 
     @cached_property
-    def slot(self) -> NDArray[np.int32]:
+    def slot(self) -> IntArray:
         """#H."""
         slots = np.broadcast_to(np.arange(4, dtype=np.int32), self.faces.shape)
         return _fixed(slots[self.faces >= 0])
 
     @cached_property
-    def next(self) -> NDArray[np.int32]:
+    def next(self) -> IntArray:
         """#H."""
         sides = _side_counts(self.faces)
         follow = np.arange(1, len(self.edge) + 1, dtype=np.int32)
@@ -106,14 +107,14 @@ class HalfEdges:
         return _fixed(follow)
 
 
-def _fixed(values: NDArray[np.int32]) -> NDArray[np.int32]:
+def _fixed(values: IntArray) -> IntArray:
     """A view that is not to be written to: what is asked for twice is the same."""
     view = values.view()
     view.flags.writeable = False
     return view
 
 
-def _four_columns(faces: ArrayLike) -> NDArray[np.int32]:
+def _four_columns(faces: ArrayLike) -> IntArray:
     array = np.asarray(faces, dtype=np.int32)
     if array.size == 0:
         return np.empty((0, 4), dtype=np.int32)
@@ -167,12 +168,12 @@ def twins_of(he: HalfEdges) -> NDArray[np.int64]:
     return np.where(he.count[he.edge] == 2, both[he.edge] - here, -1)
 
 
-def _side_counts(quads: NDArray[np.int32]) -> NDArray[np.int32]:
+def _side_counts(quads: IntArray) -> IntArray:
     """#F, how many sides each face has."""
     return 3 + (quads[:, 3] >= 0).astype(np.int32)
 
 
-def sides_of(quads: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def sides_of(quads: IntArray) -> tuple[IntArray, IntArray]:
     """#H each, tail and head of every side."""
     is_quad = quads[:, 3] >= 0
     for sides, only in ((4, is_quad.all()), (3, not is_quad.any())):
@@ -187,12 +188,12 @@ def sides_of(quads: NDArray[np.int32]) -> tuple[NDArray[np.int32], NDArray[np.in
     return quads[there], after[there]
 
 
-def rows_of(array: NDArray[Number], chosen: NDArray[np.bool_]) -> NDArray[Number]:
+def rows_of(array: NDArray[Number], chosen: BoolArray) -> NDArray[Number]:
     """The chosen rows; the array itself, if these are all."""
     return array if chosen.all() else array[chosen]
 
 
-def order_by(keys: NDArray[np.int32], count: int) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def order_by(keys: IntArray, count: int) -> tuple[IntArray, IntArray]:
     """The order that sorts numbers below `count`, equal ones in their own, and #count+1, where each number's begin.
 
     A counting sort: the transpose of a sparse matrix with one entry a row.
@@ -227,12 +228,12 @@ def _sorted_with_order(keys: NDArray[np.integer]) -> tuple[NDArray[np.int64], ND
     return with_index, order
 
 
-def mesh_edges(faces: ArrayLike) -> NDArray[np.int32]:
+def mesh_edges(faces: ArrayLike) -> IntArray:
     """#E by 2, the unique edges as (lower, higher) vertex, sorted by the first, then the second. No diagonals."""
     return half_edges(faces).edges
 
 
-def edge_faces(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def edge_faces(faces: ArrayLike) -> tuple[IntArray, IntArray]:
     """The edges (as :func:`mesh_edges`) and, #E by 2, the faces beside each: lower index first, -1 on the border.
 
     Of an edge with more than two faces the two lowest are given; :func:`non_manifold_edges` finds those edges.
@@ -247,13 +248,13 @@ def edge_faces(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
     return he.edges, beside
 
 
-def non_manifold_edges(faces: ArrayLike) -> NDArray[np.int32]:
+def non_manifold_edges(faces: ArrayLike) -> IntArray:
     """#N by 2, the edges with more than two faces, as (lower, higher) vertex."""
     he = half_edges(faces)
     return he.edges[he.count > 2]
 
 
-def border_edges(faces: ArrayLike) -> NDArray[np.int32]:
+def border_edges(faces: ArrayLike) -> IntArray:
     """#B by 2, the edges with one face, as (from, to) in the direction in which that face runs through them."""
     he = half_edges(faces)
     alone = he.count[he.edge] == 1
@@ -271,13 +272,13 @@ def _paired(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     return order[:-1][same], order[1:][same]
 
 
-def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> NDArray[np.int32]:
+def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> IntArray:
     """Connected components of `size` nodes joined by the pairs a-b, numbered from 0 by each component's first node."""
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components
 
     graph = coo_array((np.ones(len(a), dtype=np.int8), (a, b)), shape=(size, size))
-    labels: NDArray[np.int32] = connected_components(graph, directed=False)[1].astype(np.int32, copy=False)
+    labels: IntArray = connected_components(graph, directed=False)[1].astype(np.int32, copy=False)
     if size == 0 or (labels[0] == 0 and (labels[1:] <= np.maximum.accumulate(labels)[:-1] + 1).all()):
         return labels
     # SciPy numbers them so, but does not promise to.
@@ -285,7 +286,7 @@ def join_labels(size: int, a: NDArray[np.integer], b: NDArray[np.integer]) -> ND
     return np.argsort(np.argsort(first))[inverse.reshape(-1)].astype(np.int32)
 
 
-def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) -> NDArray[np.int32]:
+def components(faces: ArrayLike, *, barrier: IntArray | None = None) -> IntArray:
     """#F, the connected component of each face, numbered from 0 by each component's first face.
 
     Faces are connected across shared edges; two faces that touch in a single vertex are not.
@@ -298,12 +299,12 @@ def components(faces: ArrayLike, *, barrier: NDArray[np.int32] | None = None) ->
 
 
 @once_per_faces
-def components_of(surface: Surface) -> NDArray[np.int32]:
+def components_of(surface: Surface) -> IntArray:
     """`components` of the surface's faces, worked out once."""
     return _fixed(_components(half_edges_of(surface), len(surface.faces), None))
 
 
-def _components(he: HalfEdges, size: int, barrier: NDArray[np.int32] | None) -> NDArray[np.int32]:
+def _components(he: HalfEdges, size: int, barrier: IntArray | None) -> IntArray:
     if size == 0:
         return np.empty(0, dtype=np.int32)
     # Each face joined to the last one at each of its edges.
@@ -319,7 +320,7 @@ def _components(he: HalfEdges, size: int, barrier: NDArray[np.int32] | None) -> 
     return join_labels(size, a, b)
 
 
-def corner_fans(faces: ArrayLike) -> NDArray[np.int32]:
+def corner_fans(faces: ArrayLike) -> IntArray:
     """#H, for each corner (the tails of :func:`half_edges`) the fan of faces around its vertex that it belongs to.
 
     Corners at one vertex are of one fan where their faces share an edge at that vertex. A vertex of a manifold has one
@@ -328,7 +329,7 @@ def corner_fans(faces: ArrayLike) -> NDArray[np.int32]:
     return _corner_fans(half_edges(faces))
 
 
-def _corner_fans(he: HalfEdges) -> NDArray[np.int32]:
+def _corner_fans(he: HalfEdges) -> IntArray:
     a, b = _paired(he)
     opposite = he.tail[a] == he.head[b]
     at_tail = np.where(opposite, he.next[b], b)
@@ -336,7 +337,7 @@ def _corner_fans(he: HalfEdges) -> NDArray[np.int32]:
     return join_labels(len(he.tail), np.concatenate([a, he.next[a]]), np.concatenate([at_tail, at_head]))
 
 
-def non_manifold_vertices(faces: ArrayLike) -> NDArray[np.int32]:
+def non_manifold_vertices(faces: ArrayLike) -> IntArray:
     """#N, the vertices at which several fans of faces touch in the point only (bow ties), sorted."""
     he = half_edges(faces)
     if len(he.tail) == 0:
@@ -346,7 +347,7 @@ def non_manifold_vertices(faces: ArrayLike) -> NDArray[np.int32]:
     return vertex[count > 1].astype(np.int32)
 
 
-def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) -> list[NDArray[np.int32]]:
+def border_loops(faces: ArrayLike, vertices: FloatArray | None = None) -> list[IntArray]:
     """The closed loops of border edges, each a vertex array that does *not* repeat its first vertex.
 
     Args:
@@ -382,7 +383,7 @@ def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) 
             here = follow.pop(here)
         loops.append(np.array(loop, dtype=np.int32))
 
-    def length(loop: NDArray[np.int32]) -> float:
+    def length(loop: IntArray) -> float:
         if vertices is None:
             return float(len(loop))
         return float(np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum())
@@ -390,19 +391,17 @@ def border_loops(faces: ArrayLike, vertices: NDArray[np.float64] | None = None) 
     return sorted(loops, key=length, reverse=True)
 
 
-def border_of(surface: Surface) -> NDArray[np.int32]:
+def border_of(surface: Surface) -> IntArray:
     """The vertices on the border, in the order of their numbers."""
     numbered = row_by_row(surface)
     return _on_border(half_edges_of(surface)) if numbered is None else numbered.border
 
 
-def _on_border(he: HalfEdges) -> NDArray[np.int32]:
+def _on_border(he: HalfEdges) -> IntArray:
     return np.unique(he.edges[he.count == 1])
 
 
-def places_of(
-    vertices: NDArray[np.float64], faces: ArrayLike, *, border: NDArray[np.int32] | None = None
-) -> NDArray[np.int64]:
+def places_of(vertices: FloatArray, faces: ArrayLike, *, border: IntArray | None = None) -> NDArray[np.int64]:
     """#V, for each vertex the lowest one at the very same place, of which only border vertices have any: sides of a crack.
 
     Args:
@@ -426,7 +425,7 @@ def euler_characteristic(faces: ArrayLike) -> int:
     return len(np.unique(he.tail)) - len(he.edges) + len(_four_columns(faces))
 
 
-def orient(faces: ArrayLike) -> tuple[NDArray[np.int32], int]:
+def orient(faces: ArrayLike) -> tuple[IntArray, int]:
     """Faces wound consistently, and how many of them had to be turned over.
 
     In each component the winding of the majority is kept. Edges with more than two faces are not crossed.
@@ -464,9 +463,7 @@ def orient(faces: ArrayLike) -> tuple[NDArray[np.int32], int]:
     return turned, int(flip.sum())
 
 
-def triangulate(
-    faces: ArrayLike, *, other_diagonal: bool | NDArray[np.bool_] = False
-) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def triangulate(faces: ArrayLike, *, other_diagonal: bool | BoolArray = False) -> tuple[IntArray, IntArray]:
     """#T by 3 triangles, in the order of the faces, and #T, the face of each. Winding is kept.
 
     Args:
@@ -483,7 +480,7 @@ def triangulate(
     return np.ascontiguousarray(both[keep]), face[keep]
 
 
-def corner_triangles(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.int32], NDArray[np.float64]]:
+def corner_triangles(faces: ArrayLike) -> tuple[IntArray, IntArray, FloatArray]:
     """Triangles that measure both splits of a quad at once.
 
     A triangle gives itself with weight 1; a quad gives its four corner triangles (before, corner, after) with weight
@@ -508,8 +505,8 @@ def corner_triangles(faces: ArrayLike) -> tuple[NDArray[np.int32], NDArray[np.in
 
 
 def unfold_quad_diagonals(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], *, crease: NDArray[np.int8] | None = None
-) -> tuple[NDArray[np.float64], NDArray[np.int32]]:
+    vertices: FloatArray, faces: IntArray, *, crease: NDArray[np.int8] | None = None
+) -> tuple[FloatArray, IntArray]:
     """Both diagonals of each quad, measured on the surface.
 
     A bent quad is two triangles that meet in one diagonal; the other diagonal is the distance between their far

@@ -15,6 +15,7 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from warpflat.arrays import BoolArray, FloatArray, IntArray
 from warpflat.errors import InputError
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import triangulate
@@ -51,9 +52,9 @@ class SurfacePath:
         closed: true where the last point is joined to the first; the first is not repeated.
     """
 
-    support: NDArray[np.int32]
-    weights: NDArray[np.float64]
-    points: NDArray[np.float64]
+    support: IntArray
+    weights: FloatArray
+    points: FloatArray
     closed: bool = False
 
     @property
@@ -63,14 +64,14 @@ class SurfacePath:
         return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
-def path_triangles(surface: Surface) -> tuple[NDArray[np.int32], NDArray[np.int32]]:
+def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
     """The triangles that paths run over: #T by 3 vertices, and #T, the face of each.
 
     A quad is split along its corners 0-2, or along 1-3 where only that diagonal lies inside it.
     """
     corner = surface.vertices[surface.faces]
 
-    def folds(a: int, b: int, c: int, d: int) -> NDArray[np.bool_]:
+    def folds(a: int, b: int, c: int, d: int) -> BoolArray:
         one = np.cross(corner[:, b] - corner[:, a], corner[:, c] - corner[:, a])
         two = np.cross(corner[:, c] - corner[:, a], corner[:, d] - corner[:, a])
         return np.einsum("ij,ij->i", one, two) < 0
@@ -244,7 +245,7 @@ def _same(a: Place, b: Place) -> bool:
 class VertexStar:
     """The triangles around each vertex, for walking from one to the next."""
 
-    def __init__(self, triangles: NDArray[np.int32]) -> None:
+    def __init__(self, triangles: IntArray) -> None:
         corner = triangles.ravel()
         self.triangles = triangles
         self._order = np.argsort(corner, kind="stable") // 3
@@ -265,7 +266,7 @@ class VertexStar:
         return [int(t) for t in found]
 
 
-def _insert(triangles: NDArray[np.int32], new: int, place: Place) -> NDArray[np.int32]:
+def _insert(triangles: IntArray, new: int, place: Place) -> IntArray:
     """The triangles with a vertex added inside one of them, or on an edge, whose triangles are then divided too."""
     hit = np.isin(triangles, list(place)).sum(axis=1) == len(place)
     parts = []
@@ -287,9 +288,9 @@ def _in_old_vertices(place: Place, inserted: dict[int, Place]) -> Place:
 
 
 def _retrace(
-    positions: NDArray[np.float64],
-    triangles: NDArray[np.int32],
-    drawn: NDArray[np.float64],
+    positions: FloatArray,
+    triangles: IntArray,
+    drawn: FloatArray,
     start: int,
     stop: int,
 ) -> list[Place]:
@@ -310,7 +311,7 @@ def _retrace(
 
 
 def _nearest_on_rim(
-    positions: NDArray[np.float64], star: VertexStar, here: Place, target: NDArray[np.float64]
+    positions: FloatArray, star: VertexStar, here: Place, target: FloatArray
 ) -> tuple[Place, float, float]:
     """The nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
     around = star.triangles[star.sharing(list(here))]

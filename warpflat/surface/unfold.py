@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.surface_cells import average_normals, find_bends, find_creases
 from warpflat.kernels.surface_cells import lay_cells as lay_each
 from warpflat.launching import launch_each
@@ -20,9 +21,6 @@ from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import order_by, places_of
 
 __all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
-
-FloatArray = NDArray[np.float64]
-IntArray = NDArray[np.int32]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.kernels.strain import measure_flat_cells
 from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface
@@ -23,12 +24,12 @@ _RINGS = 6
 
 def untangle(
     surface: Surface,
-    positions: NDArray[np.float64],
+    positions: FloatArray,
     *,
     least_area: float = 1e-3,
     most_sweeps: int = 200,
     suspects: NDArray[np.integer] | None = None,
-) -> tuple[NDArray[np.float64], int]:
+) -> tuple[FloatArray, int]:
     """Move the vertices of mirrored faces, and those beside, towards the mean of their neighbours until all faces agree.
 
     Meant for the odd face that a first layout turns over: far from such faces nothing moves, and nothing is looked at.
@@ -49,7 +50,7 @@ def untangle(
     corner, _, _ = corner_triangles(surface.faces)
     flat = np.array(positions, dtype=np.float64)
 
-    def crushed(corner: NDArray[np.int32]) -> NDArray[np.int32]:
+    def crushed(corner: IntArray) -> IntArray:
         p = points_at(surface.vertices, corner.T)
         body = 0.5 * norm(cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]))
         return corner[signed_cell_areas(corner, flat) <= least_area * body]
@@ -113,7 +114,7 @@ class _Patch:
         ).tocsr()
 
 
-def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> NDArray[np.int32]:
+def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> IntArray:
     """The faces that have some of these vertices, in their order."""
     around = corners_of(surface)
     begin, counts = around.offset[vertices], np.diff(around.offset)[vertices]
@@ -121,7 +122,7 @@ def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> NDArray[np.int
     return np.unique(around.entry[np.repeat(begin - first, counts) + np.arange(counts.sum())] // 4)
 
 
-def signed_cell_areas(corner: NDArray[np.int32], positions: NDArray[np.float64]) -> NDArray[np.float64]:
+def signed_cell_areas(corner: IntArray, positions: FloatArray) -> FloatArray:
     """#C, signed areas of triangles (#C by 3) in the plane [m2]; 0 or less where one is mirrored or collapsed."""
     area = np.empty(len(corner))
     given = [np.ascontiguousarray(positions), np.ascontiguousarray(corner, dtype=np.int32)]

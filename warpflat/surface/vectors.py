@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-__all__ = ["cross", "dot", "norm", "points_at"]
+from warpflat.arrays import FloatArray
 
-FloatArray = NDArray[np.float64]
+__all__ = ["cross", "dot", "norm", "points_at"]
 
 
 def points_at(vertices: FloatArray, index: NDArray[np.integer]) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.arrays import FloatArray, IntArray
 from warpflat.surface.polygons import distinct_corners
 from warpflat.surface.topology import components, euler_characteristic, half_edges
 
@@ -16,7 +17,7 @@ _SAME_PLACE = 1e-7
 _ON_EDGE, _OFF_ENDS = 1e-3, 1e-2
 
 
-def weld_map(vertices: NDArray[np.float64]) -> NDArray[np.int32]:
+def weld_map(vertices: FloatArray) -> IntArray:
     """#V, for each vertex the first vertex at the same place (to 1e-7 of the bounding box's diagonal)."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
@@ -37,7 +38,7 @@ def weld_map(vertices: NDArray[np.float64]) -> NDArray[np.int32]:
     return first[group].astype(np.int32)
 
 
-def is_sheet(faces: NDArray[np.int32]) -> bool:
+def is_sheet(faces: IntArray) -> bool:
     """Whether faces form one part without handles and with one border: something that lies flat without a cut."""
     he = half_edges(faces)
     if len(faces) == 0 or (he.count > 2).any() or components(faces).max() > 0 or not (he.count == 1).any():
@@ -46,13 +47,13 @@ def is_sheet(faces: NDArray[np.int32]) -> bool:
 
 
 def welding(
-    vertices: NDArray[np.float64],
-    faces: NDArray[np.int32],
+    vertices: FloatArray,
+    faces: IntArray,
     *,
     weld: bool | None,
     split_corners: bool,
     part_chosen: bool,
-) -> tuple[NDArray[np.int32] | None, str]:
+) -> tuple[IntArray | None, str]:
     """Whether to weld, and how.
 
     Args:
@@ -91,9 +92,7 @@ def welding(
     return place, f"vertices that lay at the same place as another one joined to it: {joined:,}"
 
 
-def t_junction(
-    vertices: NDArray[np.float64], faces: NDArray[np.int32], part: NDArray[np.integer]
-) -> tuple[int, int, int] | None:
+def t_junction(vertices: FloatArray, faces: IntArray, part: NDArray[np.integer]) -> tuple[int, int, int] | None:
     """A vertex at the border of one part that lies on a border edge of another, and this edge's ends; None where there is none.
 
     Args:
