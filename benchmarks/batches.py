@@ -15,9 +15,9 @@ from dataclasses import replace
 import warp as wp
 
 import warpflat
-from warpflat.flattening import Flattening
-from warpflat.shapes import make_shape
-from warpflat.surface import Surface
+from warpflat.flattening.result import Flattening
+from warpflat.surface.mesh import Surface
+from warpflat.surface.shapes import make_shape
 
 
 def sizes_of(shape: str, vertices: int, triangles: bool) -> list[Surface]:

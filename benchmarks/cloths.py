@@ -18,9 +18,11 @@ import warp as wp
 from meshes import KINDS, Mesh
 
 import warpflat
-from warpflat.fabric import Fabric, find_fabric
-from warpflat.flattening import Progress
-from warpflat.mannequin import Mannequin, form_names
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import find_fabric
+from warpflat.flattening.progress import Progress
+from warpflat.mannequin.forms import form_names
+from warpflat.mannequin.mannequin import Mannequin
 
 
 def meshes_of(chosen: argparse.Namespace) -> Iterator[Mesh]:

@@ -21,10 +21,11 @@ from meshes import KINDS, Mesh
 from speed import ALLOWANCE, CLOTH
 
 import warpflat
-from warpflat.cutting import CutPlan, cut
-from warpflat.fabric import Fabric
-from warpflat.flattening import Flattening, Progress
-from warpflat.surface import Surface
+from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.surface.mesh import Surface
 
 Look = Callable[[Progress], None]
 

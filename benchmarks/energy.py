@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from warpflat.fabric import grain_axes
-from warpflat.network import SpringNetwork
+from warpflat.fabric.fabric import grain_axes
+from warpflat.model.network import SpringNetwork
 
 FloatArray = NDArray[np.float64]
 

@@ -12,9 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.shapes import bodice, dome
-from warpflat.surface import Surface, make_surface, read_surface
-from warpflat.surface.cut import cut_along
+from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.io.read import read_surface
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import bodice, dome
 
 FloatArray = NDArray[np.float64]
 
@@ -99,7 +101,7 @@ def _line_at(surface: Surface, points: FloatArray) -> NDArray[np.int32]:
 
 
 def _lift(shape: str) -> Callable[[FloatArray, FloatArray], FloatArray]:
-    """Formulas of `warpflat.shapes`, at any parameters."""
+    """Formulas of `warpflat.surface.shapes`, at any parameters."""
 
     def on_dome(u: FloatArray, w: FloatArray) -> FloatArray:
         x, y = 0.5 * (u - 0.5), 0.5 * (w - 0.5)

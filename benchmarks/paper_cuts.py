@@ -17,9 +17,9 @@ import argparse
 import numpy as np
 
 import warpflat
-from warpflat.cutting import CutPlan, cut
-from warpflat.flattening import Flattening
-from warpflat.mannequin import Mannequin
+from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.flattening.result import Flattening
+from warpflat.mannequin.mannequin import Mannequin
 
 
 def paths(piece: Flattening, line: str, stops: list[str]) -> tuple[np.ndarray, ...]:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.sparse.linalg import splu
 
-from warpflat.strain import signed_cell_areas
+from warpflat.surface.untangle import signed_cell_areas
 
 FloatArray = NDArray[np.float64]
 IntArray = NDArray[np.int32]

@@ -16,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat import Fabric, flatten
-from warpflat.compare import laid_upon
-from warpflat.flattening import Flattening
-from warpflat.relax import RelaxOptions
-from warpflat.shapes import make_shape
+from warpflat.flattening.result import Flattening
+from warpflat.scene.compare import laid_upon
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 

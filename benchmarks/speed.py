@@ -41,8 +41,9 @@ from peers import (
 )
 
 import warpflat
-from warpflat.flattening import Flattening, Progress
-from warpflat.strain import layout_errors
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.model.strain import layout_errors
 from warpflat.surface.topology import triangulate
 
 FloatArray = NDArray[np.float64]

@@ -19,11 +19,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.develop import develop
-from warpflat.fabric import Fabric
-from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions, relax
-from warpflat.shapes import make_shape
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.develop import develop
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 
@@ -59,7 +59,7 @@ Energies = Iterator[tuple[float, float]]
 
 
 def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energies:
-    """`warpflat.relax`, step by step."""
+    """`warpflat.solver.relax`, step by step."""
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()

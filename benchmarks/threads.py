@@ -20,11 +20,11 @@ import warp as wp
 from machine import step_bytes
 from numpy.typing import NDArray
 
-from warpflat.develop import develop
-from warpflat.fabric import Fabric
-from warpflat.network import SpringNetwork
-from warpflat.relax import Relaxation, RelaxOptions
-from warpflat.shapes import make_shape
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.develop import develop
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 

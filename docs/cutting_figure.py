@@ -12,10 +12,10 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.cutting import CutPlan, cut
-from warpflat.export import PicturePiece, write_picture
-from warpflat.flattening import Flattening
-from warpflat.shapes import make_shape
+from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.export.picture import PicturePiece, write_picture
+from warpflat.flattening.result import Flattening
+from warpflat.surface.shapes import make_shape
 
 RESOLUTION = 65
 

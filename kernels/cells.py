@@ -46,7 +46,7 @@ class Cells:
 
 @wp.struct
 class ThreadGuard:
-    """What keeps threads straight and faces unfolded (`warpflat.network` says why).
+    """What keeps threads straight and faces unfolded (`warpflat.model.network` says why).
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].

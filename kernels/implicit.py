@@ -1,8 +1,8 @@
 """Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix.
 
 The same step smooths: without viscosity, and with shares of the velocity and of its change that are others from step to step
-(`warpflat.smoothing`). `pace` is an array of one that says so: what viscosity is to be taken times, 0 or 1, what the velocity and what
-its change; with three times 1 it is the paper's step.
+(`warpflat.solver.smoother`). `pace` is an array of one that says so: what viscosity is to be taken times, 0 or 1, what
+the velocity and what its change; with three times 1 it is the paper's step.
 """
 
 import warp as wp

@@ -1,4 +1,7 @@
-"""How pieces turn in the plane, summed up and taken out, for devices from which arrays would be slow to fetch (`warpflat.upright`)."""
+"""The rotation of each piece in the plane is summed up and removed, on devices from which arrays would be slow to fetch.
+
+See `warpflat.solver.grain_alignment`.
+"""
 
 import warp as wp
 

@@ -3,66 +3,203 @@
 >>> import warpflat
 >>> result = warpflat.flatten("bodice.obj", units="m", fabric="woven")
 >>> result.save("out")
+
+Every name that a script needs is `warpflat.NAME`; it is loaded when it is first used.
 """
 
 from __future__ import annotations
 
 import os
+import sys
 
 from warpflat._version import __version__
 
-TYPE_CHECKING = False  # that of typing, whose import would take longer than this whole file
+TYPE_CHECKING = False  # importing typing would take longer than this whole file
 
 if TYPE_CHECKING:
     from typing import Any
 
-    from warpflat.batch import flatten_all
-    from warpflat.edits import change_fabric, change_surface
-    from warpflat.errors import InputError
-    from warpflat.fabric import Fabric, find_fabric, load_library
-    from warpflat.flattening import Flattening, Progress, flatten
-    from warpflat.relax import RelaxOptions
-    from warpflat.surface import Surface, make_surface, read_surface
+    from warpflat.core.errors import InputError
+    from warpflat.cutting.cut_piece import CutPlan, cut, line_part, move_dart, separate
+    from warpflat.cutting.ledger import make_ledger
+    from warpflat.cutting.remedies import advise
+    from warpflat.export.read_pattern_json import read_pattern_json
+    from warpflat.fabric.fabric import Fabric
+    from warpflat.fabric.library import find_fabric, load_library
+    from warpflat.flattening.edit import change_fabric, change_surface
+    from warpflat.flattening.fit_report import Remedy
+    from warpflat.flattening.flatten_all import flatten_all
+    from warpflat.flattening.flatten_piece import flatten
+    from warpflat.flattening.progress import Progress
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.constraints import FixedLength, Straight
+    from warpflat.garment.ease import SeamWish
+    from warpflat.garment.edge_rules import EdgeRules
+    from warpflat.garment.garment import Garment, flatten_form
+    from warpflat.garment.pattern_files import PatternOptions, garment_files, surface_files
+    from warpflat.garment.sewing import sew
+    from warpflat.garment.to_pattern import pattern_of_garment
+    from warpflat.mannequin.forms import Form, form_from_mapping, form_names, shipped_form
+    from warpflat.mannequin.mannequin import Mannequin
+    from warpflat.mannequin.measurements import size_names
+    from warpflat.mannequin.output import write_mannequin
+    from warpflat.mannequin.scan_pose import ScanOptions
+    from warpflat.model.fit import assess_pattern
+    from warpflat.model.wear import Wear
+    from warpflat.pattern.draft import draft_garment
+    from warpflat.pattern.marker import Cloth, make_marker
+    from warpflat.scene.compare import compare_fabrics, save_comparison
+    from warpflat.scene.load import load_scene, make_scene
+    from warpflat.scene.run import run_scene
+    from warpflat.solver.relax import RelaxOptions
+    from warpflat.surface.io.read import read_surface
+    from warpflat.surface.mesh import Surface
+    from warpflat.surface.paths.lines import line_between, line_from_curve, line_on_plane, with_lines
+    from warpflat.surface.repair.validate import make_surface
+    from warpflat.surface.shapes import make_shape
 
-_here = os.path.dirname(os.path.abspath(__file__))
-_root = os.path.dirname(_here)
-if not os.path.isdir(os.path.join(_here, "kernels")) and os.path.isdir(os.path.join(_root, "kernels")):
-    # Imported from a checkout's root, where the kernels lie beside this folder and not in it.
-    __path__.append(_root)
+_HERE = os.path.dirname(os.path.abspath(__file__))
+
+
+def _find_kernels() -> None:
+    """Import the kernels of a checkout, which lie beside this folder; installed ones lie in it."""
+    folder = os.path.join(os.path.dirname(_HERE), "kernels")
+    if os.path.isdir(os.path.join(_HERE, "kernels")) or not os.path.isdir(folder):
+        return
+    from importlib.util import module_from_spec, spec_from_file_location
+
+    spec = spec_from_file_location(
+        "warpflat.kernels", os.path.join(folder, "__init__.py"), submodule_search_locations=[folder]
+    )
+    assert spec is not None
+    assert spec.loader is not None
+    kernels = module_from_spec(spec)
+    sys.modules[spec.name] = kernels
+    spec.loader.exec_module(kernels)
+    globals()["kernels"] = kernels
+
+
+_find_kernels()
 
 _HOME = {
-    "Fabric": "fabric",
-    "Flattening": "flattening",
-    "InputError": "errors",
-    "Progress": "flattening",
-    "RelaxOptions": "relax",
-    "Surface": "surface",
-    "change_fabric": "edits",
-    "change_surface": "edits",
-    "find_fabric": "fabric",
-    "flatten": "flattening",
-    "flatten_all": "batch",
-    "load_library": "fabric",
-    "make_surface": "surface",
-    "read_surface": "surface",
+    "Cloth": "pattern.marker",
+    "CutPlan": "cutting.cut_piece",
+    "EdgeRules": "garment.edge_rules",
+    "Fabric": "fabric.fabric",
+    "FixedLength": "garment.constraints",
+    "Flattening": "flattening.result",
+    "Form": "mannequin.forms",
+    "Garment": "garment.garment",
+    "InputError": "core.errors",
+    "Mannequin": "mannequin.mannequin",
+    "PatternOptions": "garment.pattern_files",
+    "Progress": "flattening.progress",
+    "RelaxOptions": "solver.relax",
+    "Remedy": "flattening.fit_report",
+    "ScanOptions": "mannequin.scan_pose",
+    "SeamWish": "garment.ease",
+    "Straight": "garment.constraints",
+    "Surface": "surface.mesh",
+    "Wear": "model.wear",
+    "advise": "cutting.remedies",
+    "assess_pattern": "model.fit",
+    "change_fabric": "flattening.edit",
+    "change_surface": "flattening.edit",
+    "compare_fabrics": "scene.compare",
+    "cut": "cutting.cut_piece",
+    "draft_garment": "pattern.draft",
+    "find_fabric": "fabric.library",
+    "flatten": "flattening.flatten_piece",
+    "flatten_all": "flattening.flatten_all",
+    "flatten_form": "garment.garment",
+    "form_from_mapping": "mannequin.forms",
+    "form_names": "mannequin.forms",
+    "garment_files": "garment.pattern_files",
+    "line_between": "surface.paths.lines",
+    "line_from_curve": "surface.paths.lines",
+    "line_on_plane": "surface.paths.lines",
+    "line_part": "cutting.cut_piece",
+    "load_library": "fabric.library",
+    "load_scene": "scene.load",
+    "make_ledger": "cutting.ledger",
+    "make_marker": "pattern.marker",
+    "make_scene": "scene.load",
+    "make_shape": "surface.shapes",
+    "make_surface": "surface.repair.validate",
+    "move_dart": "cutting.cut_piece",
+    "pattern_of_garment": "garment.to_pattern",
+    "read_pattern_json": "export.read_pattern_json",
+    "read_surface": "surface.io.read",
+    "run_scene": "scene.run",
+    "save_comparison": "scene.compare",
+    "separate": "cutting.cut_piece",
+    "sew": "garment.sewing",
+    "shipped_form": "mannequin.forms",
+    "size_names": "mannequin.measurements",
+    "surface_files": "garment.pattern_files",
+    "with_lines": "surface.paths.lines",
+    "write_mannequin": "mannequin.output",
 }
 
 __all__ = [
+    "Cloth",
+    "CutPlan",
+    "EdgeRules",
     "Fabric",
+    "FixedLength",
     "Flattening",
+    "Form",
+    "Garment",
     "InputError",
+    "Mannequin",
+    "PatternOptions",
     "Progress",
     "RelaxOptions",
+    "Remedy",
+    "ScanOptions",
+    "SeamWish",
+    "Straight",
     "Surface",
+    "Wear",
     "__version__",
+    "advise",
+    "assess_pattern",
     "change_fabric",
     "change_surface",
+    "compare_fabrics",
+    "cut",
+    "draft_garment",
     "find_fabric",
     "flatten",
     "flatten_all",
+    "flatten_form",
+    "form_from_mapping",
+    "form_names",
+    "garment_files",
+    "line_between",
+    "line_from_curve",
+    "line_on_plane",
+    "line_part",
     "load_library",
+    "load_scene",
+    "make_ledger",
+    "make_marker",
+    "make_scene",
+    "make_shape",
     "make_surface",
+    "move_dart",
+    "pattern_of_garment",
+    "read_pattern_json",
     "read_surface",
+    "run_scene",
+    "save_comparison",
+    "separate",
+    "sew",
+    "shipped_form",
+    "size_names",
+    "surface_files",
+    "with_lines",
+    "write_mannequin",
 ]
 
 
@@ -78,4 +215,4 @@ def __getattr__(name: str) -> Any:
 
 
 def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__})
+    return sorted(__all__)

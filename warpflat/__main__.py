@@ -5,7 +5,7 @@ from __future__ import annotations
 import gc
 import sys
 
-from warpflat.signals import end_at_once
+from warpflat.cli.signals import end_at_once
 
 __all__ = ["program"]
 
@@ -19,7 +19,7 @@ def program() -> int:
     end_at_once()  # before anything is imported that takes a while
     gc.set_threshold(*_SELDOM)
     _silence_libraries()
-    from warpflat.cli import main
+    from warpflat.cli.main import main
 
     code: int | None = None
     try:

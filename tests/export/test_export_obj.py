@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from export_meshes import cut_up_the_middle, dome, mixed
 
-from warpflat.export import write_obj
+from warpflat.export.obj import write_obj
 
 
 def read(path: Path) -> tuple[np.ndarray, np.ndarray, list[list[tuple[int, int]]]]:

@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 
-from warpflat.export import PicturePiece, write_picture
-from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale, weighted_percentile
+from warpflat.core.sums import weighted_percentile
+from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_ends, leader_of, points_on, spread
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
+from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import png_bytes
 from warpflat.export.raster import Samples, rasterise, shade

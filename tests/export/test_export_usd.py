@@ -13,14 +13,15 @@ import pytest
 from export_meshes import cut_up_the_middle, dome, mixed
 
 import warpflat
-from warpflat.errors import InputError
-from warpflat.export import FrameWriter, validate_usd
+from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, linear_rgb
+from warpflat.export.usd import FrameWriter
+from warpflat.export.usd_validation import validate_usd
 
 # A child finds the package and the helpers where this process found them.
 FOUND = {
     **os.environ,
-    "PYTHONPATH": os.pathsep.join(map(str, (Path(warpflat.__file__).parents[1], Path(__file__).parent))),
+    "PYTHONPATH": os.pathsep.join(map(str, (Path(warpflat.__file__).parents[1], Path(__file__).parents[1]))),
 }
 
 

@@ -16,9 +16,10 @@ import pytest
 from scipy.spatial import KDTree
 from shapely.geometry import LinearRing, Point
 
-from warpflat.errors import InputError
+from warpflat.core.errors import InputError
 from warpflat.export.dxf import block_name, write_dxf
-from warpflat.pattern import Edge, Garment, Piece, draft_garment
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.pieces import Edge, Garment, Piece
 from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40")

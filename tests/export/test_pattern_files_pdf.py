@@ -11,10 +11,12 @@ import pytest
 import shapely
 from PIL import Image
 
-from warpflat.errors import InputError
+from warpflat.core.errors import InputError
 from warpflat.export.pdf import PAPERS, write_pdf
-from warpflat.export.pdf_legend import LEGEND_SIZE, TEST_INCHES, TEST_MM
-from warpflat.pattern import Edge, Garment, Piece, draft_garment
+from warpflat.export.pdf_legend import TEST_INCHES, TEST_MM
+from warpflat.export.pdf_tiling import LEGEND_SIZE
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.pieces import Edge, Garment, Piece
 from warpflat.pattern.sample import sample_dress
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")

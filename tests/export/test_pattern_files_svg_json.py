@@ -11,10 +11,10 @@ from xml.etree import ElementTree as ET
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
+from warpflat.core.errors import InputError
 from warpflat.export.pattern_json import pattern_json, write_pattern_json
 from warpflat.export.svg import STYLE, write_marker_svg, write_svg
-from warpflat.pattern import draft_garment
+from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.marker import Cloth, make_marker
 from warpflat.pattern.sample import sample_dress
 

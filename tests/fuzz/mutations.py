@@ -242,7 +242,7 @@ def _damaged_json(random: Random, value: Any) -> bytes:
 
 def _options() -> dict[str, list[tuple[str, bool]]]:
     """The options of every command, each with whether it is a flag."""
-    from warpflat.cli import cli
+    from warpflat.cli.main import cli
 
     return {
         name: [(p.opts[-1], p.is_flag) for p in command.params if isinstance(p, click.Option)]

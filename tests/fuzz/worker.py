@@ -36,7 +36,7 @@ def peak_memory(*, reset: bool = False) -> int:
 
 def run_case(case: dict[str, Any]) -> dict[str, Any]:
     """Run the command line in the case's folder, with standard output and error in files; return code, seconds and bytes."""
-    from warpflat.cli import main
+    from warpflat.cli.main import main
 
     os.chdir(case["folder"])
     for number, name in ((1, "stdout"), (2, "stderr")):

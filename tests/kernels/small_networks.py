@@ -13,10 +13,10 @@ from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 
-from warpflat.fabric import Fabric
-from warpflat.network import SpringNetwork
-from warpflat.smoothing import STEADY
-from warpflat.surface import make_surface
+from warpflat.fabric.fabric import Fabric
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.smoother import STEADY
+from warpflat.surface.repair.validate import make_surface
 
 CLOTH = Fabric(
     name="cloth",

@@ -9,7 +9,7 @@ from devices import DEVICE
 from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.kernels.lattice import number_faces
 
-from warpflat.launching import launch_each
+from warpflat.core.launch import launch_each
 
 
 def weights_of(place: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

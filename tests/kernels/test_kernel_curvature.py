@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from warpflat.kernels.curvature import bend_threads, fit_curvature
 
-from warpflat.launching import launch_each
+from warpflat.core.launch import launch_each
 
 
 def fitted(place: np.ndarray, neighbors: np.ndarray, normal: np.ndarray) -> np.ndarray:

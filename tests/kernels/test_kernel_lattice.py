@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from warpflat.kernels.lattice import lay_profiles
 
-from warpflat.launching import launch_each
+from warpflat.core.launch import launch_each
 
 
 @pytest.mark.parametrize("column", [0, 3, 6])

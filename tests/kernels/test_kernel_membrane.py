@@ -13,13 +13,14 @@ from small_networks import corner_vertices
 from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.strain import compute_membrane_strain
 
-from warpflat.fabric import Fabric, grain_axes
-from warpflat.membrane import cloth_of
-from warpflat.network import SpringNetwork
-from warpflat.smoothing import STEADY
-from warpflat.surface import Surface, make_surface
+from warpflat.fabric.fabric import Fabric, grain_axes
+from warpflat.model.membrane import cloth_of
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.membrane_stiffness import TangentMatrix
+from warpflat.solver.smoother import STEADY
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.topology import border_edges
-from warpflat.tangent import TangentMatrix
 
 CLOTH = Fabric(
     name="cloth",

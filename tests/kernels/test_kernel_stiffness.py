@@ -13,12 +13,13 @@ from small_networks import CLOTH
 from test_kernel_surface_cells import SURFACES, norm
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 
-from warpflat.cells import cells_of
-from warpflat.fabric import Fabric, grain_axes
-from warpflat.launching import launch_each
-from warpflat.network import SpringNetwork
-from warpflat.springs import quad_stiffness, shear_hold, springs_of, springs_of_sides
-from warpflat.surface import Surface, half_edges
+from warpflat.core.launch import launch_each
+from warpflat.fabric.fabric import Fabric, grain_axes
+from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import quad_stiffness, shear_hold, springs_of, springs_of_sides
+from warpflat.surface.cells import cells_of
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import half_edges
 
 FloatArray = NDArray[np.float64]
 

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, shaken, small_network, vec2
 from warpflat.kernels.strain import compute_worn_strain
 
-from warpflat.fabric import grain_axes
-from warpflat.network import SpringNetwork
-from warpflat.strain import membrane_of
+from warpflat.fabric.fabric import grain_axes
+from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import membrane_of
 
 
 def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int = 1) -> list[NDArray[np.float64]]:

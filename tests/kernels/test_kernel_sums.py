@@ -8,8 +8,8 @@ import warp as wp
 from devices import DEVICE
 from warpflat.kernels.sums import add_share, dot_blocks, least_of_blocks, subtract, sum_blocks
 
-from warpflat.far_sums import FarSums
-from warpflat.launching import launch_each
+from warpflat.core.device_sums import FarSums
+from warpflat.core.launch import launch_each
 
 BEGIN = np.array([0, 3, 4, 10], dtype=np.int32)
 

@@ -7,11 +7,12 @@ import pytest
 from numpy.typing import NDArray
 from warpflat.kernels.surface_cells import measure_triangles
 
-from warpflat.cells import cells_of
-from warpflat.launching import launch_each
-from warpflat.shapes import make_shape
-from warpflat.surface import Surface, corner_triangles, make_surface, unfold_quad_diagonals
-from warpflat.surface.topology import places_of
+from warpflat.core.launch import launch_each
+from warpflat.surface.cells import cells_of
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
+from warpflat.surface.topology import corner_triangles, places_of, unfold_quad_diagonals
 from warpflat.surface.unfold import quad_creases
 
 FloatArray = NDArray[np.float64]

@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, vec2
 from warpflat.kernels.thread_lines import go_along_lines, solve_lines
 
-from warpflat.launching import launch_each
-from warpflat.network import SpringNetwork
-from warpflat.shapes import make_shape
-from warpflat.surface import Surface, make_surface
+from warpflat.core.launch import launch_each
+from warpflat.model.network import SpringNetwork
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
 

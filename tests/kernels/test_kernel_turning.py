@@ -9,7 +9,7 @@ from small_networks import vec2
 from warpflat.kernels.implicit import count_braked, stop_braked
 from warpflat.kernels.turning import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
 
-from warpflat.launching import launch_each
+from warpflat.core.launch import launch_each
 
 COUNT = 30
 BEGIN = np.array([0, 12, 13, 30], dtype=np.int32)

@@ -7,9 +7,9 @@ import itertools
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.mannequin import Mannequin
+from warpflat.core.errors import InputError
 from warpflat.mannequin.layout import QUARTERS, make_layout
+from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.normals import face_normals
 
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.mannequin import Carrier, Mannequin
+from warpflat.core.errors import InputError
+from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.mannequin import Mannequin
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from warpflat.export.usd_validation import validate_usd
-from warpflat.mannequin import Mannequin, write_mannequin
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.output import write_mannequin
 
 
 @pytest.fixture(scope="module")

@@ -9,10 +9,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.mannequin import Mannequin, ScanOptions
+from warpflat.core.errors import InputError
 from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.scan_pose import ScanOptions
 
 needs_bodies = pytest.mark.skipif(
     "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.mannequin import Mannequin
+from warpflat.core.errors import InputError
 from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.layout import make_layout
+from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names
 from warpflat.mannequin.normals import face_normals
 from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth, superellipse_exponent

@@ -10,12 +10,12 @@ from hypothesis import strategies as st
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
-from warpflat.errors import InputError
-from warpflat.pattern import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide, draft_garment, draft_piece
+from warpflat.core.errors import InputError
 from warpflat.pattern.curves import arc_lengths, fit_curve, turning_angles
-from warpflat.pattern.draft import nest_label
+from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.layout import lay_out, nests
+from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40", "42", "44")

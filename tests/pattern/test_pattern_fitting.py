@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 import shapely
 
-from warpflat.pattern import Dart, Edge, Piece, draft_piece
 from warpflat.pattern.curves import chords, fit_curve
+from warpflat.pattern.draft import draft_piece
 from warpflat.pattern.fitting import is_wavy, smooth_line
+from warpflat.pattern.pieces import Dart, Edge, Piece
 
 
 def bent(count: int = 24) -> np.ndarray:

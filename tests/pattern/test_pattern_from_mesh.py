@@ -7,8 +7,8 @@ import pytest
 import shapely
 from shapely.affinity import scale
 
-from warpflat.errors import InputError
-from warpflat.pattern import draft_piece
+from warpflat.core.errors import InputError
+from warpflat.pattern.draft import draft_piece
 from warpflat.pattern.from_mesh import piece_from_mesh
 
 

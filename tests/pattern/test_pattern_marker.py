@@ -8,11 +8,12 @@ import numpy as np
 import pytest
 import shapely
 
-from warpflat.errors import InputError
+from warpflat.core.errors import InputError
 from warpflat.export.svg import write_marker_svg
-from warpflat.pattern import Edge, Garment, Hole, Piece, draft_garment
+from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfolded
+from warpflat.pattern.pieces import Edge, Garment, Hole, Piece
 from warpflat.pattern.sample import sample_dress
 
 

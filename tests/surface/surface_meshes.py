@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.surface import (
-    Surface,
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import (
     border_edges,
     components,
     half_edges,

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from cut_meshes import cone, cylinder, grid
 
-from warpflat.errors import InputError
-from warpflat.surface.cut import cut_along, cut_along_many, faces_at, glue
+from warpflat.core.errors import InputError
+from warpflat.surface.cut.cut_mesh import cut_along, cut_along_many, faces_at, glue
 from warpflat.surface.topology import border_edges, border_loops, euler_characteristic
 
 FIVE = grid(5, 5)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from cut_meshes import flat, grid
 
-from warpflat.errors import InputError
-from warpflat.surface.cut import cut_along
-from warpflat.surface.dart import dart_measure, draw_outline, fish_eye_measure, shape_dart, shape_fish_eye
+from warpflat.core.errors import InputError
+from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.cut.dart import dart_measure, draw_outline, fish_eye_measure, shape_dart, shape_fish_eye
 from warpflat.surface.topology import border_loops
 
 N = 11

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from cut_meshes import cylinder, edge_set, flat, grid, surface
 
-from warpflat.errors import InputError
-from warpflat.surface.cut import cut_along, cut_along_many
-from warpflat.surface.pieces import apply_cut, split_pieces
+from warpflat.core.errors import InputError
+from warpflat.surface.cut.cut_mesh import cut_along, cut_along_many
+from warpflat.surface.cut.pieces import apply_cut, split_pieces
 
 FIVE = surface(
     flat(5, 5),

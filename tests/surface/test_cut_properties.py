@@ -10,8 +10,8 @@ from cut_meshes import cone, cylinder, flat, grid, surface
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from warpflat.surface.cut import cut_along_many, glue
-from warpflat.surface.pieces import apply_cut, split_pieces
+from warpflat.surface.cut.cut_mesh import cut_along_many, glue
+from warpflat.surface.cut.pieces import apply_cut, split_pieces
 from warpflat.surface.topology import (
     border_edges,
     corner_triangles,

@@ -10,8 +10,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.surface import read_surface
+from warpflat.core.errors import InputError
+from warpflat.surface.io.read import read_surface
 
 FILES = Path(__file__).parent.parent / "regressions" / "meshes"
 WORDS = {
@@ -109,13 +109,13 @@ def test_binary_files_cut_short_are_refused(tmp_path, suffix):
 
 
 def test_the_process_that_reads_usd_does_not_load_warp():
-    code = "import sys, warpflat.usd_stage; print('warp' in sys.modules or 'scipy' in sys.modules)"
+    code = "import sys, warpflat.surface.io.usd_stage; print('warp' in sys.modules or 'scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
 def test_face_of_20000_corners_is_cut_into_triangles_that_are_no_slivers():
-    from warpflat.surface.polygons import split_polygons
+    from warpflat.surface.repair.polygons import split_polygons
 
     angle = np.linspace(0.0, 2.0 * np.pi, 20_000, endpoint=False)
     outline = np.column_stack([np.cos(angle), np.sin(angle), 0.0 * angle])
@@ -127,7 +127,7 @@ def test_face_of_20000_corners_is_cut_into_triangles_that_are_no_slivers():
 
 
 def test_face_with_too_many_corners_beside_many_faces_is_named():
-    from warpflat.surface.polygons import filled_up
+    from warpflat.surface.repair.polygons import filled_up
 
     sizes = np.full(100_000, 3)
     sizes[7] = 50_000

@@ -7,16 +7,12 @@ import numpy as np
 import pytest
 from surface_meshes import cylinder, grid, plane, scattered, sphere
 
-from warpflat.errors import InputError
-from warpflat.surface import (
-    distance_from,
-    extend_to_border,
-    line_on_plane,
-    make_surface,
-    read_surface,
-    signed_distance_and_station,
-    triangulate,
-)
+from warpflat.core.errors import InputError
+from warpflat.surface.io.read import read_surface
+from warpflat.surface.paths.geodesic import distance_from, extend_to_border, signed_distance_and_station
+from warpflat.surface.paths.lines import line_on_plane
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.topology import triangulate
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")

@@ -9,13 +9,14 @@ import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
-from warpflat.carry import LatticeCarry
-from warpflat.coarsen import coarser, coarser_surfaces
-from warpflat.shapes import make_shape
-from warpflat.surface import Surface, make_surface
-from warpflat.surface.cut import cut_along
+from warpflat.solver.multigrid.coarsen import coarser, coarser_surfaces
+from warpflat.solver.multigrid.cubic_interpolation import LatticeCarry
+from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_columns
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.shapes import make_shape
 from warpflat.surface.topology import border_loops, components, euler_characteristic, non_manifold_edges
 
 BoolArray = NDArray[np.bool_]

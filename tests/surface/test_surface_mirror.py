@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.errors import InputError
-from warpflat.shapes import make_shape
+from warpflat.core.errors import InputError
 from warpflat.surface.mirror import mirror_partners
+from warpflat.surface.shapes import make_shape
 
 
 def test_a_grid_is_its_own_mirror_image_about_its_middle_column():

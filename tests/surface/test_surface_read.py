@@ -8,9 +8,10 @@ import trimesh
 from pxr import Gf, Sdf, Usd, UsdGeom
 from surface_meshes import check_invariants, cylinder, grid
 
-from warpflat.errors import InputError
-from warpflat.surface import read_surface, triangulate
-from warpflat.surface.read_obj import chain_lines
+from warpflat.core.errors import InputError
+from warpflat.surface.io.read import read_surface
+from warpflat.surface.io.read_obj import chain_lines
+from warpflat.surface.topology import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 
@@ -401,8 +402,8 @@ def test_curves_beside_and_below_become_feature_lines(tmp_path):
 
 
 def test_a_film_is_read_with_the_lines_of_the_mesh_that_is_chosen(tmp_path):
-    from warpflat.export import FrameWriter
-    from warpflat.shapes import make_shape
+    from warpflat.export.usd import FrameWriter
+    from warpflat.surface.shapes import make_shape
 
     shape = make_shape("bodice", resolution=9)
     with FrameWriter(tmp_path / "frames.usdc") as film:

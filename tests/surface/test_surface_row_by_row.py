@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
-from warpflat.surface import Surface
+from warpflat.surface.mesh import Surface
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges
 from warpflat.surface.unfold import corners_around

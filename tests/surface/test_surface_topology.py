@@ -6,8 +6,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from surface_meshes import grid
 
-from warpflat.errors import InputError
-from warpflat.surface import (
+from warpflat.core.errors import InputError
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import (
     border_edges,
     border_loops,
     components,
@@ -15,15 +16,19 @@ from warpflat.surface import (
     edge_faces,
     euler_characteristic,
     half_edges,
+    half_edges_of,
+    join_labels,
     mesh_edges,
     non_manifold_edges,
     non_manifold_vertices,
+    order_by,
     orient,
+    places_of,
+    stable_order,
     triangulate,
+    twins_of,
     unfold_quad_diagonals,
 )
-from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges_of, join_labels, order_by, places_of, stable_order, twins_of
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 

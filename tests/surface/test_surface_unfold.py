@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from warpflat.cells import cells_of
-from warpflat.fabric import find_fabric
-from warpflat.shapes import make_shape
-from warpflat.springs import springs_of
-from warpflat.surface import make_surface
-from warpflat.surface.cut import cut_along
+from warpflat.fabric.library import find_fabric
+from warpflat.model.springs import springs_of
+from warpflat.surface.cells import cells_of
+from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
 from warpflat.surface.topology import unfold_quad_diagonals
 from warpflat.surface.unfold import lay_cells, quad_creases
 

@@ -2,21 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
+from warpflat.core.sums import weighted_percentile
 
-__all__ = [
-    "SMALLEST_SCALE",
-    "energy_colours",
-    "energy_scale",
-    "linear_rgb",
-    "weighted_percentile",
-    "weighted_percentiles",
-]
+__all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb"]
 
 # Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
 SMALLEST_SCALE = 1e-6  # [J/m2]
@@ -68,20 +60,3 @@ def energy_scale(density: ArrayLike, areas: ArrayLike) -> float:
     steps = np.array([1.0, 1.5, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0, 8.0, 10.0])
     power = 10.0 ** np.floor(np.log10(robust))
     return float(power * steps[min(np.searchsorted(steps, robust / power * (1.0 - 1e-12)), len(steps) - 1)])
-
-
-def weighted_percentile(values: ArrayLike, weights: ArrayLike, fraction: float) -> float:
-    """The smallest of `values` (#N) below or at which at least `fraction` of the `weights` (#N) lie; 0 for none."""
-    return weighted_percentiles(values, weights, [fraction])[0]
-
-
-def weighted_percentiles(values: ArrayLike, weights: ArrayLike, fractions: Sequence[float]) -> list[float]:
-    """For each fraction what `weighted_percentile` is."""
-    value, weight = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
-    if value.size == 0:
-        return [0.0] * len(fractions)
-    order = np.argsort(value)
-    running = np.cumsum(weight[order])
-    at = np.searchsorted(running, np.asarray(fractions) * running[-1])
-    found: list[float] = value[order[np.minimum(at, value.size - 1)]].tolist()
-    return found

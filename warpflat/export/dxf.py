@@ -18,15 +18,15 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat._version import __version__
-from warpflat.arrays import BoolArray, FloatArray
-from warpflat.errors import InputError, nearest
-from warpflat.export.atomic import atomic_path
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.atomic_files import atomic_path
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import control_in, plain_letters
 from warpflat.export.letters import titles
 from warpflat.pattern.curves import turning_angles
-from warpflat.pattern.draft import DraftedGarment, DraftedPiece
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
-from warpflat.words import control_in, plain_letters
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.surface.topology import triangulate
 
 __all__ = [

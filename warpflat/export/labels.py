@@ -10,7 +10,7 @@ from itertools import islice, pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray
 
 __all__ = [
     "LabelRoom",

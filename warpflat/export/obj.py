@@ -9,8 +9,8 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from warpflat.arrays import FloatArray
-from warpflat.export.atomic import atomic_path
+from warpflat.core.arrays import FloatArray
+from warpflat.core.atomic_files import atomic_path
 from warpflat.surface.mesh import Surface
 
 __all__ = ["write_obj"]

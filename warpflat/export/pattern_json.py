@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from warpflat._version import __version__
-from warpflat.export.atomic import atomic_path
-from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.core.atomic_files import atomic_path
+from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.pieces import SeamSide
 
 __all__ = ["SCHEMA", "pattern_json", "write_pattern_json"]

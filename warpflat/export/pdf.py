@@ -9,19 +9,19 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError, nearest
-from warpflat.export.atomic import atomic_path
-from warpflat.export.pdf_legend import LEGEND_SIZE, draw_legend, legend_page
+from warpflat.core.arrays import FloatArray
+from warpflat.core.atomic_files import atomic_path
+from warpflat.core.errors import InputError, nearest
+from warpflat.export.pdf_legend import draw_legend, legend_page
+from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling
 from warpflat.export.svg import OF_SIZE, STYLE
-from warpflat.pattern.draft import DraftedGarment, DraftedPiece, nest_label
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import Stroke, draw_nest
 from warpflat.pattern.layout import Sheet, lay_out, nests, taken_by
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
@@ -29,43 +29,11 @@ from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
 
-__all__ = ["PAPERS", "Paper", "Tiling", "write_pdf"]
+__all__ = ["PAPERS", "write_pdf"]
 
 
 #: Points per metre: a PDF's unit is 1/72 inch.
 POINT = 72 / 0.0254
-#: Dashes [mm] by which sizes are told apart on paper, also without colour.
-SIZE_DASHES: tuple[tuple[float, ...], ...] = (
-    (),
-    (8, 2),
-    (3, 2),
-    (10, 2, 2, 2),
-    (1, 1.5),
-    (6, 1.5, 1, 1.5, 1, 1.5),
-    (14, 3),
-)
-SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a")
-
-
-@dataclass(frozen=True, kw_only=True)
-class Paper:
-    """A sheet of paper: `width`, `height`, the `margin` that printers leave white, the `overlap` of tiles, all [m]."""
-
-    name: str
-    width: float
-    height: float
-    margin: float
-    overlap: float
-
-    @property
-    def step(self) -> FloatArray:
-        """How far one tile lies from the next [m], across and up."""
-        return np.array([self.width, self.height]) - 2 * self.margin - self.overlap
-
-    @property
-    def tiled(self) -> bool:
-        """True for papers so small that a piece spreads over several."""
-        return self.width < 0.5
 
 
 PAPERS = {
@@ -73,35 +41,6 @@ PAPERS = {
     "Letter": Paper(name="US Letter", width=0.2159, height=0.2794, margin=0.010, overlap=0.010),
     "A0": Paper(name="A0", width=0.841, height=1.189, margin=0.015, overlap=0.010),
 }
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Tiling:
-    """Which tiles of a sheet are printed: rows from the top, columns from the left, and their pages in order.
-
-    `joined` is false where no piece spreads over two tiles.
-    """
-
-    paper: Paper
-    rows: int
-    columns: int
-    tiles: tuple[tuple[int, int], ...]
-    sheet: Sheet
-    joined: bool = True
-
-    def corner(self, row: int, column: int) -> FloatArray:
-        """Lower left of a tile on the sheet [m]."""
-        step = self.paper.step
-        return np.array([column * step[0], float(self.sheet.size[1]) - (row + 1) * step[1] - self.paper.overlap])
-
-    def name(self, row: int, column: int) -> str:
-        """As "B3": second row, third column."""
-        letters = ""
-        row += 1
-        while row:
-            row, digit = divmod(row - 1, 26)
-            letters = chr(ord("A") + digit) + letters
-        return f"{letters}{column + 1}"
 
 
 def write_pdf(
@@ -165,7 +104,7 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
             sheet = lay_out(groups, width=width, gap=0.005)
         else:
             sheet = lay_out(groups, width=width, gap=0.016, page_height=float(step[1]), reserved=LEGEND_SIZE)
-        tiling = _tiling(sheet, paper)
+        tiling = make_tiling(sheet, paper)
         if best is None or _cost(tiling) < _cost(best[1]):
             best = sheet, tiling
     if best is None:
@@ -176,35 +115,6 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
 def _cost(tiling: Tiling) -> float:
     """Pages, and a little for a long strip of them, which is hard to glue and to lay out."""
     return len(tiling.tiles) + 0.2 * (tiling.rows + tiling.columns)
-
-
-def _tiling(sheet: Sheet, paper: Paper) -> Tiling:
-    import shapely
-
-    step = paper.step
-    columns = max(1, int(np.ceil((sheet.size[0] - paper.overlap) / step[0] - 1e-9)))
-    rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
-    tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
-    shapes = [shapely.Polygon(piece.cut_line + placed.offset) for placed in sheet.placed for piece in placed.pieces]
-    labels = [(nest_label(placed.pieces), placed.offset) for placed in sheet.placed]
-    shapes += [shapely.Polygon(label.box + offset) for label, offset in labels if label.leader is not None]
-    if sheet.reserved is not None:
-        shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
-    tree = shapely.STRtree(shapes)
-    tiles = []
-    for row in range(rows):
-        for column in range(columns):
-            # The strips on the right and below belong to the neighbours, but for the last ones.
-            low, high = tiling.corner(row, column), tiling.corner(row, column) + step
-            high += np.array([paper.overlap if column == columns - 1 else 0.0, paper.overlap])
-            low += np.array([0.0, 0.0 if row == rows - 1 else paper.overlap])
-            if len(tree.query(shapely.box(*low, *high), predicate="intersects")):
-                tiles.append((row, column))
-    cells = [
-        shapely.box(*c, *(c + step)) for c in (tiling.corner(*tile) + np.array([0.0, paper.overlap]) for tile in tiles)
-    ]
-    joined = any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
-    return replace(tiling, tiles=tuple(tiles), joined=joined)
 
 
 def _register_fonts() -> None:

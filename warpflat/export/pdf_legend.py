@@ -7,22 +7,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import counted
+from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
-from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.label import fit_label
 from warpflat.pattern.layout import Placed, Sheet
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width
-from warpflat.words import counted
 
 if TYPE_CHECKING:
-    from warpflat.export.pdf import Tiling
+    from warpflat.export.pdf_tiling import Tiling
 
-__all__ = ["LEGEND_SIZE", "TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
+__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
 
 
-#: Width and height [m] of the block that :func:`draw_legend` draws.
-LEGEND_SIZE = (0.180, 0.128)
 #: Sides of the test squares: 50 mm and 2 inches [m].
 TEST_MM, TEST_INCHES = 0.050, 2 * 0.0254
 
@@ -46,7 +45,7 @@ _KEY = (
 
 def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
     """Title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
-    from warpflat.export.pdf import SIZE_COLOURS, SIZE_DASHES
+    from warpflat.export.pdf_tiling import SIZE_COLOURS, SIZE_DASHES
 
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)

@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.activity import doing
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.export.atomic import atomic_path, require_writable
+from warpflat.core.activity import doing
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles

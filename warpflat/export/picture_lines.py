@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.labels import (
     LabelRoom,
     Spot,

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import energy_colours
 from warpflat.export.labels import LabelRoom, Spot
 from warpflat.export.picture_lines import draw_lines

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.export.picture_views import HALO_LAYER, INK
 
 __all__ = ["DPI", "GRAIN", "GREY", "LABEL_SIZE", "PAGE_WIDTH", "POINT", "Pen"]

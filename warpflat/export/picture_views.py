@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.mesh import Surface

@@ -15,7 +15,7 @@ import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
 __all__ = ["Samples", "rasterise", "shade"]

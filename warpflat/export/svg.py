@@ -9,16 +9,16 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.export.atomic import atomic_path
+from warpflat.core.arrays import FloatArray
+from warpflat.core.atomic_files import atomic_path
+from warpflat.core.text import control_in, counted, size_words
 from warpflat.pattern.curves import Curve
-from warpflat.pattern.draft import DraftedGarment
+from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
 from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
-from warpflat.words import control_in, counted, size_words
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 

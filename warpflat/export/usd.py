@@ -20,18 +20,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError
-from warpflat.export.atomic import hidden_file, require_writable
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.atomic_files import hidden_file, require_writable
+from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
-from warpflat.export.geometry import (
-    Polylines,
-    area_vectors,
-    corner_average,
-    face_areas,
-    polylines_of,
-    vertex_normals,
-)
+from warpflat.export.geometry import Polylines, area_vectors, corner_average, face_areas, polylines_of, vertex_normals
 from warpflat.export.usd_prims import (
     MeshSamples,
     SampledLines,
@@ -42,11 +35,10 @@ from warpflat.export.usd_prims import (
     usd_errors,
     valid_name,
 )
-from warpflat.export.usd_validation import validate_usd
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import triangulate
 
-__all__ = ["FrameWriter", "validate_usd"]
+__all__ = ["FrameWriter"]
 
 _FIRST_FRAME = 1
 _LINE_COLOUR = (0.03, 0.05, 0.10)

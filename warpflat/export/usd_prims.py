@@ -16,9 +16,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError
-from warpflat.export.atomic import atomic_path
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.atomic_files import atomic_path
+from warpflat.core.errors import InputError
 from warpflat.export.geometry import Polylines
 
 __all__ = [

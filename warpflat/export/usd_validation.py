@@ -24,7 +24,7 @@ def validate_usd(path: str | os.PathLike[str]) -> list[str]:
     """
     from pxr import Tf, Usd, UsdGeom
 
-    from warpflat.errors import InputError
+    from warpflat.core.errors import InputError
 
     try:
         stage = Usd.Stage.Open(os.fspath(path))

@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
 from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian

@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 
 __all__ = ["ArmCurves", "Blueprint", "Profile", "QuarterCurves"]
 

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import IntArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
 
 __all__ = ["TRUNK_LEVELS", "Brick", "brick", "select_bricks"]

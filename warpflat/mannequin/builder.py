@@ -6,7 +6,7 @@ import itertools
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.mannequin.blueprint import Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Layout
 from warpflat.mannequin.profiles import arc_lengths, convex_girth, resample, scale_to_girth

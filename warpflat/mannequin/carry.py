@@ -6,8 +6,8 @@ import itertools
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
 from warpflat.mannequin.closest import Closest
 
 __all__ = ["Carrier"]

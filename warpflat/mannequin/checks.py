@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
 __all__ = ["self_intersections"]
 

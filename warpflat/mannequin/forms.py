@@ -9,12 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.file_names import checked_name, same_file
+from warpflat.core.text import shown
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
 from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
-from warpflat.names import checked_name, same_file
-from warpflat.words import shown
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -96,7 +96,7 @@ class FormResult:
 
 @functools.cache
 def _shipped() -> dict[str, Any]:
-    text = importlib.resources.files("warpflat.data").joinpath("forms.toml").read_text(encoding="utf-8")
+    text = importlib.resources.files("warpflat.mannequin").joinpath("data/forms.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 

@@ -14,8 +14,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.arrays import IntArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError
 
 __all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
@@ -21,7 +21,7 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import Form, FormResult
-    from warpflat.mannequin.scan import ScanOptions
+    from warpflat.mannequin.scan_pose import ScanOptions
 
 __all__ = ["Level", "Mannequin"]
 
@@ -105,7 +105,8 @@ class Mannequin:
         Raises:
             InputError: if the mesh is not a standing body with arms and legs that can be told apart.
         """
-        from warpflat.mannequin.scan import ScanOptions, blueprint_from_scan
+        from warpflat.mannequin.scan import blueprint_from_scan
+        from warpflat.mannequin.scan_pose import ScanOptions
 
         layout = make_layout(resolution_mm)
         found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())

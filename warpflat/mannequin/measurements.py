@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.errors import InputError, expect, is_number, nearest
+from warpflat.core.errors import InputError, expect, is_number, nearest
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -52,7 +52,7 @@ class Measurements:
 @functools.cache
 def size_tables() -> dict[str, Any]:
     """The contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
-    text = importlib.resources.files("warpflat.data").joinpath("sizes.toml").read_text(encoding="utf-8")
+    text = importlib.resources.files("warpflat.mannequin").joinpath("data/sizes.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 
 __all__ = ["face_normals", "vertex_normals"]
 

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from warpflat._version import __version__
-from warpflat.export.atomic import atomic_path, output_folder
-from warpflat.leftovers import require_own_metrics, write_metrics
+from warpflat.core.atomic_files import atomic_path, output_folder
+from warpflat.core.manifest import require_own_metrics, write_metrics
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 

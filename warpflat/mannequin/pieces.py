@@ -9,8 +9,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.mannequin.layout import Layout

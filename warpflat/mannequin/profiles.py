@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 
 __all__ = ["Section", "arc_lengths", "convex_girth", "resample", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
 

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
@@ -18,7 +18,7 @@ from warpflat.mannequin.scan_limbs import neck_and_arms
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, upright
 from warpflat.mannequin.table_body import PRINCESS
 
-__all__ = ["ScanFound", "ScanOptions", "blueprint_from_scan"]
+__all__ = ["ScanFound", "blueprint_from_scan"]
 
 # Smoothing of the sampled hulls: up the body [rows] and around it [harmonics kept].
 _UP_SIGMA = 1.5

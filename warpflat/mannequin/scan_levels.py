@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.mannequin.scan_pose import Slicer
 
 __all__ = ["TrunkSections", "find_levels", "trunk_sections"]

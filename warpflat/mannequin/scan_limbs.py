@@ -7,8 +7,8 @@ from collections.abc import Callable, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
 from warpflat.mannequin.profiles import arc_lengths, resample

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError, nearest
-from warpflat.surface.stray import stray_vertex, stray_words
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import IntArray
+from warpflat.core.arrays import IntArray
 from warpflat.mannequin.layout import Layout
 
 __all__ = ["sheet_laplacian"]

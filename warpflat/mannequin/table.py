@@ -9,14 +9,14 @@ from typing import Annotated, Literal
 
 from pydantic import Field, model_validator
 
-from warpflat.errors import InputError
-from warpflat.inputs import listening_to_reads, note_read
+from warpflat.core.errors import InputError
+from warpflat.core.input_files import listening_to_reads, note_read
+from warpflat.core.text import MADE_TO_MEASURE
+from warpflat.core.toml_file import Table
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import size_table
 from warpflat.mannequin.scan_pose import ScanOptions
-from warpflat.surface.read import read_scan
-from warpflat.toml_file import Table
-from warpflat.words import MADE_TO_MEASURE
+from warpflat.surface.io.read import read_scan
 
 __all__ = ["MannequinTable", "mannequin_from_scan_file", "mannequin_from_table"]
 

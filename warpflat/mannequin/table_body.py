@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables

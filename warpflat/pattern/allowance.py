@@ -12,8 +12,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.pieces import FOLD_STRAIGHT
 

@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.arrays import BoolArray, FloatArray, IndexArray
+from warpflat.core.arrays import BoolArray, FloatArray, IndexArray
 from warpflat.pattern.spline_lengths import with_lengths
 
 __all__ = ["Curve", "arc_lengths", "chords", "fit_curve", "turning_angles"]

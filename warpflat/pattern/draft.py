@@ -6,39 +6,30 @@ Everything that the files show is worked out here once; the writers of DXF, SVG,
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
+from warpflat.pattern.drafted import (
+    DraftedCutout,
+    DraftedDart,
+    DraftedEdge,
+    DraftedGarment,
+    DraftedPiece,
+    DrillHole,
+    SeamReport,
+)
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
-from warpflat.pattern.notches import (
-    SEAM_TOLERANCE,
-    Notch,
-    SeamReport,
-    cut_darts,
-    dart_notches,
-    seam_notches,
-    seam_reports,
-)
+from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Hole, Piece, Seam
-from warpflat.surface.drawn_legs import are_curved
+from warpflat.pattern.seam_difference import SEAM_TOLERANCE
+from warpflat.surface.cut.dart_legs import are_curved
 
-__all__ = [
-    "DraftedCutout",
-    "DraftedDart",
-    "DraftedEdge",
-    "DraftedGarment",
-    "DraftedPiece",
-    "DrillHole",
-    "draft_garment",
-    "draft_piece",
-    "eye_legs",
-    "nest_label",
-]
+__all__ = ["draft_garment", "draft_piece", "eye_legs", "nest_label"]
 
 
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
@@ -47,142 +38,6 @@ ALONG_GRAIN = np.radians(1.0)
 LEG, BETWEEN = 0.010, 0.005
 #: Points of the fold between curved legs.
 MIDDLE = 33
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DraftedEdge:
-    """An edge of the sewing line as a clean curve.
-
-    Attributes:
-        edge: as it came in.
-        curve: fitted, from corner to corner.
-        line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
-        width: the allowance [m] that it got.
-        places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
-        fit_error: how far [m] the curve keeps from these points, at most.
-        tolerance: how far [m] it was allowed to, beside what equal length takes.
-    """
-
-    edge: Edge
-    curve: Curve
-    line: FloatArray
-    width: float
-    places: FloatArray
-    fit_error: float
-    tolerance: float
-
-    @property
-    def name(self) -> str:
-        return self.edge.name
-
-    @property
-    def kind(self) -> str:
-        return self.edge.kind
-
-    @property
-    def length(self) -> float:
-        """Length [m] along the sewing line."""
-        return float(arc_lengths(self.line)[-1])
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DraftedDart:
-    """A dart's lines: the legs are edges; `fold` is #P by 2 [m], from the tip to the cut line (None where it is cut)."""
-
-    dart: Dart
-    tip: FloatArray
-    fold: FloatArray | None
-    fold_to: str
-    opening: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DraftedCutout:
-    """A hole that is cut out: its sewing and its cutting line (#P by 2 [m], closed), one if its allowance is 0 [m]."""
-
-    sew_line: FloatArray
-    cut_line: FloatArray
-    width: float
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DrillHole:
-    """A point [m] marked through the cloth."""
-
-    name: str
-    at: FloatArray
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DraftedPiece:
-    """One piece in one size with all its lines, in metres, grain upwards, its fixed point of grading in the origin.
-
-    Attributes:
-        piece: as it came in.
-        frame: 2 by 3, from the piece's coordinates to these (a rotation and a shift, never a scale).
-        edges: the sewing line in order, dart legs included.
-        cut_line: #P by 2 [m], closed, counter-clockwise, first point not repeated.
-        darts, drill_holes, notches: see their classes.
-        internal_lines, fisheyes: #P by 2 [m] by name; the latter closed.
-        cutouts: by name.
-        grain: 2 by 2 [m], from and to, upwards.
-        label: what is written on it, and where.
-        notes: what the cutter should know, one sentence each.
-    """
-
-    piece: Piece
-    frame: FloatArray
-    edges: tuple[DraftedEdge, ...]
-    cut_line: FloatArray
-    darts: tuple[DraftedDart, ...]
-    drill_holes: tuple[DrillHole, ...]
-    notches: tuple[Notch, ...]
-    internal_lines: Mapping[str, FloatArray]
-    cutouts: Mapping[str, DraftedCutout]
-    fisheyes: Mapping[str, FloatArray]
-    grain: FloatArray
-    label: Label
-    notes: tuple[str, ...]
-
-    @property
-    def name(self) -> str:
-        return self.piece.name
-
-    @property
-    def size(self) -> str:
-        return self.piece.size
-
-    @property
-    def sew_line(self) -> FloatArray:
-        """#P by 2 [m], the closed sewing line, dart legs included, first point not repeated."""
-        return np.concatenate([edge.line[:-1] for edge in self.edges])
-
-    @property
-    def fold_edges(self) -> tuple[DraftedEdge, ...]:
-        """The edges that lie on the fold of the cloth."""
-        return tuple(edge for edge in self.edges if edge.kind == "fold")
-
-    def edge(self, name: str) -> DraftedEdge:
-        """The edge of that name; InputError with the nearest name otherwise."""
-        self.piece.edge(name)
-        return next(edge for edge in self.edges if edge.name == name)
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class DraftedGarment:
-    """All pieces by size, and how well the sides of every seam agree."""
-
-    garment: Garment
-    pieces: Mapping[str, tuple[DraftedPiece, ...]]
-    seams: tuple[SeamReport, ...]
-
-    @property
-    def name(self) -> str:
-        return self.garment.name
-
-    def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
-        """One piece in every size, in the order of the sizes."""
-        return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
 
 
 def draft_garment(

@@ -8,17 +8,17 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
-from warpflat.pattern.draft import DraftedEdge, DraftedPiece, eye_legs, nest_label
+from warpflat.pattern.draft import eye_legs, nest_label
+from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
 from warpflat.pattern.label import Label
 from warpflat.pattern.lettering import Words, text_width
-from warpflat.pattern.notches import Notch
 
 if TYPE_CHECKING:
     from shapely import Polygon
 
-__all__ = ["Drawing", "Stroke", "Words", "draw_nest", "draw_piece", "grain_strokes"]
+__all__ = ["Drawing", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
 
 
 #: Arrow heads: length and half width [m].

@@ -6,10 +6,10 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
-from warpflat.pattern.notches import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 from warpflat.pattern.pieces import SAME_POINT, Piece, Seam, SeamSide
+from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 
 __all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy", "smooth_line"]
 

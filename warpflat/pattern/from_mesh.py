@@ -8,8 +8,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.arrays import FloatArray, IndexArray, IntArray
-from warpflat.errors import InputError, nearest
+from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
 from warpflat.surface.topology import border_loops

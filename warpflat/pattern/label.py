@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import size_words
 from warpflat.pattern.lettering import Words, text_width, wrapped
 from warpflat.pattern.pieces import Piece
-from warpflat.words import size_words
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon

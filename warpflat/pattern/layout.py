@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.pattern.draft import DraftedGarment, DraftedPiece, nest_label
+from warpflat.core.arrays import FloatArray
+from warpflat.pattern.draft import nest_label
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 
 __all__ = ["Placed", "Sheet", "lay_out", "nests", "taken_by"]
 

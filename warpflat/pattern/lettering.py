@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 
 __all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrapped"]
 

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError, nearest
-from warpflat.pattern.draft import DraftedEdge, DraftedGarment, DraftedPiece
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import size_words
+from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label
 from warpflat.pattern.pieces import unknown_size
-from warpflat.words import size_words
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 

@@ -3,92 +3,31 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.pattern.allowance import CutOutline, Wedge
 from warpflat.pattern.curves import arc_lengths
+from warpflat.pattern.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.seam_difference import worst_difference
 
-if TYPE_CHECKING:
-    from warpflat.pattern.draft import DraftedPiece
-
-__all__ = ["Notch", "SeamReport", "cut_darts", "dart_notches", "seam_notches", "seam_reports", "worst_difference"]
+__all__ = ["cut_darts", "dart_notches", "seam_notches", "seam_reports"]
 
 
 #: Notches are cut this deep [m], and never deeper than this share of the allowance.
 DEPTH, SHARE = 0.005, 0.6
 #: Depth [m] on an edge without allowance.
 RAW_DEPTH = 0.003
-#: The two slits of a double notch stand this far [m] apart.
-DOUBLE_SPACING = 0.008
 #: Seams shorter than this [m] get no notch of their own; longer ones get one per `SPACING` [m].
 SHORTEST, SPACING = 0.080, 0.200
+#: The two slits of a double notch stand this far [m] apart.
+DOUBLE_SPACING = 0.008
 #: A notch this close [m] to a joint of edges would be lost in it.
 CLEAR = 0.012
 #: A place at which one side cannot be notched is tried again at these shares of its length from the seam's start.
 NEARER = (1.0, 0.5, 0.25)
-#: Sides of a seam may differ by this [m], and by this over any stretch of `STRETCH` [m].
-SEAM_TOLERANCE, LOCAL_TOLERANCE = 5e-4, 2e-4
-STRETCH = 0.050
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Notch:
-    """One notch.
-
-    Attributes:
-        seam: the seam, or the dart, that it belongs to.
-        edge: the edge on which it stands.
-        length: its place [m] along the seam from the seam's start, measured on this side.
-        at: its point [m] on the sewing line.
-        base: where it starts on the cut line [m]; a double notch has two.
-        direction: unit vector into the piece.
-        depth: [m].
-    """
-
-    seam: str
-    edge: str
-    length: float
-    at: FloatArray
-    base: tuple[FloatArray, ...]
-    direction: FloatArray
-    depth: float
-
-    @property
-    def double(self) -> bool:
-        return len(self.base) == 2
-
-
-@dataclass(frozen=True, kw_only=True)
-class SeamReport:
-    """How the two sides of a seam agree in one size.
-
-    Attributes:
-        name, size: of the seam.
-        sides: each side's edges, as "piece.edge + piece.edge".
-        length_mm: of both sides [mm].
-        ease: what the seam asks for.
-        difference_mm: what the second side is too long (or, negative, too short) for that ease [mm].
-        local_mm: the same over the worst 50 mm of the first side, without its sign, measured between the vertices of
-            the mesh that both sides share; None where they come from no mesh, or not with the same vertices.
-    """
-
-    name: str
-    size: str
-    sides: tuple[str, str]
-    length_mm: tuple[float, float]
-    ease: float
-    difference_mm: float
-    local_mm: float | None = None
-
-    @property
-    def matches(self) -> bool:
-        near = self.local_mm is None or self.local_mm <= LOCAL_TOLERANCE * 1000
-        return near and abs(self.difference_mm) <= SEAM_TOLERANCE * 1000
 
 
 def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
@@ -109,97 +48,6 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
             )
         )
     return reports
-
-
-def worst_difference(first: FloatArray, second: FloatArray, ease: float) -> float | None:
-    """How far [m] two sides of a seam differ over the worst `STRETCH` of it; None if they do not share their vertices.
-
-    Args:
-        first, second: #P, the lengths [m] at which both sides have their common vertices.
-        ease: by how much the second is meant to be longer, as a share.
-    """
-    if len(first) != len(second):
-        return None
-    starts = np.unique(np.concatenate([first, first - STRETCH]))
-    starts = starts[(starts >= 0) & (starts <= first[-1] - STRETCH)]
-    starts = starts if len(starts) else first[:1]
-    ends = np.minimum(starts + STRETCH, first[-1])
-    stretch = np.interp(ends, first, second) - np.interp(starts, first, second)
-    return float(np.abs(stretch - (ends - starts) * (1 + ease)).max())
-
-
-def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
-    """The worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
-    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
-        return None
-    worst = worst_difference(one.places, other.places, ease)
-    return None if worst is None else 1000 * worst
-
-
-class _Chain:
-    """One side of a seam as one long line, run in the seam's direction."""
-
-    def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
-        self.side = side
-        self.pieces = [pieces[s.piece] for s in side]
-        self.edges = [piece.edge(s.edge) for piece, s in zip(self.pieces, side, strict=True)]
-        self.lines = [edge.line[::-1] if s.reversed else edge.line for edge, s in zip(self.edges, side, strict=True)]
-        self.arcs = [arc_lengths(line) for line in self.lines]
-        self.joints = np.concatenate([[0.0], np.cumsum([arc[-1] for arc in self.arcs])])
-
-    @property
-    def length(self) -> float:
-        return float(self.joints[-1])
-
-    @property
-    def places(self) -> FloatArray:
-        """The length at each point of the edges as they came in, joints once."""
-        rows: list[FloatArray] = []
-        for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
-            along = edge.length - edge.places[::-1] if side.reversed else edge.places
-            rows.append(start + along[bool(rows) :])
-        return np.concatenate(rows)
-
-    def index(self, length: float) -> int:
-        """The edge on which that length falls."""
-        return int(np.clip(np.searchsorted(self.joints, length, side="right") - 1, 0, len(self.lines) - 1))
-
-    def piece_name(self, length: float) -> str:
-        return self.side[self.index(length)].piece
-
-    def mirrored(self, length: float) -> bool:
-        """Whether the edge there is that of a second copy, cut turned over."""
-        return self.side[self.index(length)].mirrored
-
-    def notch(self, seam: str, length: float, double: bool) -> Notch | None:
-        """A notch at that length; both slits of a double one lie as far to either side of it.
-
-        None where the cut line does not run along the edge, since the allowance there meets another one.
-        """
-        index = self.index(length)
-        piece, edge = self.pieces[index], self.edges[index]
-        local = length - self.joints[index]
-        at, direction = self._frame(index, local)
-        offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
-        found = [_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets]
-        base = tuple(point for point in found if point is not None)
-        if len(base) < len(offsets):
-            return None
-        depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
-        return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
-
-    def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
-        """Point on the sewing line and unit normal into the piece."""
-        line, arc = self.lines[index], self.arcs[index]
-        length = float(np.clip(length, 0.0, arc[-1]))
-        step = int(np.clip(np.searchsorted(arc, length) - 1, 0, len(line) - 2))
-        span = float(arc[step + 1] - arc[step])
-        at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
-        # The direction over a few millimetres: that of a single short chord would jitter.
-        near, far = (np.array([np.interp(x, arc, line[:, k]) for k in (0, 1)]) for x in (length - 2e-3, length + 2e-3))
-        tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
-        inwards = np.array([-tangent[1], tangent[0]])
-        return at, -inwards if self.side[index].reversed else inwards
 
 
 def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> dict[str, list[Notch]]:
@@ -305,3 +153,77 @@ def _base(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArra
     if len(hits) == 0:
         return None
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
+
+
+def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
+    """The worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
+    if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
+        return None
+    worst = worst_difference(one.places, other.places, ease)
+    return None if worst is None else 1000 * worst
+
+
+class _Chain:
+    """One side of a seam as one long line, run in the seam's direction."""
+
+    def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
+        self.side = side
+        self.pieces = [pieces[s.piece] for s in side]
+        self.edges = [piece.edge(s.edge) for piece, s in zip(self.pieces, side, strict=True)]
+        self.lines = [edge.line[::-1] if s.reversed else edge.line for edge, s in zip(self.edges, side, strict=True)]
+        self.arcs = [arc_lengths(line) for line in self.lines]
+        self.joints = np.concatenate([[0.0], np.cumsum([arc[-1] for arc in self.arcs])])
+
+    @property
+    def length(self) -> float:
+        return float(self.joints[-1])
+
+    @property
+    def places(self) -> FloatArray:
+        """The length at each point of the edges as they came in, joints once."""
+        rows: list[FloatArray] = []
+        for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
+            along = edge.length - edge.places[::-1] if side.reversed else edge.places
+            rows.append(start + along[bool(rows) :])
+        return np.concatenate(rows)
+
+    def index(self, length: float) -> int:
+        """The edge on which that length falls."""
+        return int(np.clip(np.searchsorted(self.joints, length, side="right") - 1, 0, len(self.lines) - 1))
+
+    def piece_name(self, length: float) -> str:
+        return self.side[self.index(length)].piece
+
+    def mirrored(self, length: float) -> bool:
+        """Whether the edge there is that of a second copy, cut turned over."""
+        return self.side[self.index(length)].mirrored
+
+    def notch(self, seam: str, length: float, double: bool) -> Notch | None:
+        """A notch at that length; both slits of a double one lie as far to either side of it.
+
+        None where the cut line does not run along the edge, since the allowance there meets another one.
+        """
+        index = self.index(length)
+        piece, edge = self.pieces[index], self.edges[index]
+        local = length - self.joints[index]
+        at, direction = self._frame(index, local)
+        offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
+        found = [_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets]
+        base = tuple(point for point in found if point is not None)
+        if len(base) < len(offsets):
+            return None
+        depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
+        return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
+
+    def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
+        """Point on the sewing line and unit normal into the piece."""
+        line, arc = self.lines[index], self.arcs[index]
+        length = float(np.clip(length, 0.0, arc[-1]))
+        step = int(np.clip(np.searchsorted(arc, length) - 1, 0, len(line) - 2))
+        span = float(arc[step + 1] - arc[step])
+        at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
+        # The direction over a few millimetres: that of a single short chord would jitter.
+        near, far = (np.array([np.interp(x, arc, line[:, k]) for k in (0, 1)]) for x in (length - 2e-3, length + 2e-3))
+        tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
+        inwards = np.array([-tangent[1], tangent[0]])
+        return at, -inwards if self.side[index].reversed else inwards

@@ -10,11 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike
 
-from warpflat.arrays import FloatArray, IntArray
-from warpflat.errors import InputError, nearest
-from warpflat.names import checked_label
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.file_names import checked_label
+from warpflat.core.text import size_words
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
-from warpflat.words import size_words
 
 if TYPE_CHECKING:
     import shapely

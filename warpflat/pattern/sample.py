@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]

@@ -6,9 +6,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
+from warpflat.core.launch import launch_each
 from warpflat.kernels.curvature import fit_curvature
-from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.unfold import vertex_normals
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 import warp as wp
 
-from warpflat.arrays import BoolArray, IntArray
+from warpflat.core.arrays import BoolArray, IntArray
 from warpflat.kernels.lattice import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row

@@ -11,9 +11,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from warpflat.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Surface", "forget", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
+__all__ = ["Surface", "forget", "is_large", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
 
 Result = TypeVar("Result")
 
@@ -121,3 +121,12 @@ def read_only(arrays: Result) -> Result:
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
     return arrays
+
+
+# On the way to the relaxation of more triangles so much is freed that giving it back is worth a twentieth of the time.
+_MUCH_IS_FREED = 50_000
+
+
+def is_large(surface: Surface) -> bool:
+    """Whether what is worked out on the way to a piece's relaxation is worth to be let go of."""
+    return len(surface.vertices) > _MUCH_IS_FREED

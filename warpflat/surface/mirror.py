@@ -7,8 +7,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from warpflat.arrays import IntArray
-from warpflat.errors import InputError
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError
 from warpflat.surface.topology import half_edges
 
 __all__ = ["mirror_partners"]

@@ -11,7 +11,8 @@ from functools import cached_property
 import numpy as np
 import warp as wp
 
-from warpflat.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.launch import launch_each
 from warpflat.kernels.lattice import (
     is_row_by_row,
     list_corners,
@@ -20,7 +21,6 @@ from warpflat.kernels.lattice import (
     list_stiffness,
     list_values,
 )
-from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface, once_per_faces
 
 __all__ = ["RowByRow", "row_by_row"]

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.launch import launch_each
 from warpflat.kernels.strain import measure_flat_cells
-from warpflat.launching import launch_each
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import corner_triangles, half_edges_of
 from warpflat.surface.unfold import corners_of

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.arrays import FloatArray
+from warpflat.core.arrays import FloatArray
 
 __all__ = ["cross", "dot", "norm", "points_at"]
 

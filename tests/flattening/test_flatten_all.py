@@ -1,0 +1,360 @@
+"""Many pieces at once: each with the pattern, the energy and the history that it would have alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+from devices import DEVICE
+from scipy.spatial import cKDTree
+
+import warpflat
+from warpflat.core.errors import InputError
+from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import find_fabric
+from warpflat.flattening.flatten_all import flatten_all
+from warpflat.flattening.flatten_piece import flatten
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.model.join import join_networks, join_surfaces
+from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import springs_of
+from warpflat.model.wear import Wear
+from warpflat.solver.multigrid.cycle import Levels
+from warpflat.solver.multigrid.solve import _Cycles, _Pace, levels_pay, relax_multilevel
+from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface.cells import cells_of
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
+from warpflat.surface.topology import border_loops
+
+CLOTH = Fabric(
+    name="cloth",
+    stiffness_warp=1000.0,
+    stiffness_weft=600.0,
+    shear_stiffness=150.0,
+    areal_density=0.15,
+    poisson_ratio=0.2,
+)
+
+
+def shape(name: str, resolution: int, *, size: float = 1.0, triangles: bool = False) -> Surface:
+    made = make_shape(name, resolution=resolution, triangles=triangles)
+    return make_surface(size * made.vertices, made.faces, lines=made.lines, name=f"{name} {size:.3g}")
+
+
+def potential(piece: Flattening) -> float:
+    return piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j
+
+
+def outline_difference(one: Flattening, other: Flattening) -> float:
+    """Largest distance of the outlines [m], each about its centre: nothing says where on the cloth a piece lies."""
+    loops = [np.concatenate(border_loops(piece.faces)) for piece in (one, other)]
+    lines = [
+        piece.positions[loop] - piece.positions[loop].mean(0) for piece, loop in zip((one, other), loops, strict=True)
+    ]
+    return float(cKDTree(lines[0]).query(lines[1])[0].max())
+
+
+def check(surfaces: Sequence[Surface], **options: object) -> list[Flattening]:
+    """That all at once give what one after the other do."""
+    given = {"fabric": CLOTH, "datum": "centre", "device": DEVICE, **options}
+    batch = flatten_all(surfaces, **given)
+    assert len(batch) == len(surfaces)
+    for surface, piece in zip(surfaces, batch, strict=True):
+        alone = flatten(surface, **given)
+        assert piece.surface is surface
+        assert piece.network.surface is surface
+        assert piece.converged
+        assert piece.flipped_faces == 0
+        assert potential(piece) == pytest.approx(potential(alone), rel=1e-3)
+        assert outline_difference(piece, alone) < 1e-4
+        assert [stage.name for stage in piece.stages] == ["develop", "relax"]
+        assert piece.stages[0].spring_energy_j == pytest.approx(alone.stages[0].spring_energy_j, rel=1e-12)
+        assert piece.stages[0].strain_energy_j == pytest.approx(alone.stages[0].strain_energy_j, rel=1e-12)
+        assert piece.stages[1].strain_energy_j == pytest.approx(piece.worn.energy.sum(), rel=1e-12)
+        assert piece.stages[1].residual <= RelaxOptions().residual_tolerance
+        np.testing.assert_allclose(
+            piece.history[-1, 1:3], [piece.stages[1].spring_energy_j, piece.stages[1].guard_energy_j]
+        )
+        assert piece.history[-1, 0] == piece.stages[1].steps
+        assert piece.notes == alone.notes
+        assert piece.measures["length_error"] == pytest.approx(alone.measures["length_error"], rel=1e-2)
+    return batch
+
+
+@pytest.mark.parametrize("name", ["dome", "bodice"])
+def test_sizes_of_a_grid(name: str):
+    check([shape(name, 21, size=size) for size in (0.9, 1.0, 1.15)])
+
+
+def test_pieces_of_unlike_sizes_and_meshes():
+    """Levels of other depths, onsets of their own, some that need many more cycles than others, and one of a single level."""
+    check(
+        [
+            shape("bodice", 33),
+            shape("dome", 9),
+            shape("saddle", 17),
+            shape("bodice", 33, triangles=True),
+            shape("dome", 21, size=0.5, triangles=True),
+        ],
+        fabric=find_fabric("interlock"),
+    )
+
+
+def test_pieces_for_which_levels_do_not_pay():
+    pieces = [shape("dome", 17, triangles=True), shape("bodice", 15, triangles=True), shape("bodice", 17)]
+    batch = check(pieces, fabric="woven")
+    assert [levels_pay(piece.network) for piece in batch] == [False, False, True]
+
+
+def test_plain_steps():
+    batch = check(
+        [shape("dome", 15), shape("bodice", 15), shape("dome", 15, size=1.2)], relax=RelaxOptions(solver="plain")
+    )
+    # Each is stepped until it has come to rest itself, or until it is worth while to go on without it.
+    assert batch[0].stages[-1].steps < batch[1].stages[-1].steps
+
+
+def test_the_membrane_worn_stretched():
+    check(
+        [shape("dome", 13, triangles=True), shape("bodice", 13)],
+        fabric="jersey",
+        model="membrane",
+        wear=Wear(stretch_warp=0.05, stretch_weft=0.1),
+    )
+
+
+def test_repeated_pieces_are_as_alone_bit_for_bit():
+    """Nothing of one piece gets to another: of the same three each is what one alone is."""
+    alone = flatten(shape("dome", 21), fabric=CLOTH, datum="centre", device=DEVICE)
+    for piece in flatten_all([shape("dome", 21) for _ in range(3)], fabric=CLOTH, datum="centre", device=DEVICE):
+        np.testing.assert_allclose(piece.positions, alone.positions, atol=1e-12)
+        assert piece.stages[-1].steps == alone.stages[-1].steps
+
+
+def test_a_piece_of_a_batch_can_be_cut():
+    surfaces = [shape("dome", 21), shape("bodice", 17)]
+    piece = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE)[0]
+    alone = flatten(surfaces[0], fabric=CLOTH, datum="centre", device=DEVICE)
+    path = np.arange(21 * 21, dtype=np.int32).reshape(21, 21)[:12, 6]
+    plan = CutPlan(name="dart", paths=(path,))
+    assert potential(cut(piece, plan)) == pytest.approx(potential(cut(alone, plan)), rel=1e-3)
+
+
+def test_datums_of_their_own_and_a_chosen_one():
+    surfaces = [shape("dome", 13), shape("bodice", 13)]
+    line = surfaces[1].lines["centre"]
+    given, chosen = flatten_all(surfaces[::-1], fabric=CLOTH, datum=[line, None], device=DEVICE)
+    np.testing.assert_array_equal(given.datum, line)
+    assert chosen.notes[-1].startswith("datum chosen")
+
+
+def test_what_is_told_on_the_way():
+    surfaces = [shape("dome", 13), shape("bodice", 21)]
+    told: dict[int, list[Progress]] = {0: [], 1: []}
+    layouts: dict[int, list[np.ndarray]] = {0: [], 1: []}
+
+    def hear(number: int, progress: Progress) -> None:
+        told[number].append(progress)
+        layouts[number].append(progress.positions())
+        assert progress.face_energy_density().shape == (len(surfaces[number].faces),)
+
+    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE, callback=hear)
+    for number, piece in enumerate(batch):
+        assert told[number][0].stage == "develop"
+        assert told[number][0].step == 0
+        assert {progress.stage for progress in told[number][1:]} == {"relax"}
+        assert told[number][0].surface is surfaces[number]
+        np.testing.assert_array_equal(layouts[number][0], piece.development.positions)
+        assert layouts[number][-1].shape == piece.positions.shape
+        assert told[number][0].spring_energy == piece.stages[0].spring_energy_j
+        assert told[number][-1].step == piece.stages[-1].steps
+
+
+def test_a_work_limit_is_told_of_those_that_met_it():
+    surfaces = [shape("bodice", 33), make_surface(*flat_sheet(), lines={"centre": np.arange(4, 49, 9)})]
+    batch = flatten_all(surfaces, fabric=CLOTH, datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=20))
+    assert [piece.converged for piece in batch] == [False, True]
+
+
+def flat_sheet() -> tuple[np.ndarray, np.ndarray]:
+    across, up = np.meshgrid(np.linspace(0, 0.2, 9), np.linspace(0, 0.1, 5))
+    index = np.arange(45).reshape(5, 9)
+    faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
+    return np.column_stack([across.ravel(), up.ravel(), np.zeros(45)]), faces
+
+
+def test_nothing_is_nothing():
+    assert flatten_all([]) == []
+
+
+def test_what_is_wrong_with_a_piece_is_told_with_its_name():
+    surfaces = [shape("dome", 9), shape("bodice", 9)]
+    with pytest.raises(InputError, match=r"piece 'bodice 1' has no line 'center' for its datum; did you mean 'centre'"):
+        flatten_all(surfaces, datum=["centre", "center"], device=DEVICE)
+    with pytest.raises(InputError, match=r"^vertex 5000 does not exist in 'bodice 1'"):
+        flatten_all(surfaces, datum=["centre", [0, 5000]], device=DEVICE)
+    with pytest.raises(
+        InputError, match=r"^piece 'bodice 1' \(surface 1\): a line needs at least two different vertices"
+    ):
+        flatten_all(surfaces, datum=["centre", [3, 3]], device=DEVICE)
+    with pytest.raises(InputError, match=r"datum has 1 entries for 2 surfaces"):
+        flatten_all(surfaces, datum=["centre"], device=DEVICE)
+    with pytest.raises(InputError, match=r"^unknown fabric 'wooven'"):
+        flatten_all(surfaces, fabric="wooven", datum="centre", device=DEVICE)
+    with pytest.raises(InputError, match=r"^relax: max_steps = 0"):
+        flatten_all(surfaces, relax=RelaxOptions(max_steps=0), datum="centre", device=DEVICE)
+
+
+def test_it_is_offered_beside_flatten():
+    assert warpflat.flatten_all is flatten_all
+    assert "flatten_all" in dir(warpflat)
+
+
+# --- joined networks
+
+
+def networks(**options: object) -> list[SpringNetwork]:
+    surfaces = [shape("dome", 9, triangles=True), shape("bodice", 7), shape("saddle", 8, triangles=True)]
+    return [
+        SpringNetwork.build(surface, CLOTH, surface.vertices[:, :2], device=DEVICE, **options) for surface in surfaces
+    ]
+
+
+def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
+    parts = networks()
+    joined = join_networks(parts)
+    surface = join_surfaces([part.surface for part in parts])
+    np.testing.assert_array_equal(joined.surface.faces, surface.faces)
+    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), cells_of(surface)
+    np.testing.assert_array_equal(joined.springs.offset.numpy(), springs.around.offset)
+    np.testing.assert_array_equal(joined.springs.neighbor.numpy(), springs.around.neighbor)
+    np.testing.assert_array_equal(joined.springs.rest_length.numpy(), springs.listed_length)
+    assert joined.spring_arrays.edge_count == springs.edge_count
+    for ends in (joined.spring_arrays.ends, springs.ends):
+        assert len(np.unique(np.sort(ends, axis=1), axis=0)) == joined.spring_count
+    np.testing.assert_array_equal(joined.mass.numpy(), CLOTH.areal_density * cells.vertex_areas)
+    # Cells come in another order, quads first: by their corners.
+    order, wished = (np.lexsort(np.sort(corner, axis=1).T) for corner in (joined.cell_arrays.corner, cells.corner))
+    np.testing.assert_array_equal(joined.cell_arrays.face[order], cells.face[wished])
+    np.testing.assert_array_equal(joined.cell_arrays.area[order], cells.area[wished])
+    around = joined.cell_arrays.around
+    vertex = np.repeat(np.arange(joined.vertex_count), np.diff(around.offset))
+    np.testing.assert_array_equal(joined.cell_arrays.faces.ravel()[around.entry], vertex)
+
+
+@pytest.mark.parametrize("stretched", [False, True])
+@pytest.mark.parametrize("model", ["springs", "membrane"])
+def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, stretched: bool):
+    parts = networks(model=model)
+    if stretched:
+        parts = [
+            SpringNetwork.build(
+                part.surface,
+                CLOTH,
+                part.surface.vertices[:, :2],
+                device=DEVICE,
+                model=model,
+                stretch=np.full((len(part.surface.faces), 2), 1.02 + 0.01 * number),
+            )
+            for number, part in enumerate(parts)
+        ]
+    starts = [0.8 * part.surface.vertices[:, :2] for part in parts]
+    joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
+    alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
+    forces = joined.forces()
+    for piece, state in enumerate(alone):
+        np.testing.assert_array_equal(forces[joined.vertices[piece]], state.forces())
+        np.testing.assert_allclose(joined.piece_energies()[piece], state.piece_energies()[0], rtol=1e-12)
+        np.testing.assert_allclose(joined.residuals()[piece], state.residuals()[0], rtol=1e-12)
+    if model == "springs":
+        # Between triangles threads are held by less, by each mesh's own measure.
+        assert len({tuple(row) for row in joined.network.cells.onset.numpy().tolist()}) == 3
+        assert min(state.energies().guard for state in alone) > 0.0
+
+
+def test_pieces_brake_each_on_its_own():
+    """Steps of a joined network are those of its parts, whose velocities are set to zero at other steps."""
+    surfaces = [shape("dome", 9), shape("bodice", 11), shape("saddle", 9)]
+    parts, starts = [], []
+    for surface in surfaces:
+        starts.append(1.1 * flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
+        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
+    joined = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
+    alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
+    joined.sweep(60)
+    for piece, state in enumerate(alone):
+        state.sweep(60)
+        np.testing.assert_allclose(joined.positions()[joined.vertices[piece]], state.positions(), atol=1e-14)
+    assert len({state.restarts for state in alone}) > 1
+
+
+def test_levels_of_unlike_pieces_are_joined():
+    surfaces = [shape("dome", 33), shape("dome", 9), shape("bodice", 21)]
+    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
+    start = np.concatenate([each.vertices[:, :2] for each in surfaces])
+    levels = Levels(Relaxation(join_networks(parts), RelaxOptions(), start=start))
+    # The dome of 9 by 9 has none, and stays, as the bodice's of 11 by 11 does.
+    assert levels.sizes == [33**2 + 9**2 + 21**2, 17**2 + 9**2 + 11**2, 9**2 + 9**2 + 11**2]
+
+
+def test_pieces_that_leave_are_given_back():
+    surfaces = [shape("dome", 13), shape("bodice", 15)]
+    parts, starts = [], []
+    for surface in surfaces:
+        starts.append(flatten(surface, fabric=CLOTH, datum="centre", device=DEVICE).development.positions)
+        parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=DEVICE))
+    whole = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
+    outcome = relax(whole)
+    assert outcome.converged
+    assert whole.last.at_rest.all()
+    assert len(set(whole.last.steps.tolist())) == 2
+    for piece, (part, start) in enumerate(zip(parts, starts, strict=True)):
+        state = Relaxation(part, RelaxOptions(), start=start)
+        alone = relax(state)
+        assert whole.last.steps[piece] == alone.steps
+        assert whole.last.residual[piece] == pytest.approx(alone.residual, rel=1e-9)
+        np.testing.assert_allclose(whole.positions()[whole.vertices[piece]], state.positions(), atol=1e-12)
+    kept = whole.keep([1])
+    np.testing.assert_array_equal(kept.positions(), whole.positions()[whole.vertices[1]])
+    assert kept.numbers == [1]
+    assert kept.last.total == whole.last.of([1]).total
+
+
+def test_pieces_that_are_done_are_cycled_no_more():
+    surfaces = [shape("dome", 13), shape("bodice", 13), shape("saddle", 13), shape("dome", 13, size=0.8)]
+    parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
+    start = np.concatenate([each.vertices[:, :2] for each in surfaces])
+    state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
+    state.begin()
+    cycles = _Cycles(state=state, levels=Levels(state), paces=[_Pace() for _ in parts])
+    assert cycles.without_done() is None
+    cycles.paces[1].near = cycles.paces[2].near = True
+    left = cycles.without_done()
+    assert list(left.state.numbers) == [0, 3]
+    assert left.paces == [cycles.paces[0], cycles.paces[3]]
+    assert left.levels.sizes[0] == left.state.network.vertex_count == 2 * 13**2
+    np.testing.assert_array_equal(left.state.positions(), start.reshape(4, -1, 2)[[0, 3]].reshape(-1, 2))
+
+
+def test_what_is_cycled_apart_comes_to_the_same_minimum(monkeypatch: pytest.MonkeyPatch):
+    surfaces = [shape("bodice", 33), shape("dome", 17), shape("bodice", 17, size=1.2)]
+    starts = [flatten(each, fabric="woven", datum="centre", device=DEVICE).development.positions for each in surfaces]
+    parts = [
+        SpringNetwork.build(each, find_fabric("woven"), start, device=DEVICE)
+        for each, start in zip(surfaces, starts, strict=True)
+    ]
+    energies = []
+    for share in (0.01, 2.0):  # leave as soon as they can, and never
+        monkeypatch.setattr("warpflat.solver.relax._LEAVE", share)
+        state = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
+        outcome = relax_multilevel(state)
+        assert outcome.converged
+        assert len(set(state.last.steps.tolist())) == (1 if share > 1.0 else 3)
+        np.testing.assert_allclose(state.last.energies, state.piece_energies(), atol=1e-9)
+        energies.append(state.last.potential)
+    np.testing.assert_allclose(*energies, rtol=1e-5)

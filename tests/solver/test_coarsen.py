@@ -1,0 +1,505 @@
+"""Coarser levels: what they keep, how layouts go up from them, and that nothing is glued."""
+
+from __future__ import annotations
+
+import threading
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import warp as wp
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial import Delaunay
+
+from warpflat.model.springs import unweighed_springs
+from warpflat.solver.multigrid.coarsen import (
+    Coarser,
+    _prepare_levels,
+    _prolongation,
+    coarser,
+    coarser_surfaces,
+    has_coarser,
+    inherit_levels,
+    is_coarsest,
+    levels_meanwhile,
+    spread_surface,
+)
+from warpflat.solver.multigrid.grid_coarsening import SpreadKind
+from warpflat.surface.cells import cells_of
+from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
+from warpflat.surface.topology import (
+    border_loops,
+    components,
+    euler_characteristic,
+    half_edges_of,
+    non_manifold_edges,
+    non_manifold_vertices,
+)
+from warpflat.surface.untangle import signed_cell_areas
+
+FloatArray = NDArray[np.float64]
+
+KINDS: tuple[SpreadKind, ...] = ("fine", "halves", "thirds")
+
+
+def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
+    """A flat rectangle of 10 mm cells."""
+    x, y = np.meshgrid(0.01 * np.arange(columns), 0.01 * np.arange(rows))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    if triangles:
+        none = np.full((len(faces), 1), -1)
+        faces = np.concatenate([np.hstack([faces[:, k], none]) for k in ([0, 1, 2], [0, 2, 3])])
+    return make_surface(np.stack([x, y, 0 * x], axis=-1).reshape(-1, 3), faces)
+
+
+def flat(surface: Surface) -> FloatArray:
+    return surface.vertices[:, :2]
+
+
+def made(surface: Surface, layout: FloatArray | None = None) -> Coarser:
+    step = coarser(surface, flat(surface) if layout is None else layout)
+    assert step is not None
+    return step
+
+
+@pytest.mark.parametrize(("columns", "rows"), [(9, 5), (17, 17), (8, 11), (33, 6)])
+def test_a_grid_keeps_every_second_row_and_column(columns: int, rows: int):
+    surface = sheet(columns, rows)
+    shuffled = np.random.default_rng(0).permutation(len(surface.vertices))
+    number = np.argsort(shuffled)
+    mixed = make_surface(surface.vertices[shuffled], number[surface.faces])
+    for piece in (surface, mixed):
+        step = made(piece)
+        assert step.surface.is_quad.all()
+        assert len(step.kept) == ((columns + 1) // 2) * ((rows + 1) // 2)
+        corners = {(0.0, 0.0), (0.01 * (columns - 1), 0.0), (0.0, 0.01 * (rows - 1))}
+        assert corners <= {(x, y) for x, y in step.surface.vertices[:, :2].tolist()}
+        np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(piece), atol=1e-15)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_triangles_lose_three_quarters_and_stay_a_mesh(seed: int):
+    rng = np.random.default_rng(seed)
+    points = np.concatenate([rng.uniform(size=(900, 2)), [[0, 0], [1, 0], [1, 1], [0, 1]]])
+    faces = Delaunay(points).simplices
+    surface = make_surface(np.column_stack([points, 0.1 * np.sin(5 * points[:, 0])]), faces)
+    step = made(surface)
+    count = len(surface.vertices)
+    assert 0.15 * count < len(step.kept) < 0.4 * count
+    assert not len(non_manifold_edges(step.surface.faces))
+    assert components(step.surface.faces).max() == 0
+    assert len(border_loops(step.surface.faces)) == 1
+    assert (signed_cell_areas(step.surface.faces[:, :3], flat(surface)[step.kept]) > 0).all()
+    np.testing.assert_allclose(step.prolongation.sum(axis=1), 1.0, atol=1e-12)
+    assert step.prolongation.data.min() >= 0.0
+    # A kept vertex is where it was.
+    np.testing.assert_allclose((step.prolongation @ step.surface.vertices)[step.kept], surface.vertices[step.kept])
+
+
+def test_inside_a_flat_mesh_the_way_up_is_exact_for_linear_layouts():
+    surface = sheet(21, 21, triangles=True)
+    step = made(surface)
+    inside = (flat(surface) > 1e-6).all(axis=1) & (flat(surface) < 0.2 - 1e-6).all(axis=1)
+    layout = flat(surface) @ np.array([[1.1, 0.2], [-0.1, 0.9]])
+    np.testing.assert_allclose((step.prolongation @ layout[step.kept])[inside], layout[inside], atol=1e-12)
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_the_sides_of_a_crack_stay_apart(triangles: bool):
+    whole = make_shape("dome", resolution=25, triangles=triangles)
+    column = np.arange(25 * 25, dtype=np.int32).reshape(25, 25)[:15, 8]
+    cut = cut_along(whole.faces, column, vertex_count=len(whole.vertices))
+    surface = make_surface(whole.vertices[cut.vertex_origin], cut.faces)
+    layout = surface.vertices[:, :2]
+    left = layout[:, 0] < whole.vertices[column[0], 0] - 1e-9
+    twins = {}
+    for vertex, origin in enumerate(cut.vertex_origin):
+        twins.setdefault(int(origin), []).append(vertex)
+    sides = [pair for pair in twins.values() if len(pair) == 2]
+    assert len(sides) == 14
+    for _ in range(3):
+        step = made(surface, layout)
+        coarse = step.surface
+        assert len(border_loops(coarse.faces)) == 1
+        assert not len(non_manifold_edges(coarse.faces))
+        # Below the tip, no face has vertices on both sides; the twins of the crack belong to the side of their faces.
+        side = np.where(left[step.kept], -1, 1)
+        below = layout[step.kept, 1] < whole.vertices[column[-1], 1] - 0.05
+        on_line = np.isclose(layout[step.kept, 0], whole.vertices[column[0], 0])
+        for face in coarse.faces:
+            corners = face[face >= 0]
+            sure = corners[below[corners] & ~on_line[corners]]
+            if below[corners].all():
+                assert len(set(side[sure].tolist())) <= 1
+        surface, layout, left = coarse, layout[step.kept], left[step.kept]
+
+
+@given(st.integers(0, 10_000), st.floats(0.0, 0.3))
+@example(868, 0.0)  # with a sliver beside a face that is almost one, along its border
+@settings(max_examples=25, deadline=None)
+def test_any_mesh_becomes_a_mesh_without_mirrored_triangles(seed: int, relief: float):
+    rng = np.random.default_rng(seed)
+    points = rng.uniform(size=(rng.integers(40, 300), 2))
+    surface = make_surface(np.column_stack([points, relief * rng.normal(size=len(points))]), Delaunay(points).simplices)
+    layout = surface.vertices[:, :2]
+    step = coarser(surface, layout)
+    if step is None:
+        return
+    assert not len(non_manifold_edges(step.surface.faces))
+    assert (signed_cell_areas(step.surface.faces[:, :3], layout[step.kept]) > 0).all()
+    assert np.isfinite(step.prolongation.data).all()
+    np.testing.assert_allclose(step.prolongation.sum(axis=1), 1.0, atol=1e-12)
+
+
+def jittered(side: int, *, hole: bool = False, seed: int = 0) -> Surface:
+    """A dome of irregular triangles over the unit square, with even borders; with a square hole in the middle."""
+    rng = np.random.default_rng(seed)
+    x, y = (axis.ravel() for axis in np.meshgrid(np.linspace(0, 1, side), np.linspace(0, 1, side)))
+    inner = (np.minimum(x, y) > 0) & (np.maximum(x, y) < 1)
+    points = np.column_stack([x, y]) + np.where(inner[:, None], rng.uniform(-0.3, 0.3, (len(x), 2)) / side, 0.0)
+    faces = Delaunay(points).simplices
+    corners = points[faces]
+    a, b = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    # Delaunay leaves needles along straight borders.
+    kept = np.abs(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) > 0.05 / side**2
+    if hole:
+        kept &= (np.abs(corners.mean(axis=1) - 0.5) > 0.15).any(axis=1)
+    height = np.sqrt(1.0 - ((points - 0.5) ** 2).sum(axis=1))
+    return make_surface(np.column_stack([points, height]), faces[kept])
+
+
+def qualities(surface: Surface) -> FloatArray:
+    """Of its triangles: 1 where equilateral, 0 where they are flat."""
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    area = 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+    return 4 * np.sqrt(3) * area / sum(((p - q) ** 2).sum(axis=1) for p, q in ((a, b), (b, c), (c, a)))
+
+
+def normals(surface: Surface) -> FloatArray:
+    a, b, c = (surface.vertices[surface.faces[:, k]] for k in range(3))
+    across = np.cross(b - a, c - a)
+    return across / np.linalg.norm(across, axis=1, keepdims=True)
+
+
+@pytest.mark.parametrize("planned", [True, False], ids=["with a layout", "without"])
+def test_each_level_has_about_a_quarter_of_the_vertices_and_good_triangles(planned: bool):
+    surface = jittered(71)
+    while not is_coarsest(surface):
+        step = coarser(surface, flat(surface) if planned else None)
+        assert step is not None
+        assert 0.18 * len(surface.vertices) < len(step.kept) < 0.28 * len(surface.vertices)
+        surface = step.surface
+        assert qualities(surface).min() > 0.25
+        assert np.median(qualities(surface)) > 0.78
+
+
+def test_corners_and_holes_stay():
+    surface = jittered(51, hole=True)
+    corners = {tuple(place) for place in np.array([[0, 0], [0, 1], [1, 0], [1, 1]], dtype=float)}
+    steps = coarser_surfaces(surface)
+    assert len(steps) >= 2
+    for step in steps:
+        assert len(border_loops(step.surface.faces)) == 2
+        assert corners <= {tuple(place) for place in flat(step.surface)}
+
+
+def test_levels_of_a_surface_are_made_once_the_finest_first():
+    surface = jittered(51)
+    steps = coarser_surfaces(surface)
+    assert steps is coarser_surfaces(surface)
+    assert coarser_surfaces(steps[-1].surface) == ()
+    assert is_coarsest(steps[-1].surface)
+    for finer, step in zip([surface, *(step.surface for step in steps)], steps, strict=False):
+        assert not is_coarsest(finer)
+        np.testing.assert_array_equal(step.surface.vertices, finer.vertices[step.kept])
+        again = coarser(finer)
+        assert again is not None
+        np.testing.assert_array_equal(again.surface.faces, step.surface.faces)
+        assert (again.prolongation != step.prolongation).nnz == 0
+
+
+def test_levels_of_a_grid_go_down_to_fewer_vertices():
+    steps = coarser_surfaces(sheet(65, 65))
+    assert [len(step.kept) for step in steps] == [33**2, 17**2, 9**2]
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "expected"),
+    [(101, 101, (57, 57)), (72, 143, (41, 81)), (1_000, 21, (393, 9)), (2_000, 5, (785, 5)), (90, 70, (65, 49))],
+)
+def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expected: tuple[int, int]):
+    """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
+    all can be halved."""
+    surface = sheet(columns, rows)
+    found = spread_surface(surface, "fine")
+    assert found is not None
+    small, carry, face_of = found
+    grid = rows_and_columns(small)
+    assert grid is not None
+    assert sorted(grid.shape) == sorted(expected)
+    middle = small.vertices[small.faces].mean(axis=1)
+    there = surface.vertices[surface.faces[face_of]]
+    assert (there.min(axis=1) - 1e-9 <= middle).all()
+    assert (middle <= there.max(axis=1) + 1e-9).all()
+    np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
+    assert spread_surface(surface, "fine") is found
+
+
+@pytest.mark.parametrize(
+    ("columns", "rows", "quads", "triangles"),
+    [(7, 9, False, False), (11, 11, True, False), (200, 4, False, True), (200, 5, True, True), (30, 30, True, True)],
+)
+def test_whether_there_is_a_coarser_level_is_told_before_it_is_made(
+    columns: int, rows: int, quads: bool, triangles: bool
+):
+    for surface, wished in ((sheet(columns, rows), quads), (sheet(columns, rows, triangles=True), triangles)):
+        assert has_coarser(surface) == wished
+        assert bool(coarser_surfaces(surface)) == wished
+
+
+def test_stiff_cloth_has_a_coarser_one():
+    surface = sheet(101, 101)
+    sizes = []
+    for kind in KINDS:
+        found = spread_surface(surface, kind)
+        assert found is not None
+        sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarser_surfaces(found[0]))])
+    assert sizes == [[57**2, 29**2, 15**2, 8**2], [49**2, 25**2, 13**2, 7**2], [49**2, 17**2, 9**2]]
+
+
+@pytest.mark.parametrize("shape", [(72, 143), (90, 70), (1_000, 21)])
+def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape: tuple[int, int]):
+    """All of them where a small grid has as many as it likes; every second one where a large grid has too few rows, or long quads."""
+    surface = sheet(*shape)
+    found = spread_surface(surface, "thirds")
+    assert found is not None
+    step = coarser_surfaces(found[0])[0]
+    fine, coarse = (rows_and_columns(of) for of in (found[0], step.surface))
+    assert fine is not None
+    assert coarse is not None
+    np.testing.assert_array_equal(
+        step.kept.reshape(coarse.shape), fine[::3, ::3] if min(shape) > 21 else fine[::2, ::2]
+    )
+    np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(found[0]), atol=1e-12)
+    assert step.smooth_carry is not None
+    np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(found[0]), atol=1e-12)
+
+
+def test_rows_much_farther_apart_than_columns_all_stay():
+    """Until quads are nearly square; what goes up from there is exact for linear layouts."""
+    x, y = np.meshgrid(0.001 * np.arange(65), 0.008 * np.arange(9))
+    i = np.arange(x.size).reshape(x.shape)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    for points in (np.stack([x, y, 0 * x], axis=-1), np.stack([y, -x, 0 * x], axis=-1)):
+        surface = make_surface(points.reshape(-1, 3), faces)
+        shapes = []
+        for step in coarser_surfaces(surface):
+            grid = rows_and_columns(step.surface)
+            assert grid is not None
+            shapes.append(tuple(sorted(grid.shape)))
+            np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(surface), atol=1e-12)
+            assert step.smooth_carry is not None
+            np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(surface), atol=1e-12)
+            surface = step.surface
+        assert shapes == [(9, 33), (9, 17), (5, 9)]
+
+
+def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
+    """Of the same rows and columns, pulled long or not, each has the levels that it had if it were alone."""
+    square = sheet(33, 33)
+    long = replace(square, vertices=square.vertices * [8.0, 1.0, 1.0])
+    shapes = []
+    for surface in (long, square, replace(long)):
+        grid = rows_and_columns(coarser_surfaces(surface)[0].surface)
+        assert grid is not None
+        shapes.append(grid.shape)
+    assert shapes == [(17, 33), (17, 17), (17, 33)]
+
+
+def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
+    for kind in KINDS:
+        assert spread_surface(sheet(2_000, 4), kind) is None
+        assert spread_surface(sheet(21, 21, triangles=True), kind) is None
+
+
+@pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
+def test_without_a_layout_faces_lie_like_those_of_the_body(triangles: bool):
+    """A tube that is almost closed: seen from any side some of it is turned."""
+    x, y = np.meshgrid(np.linspace(0.0, 0.9 * 2 * np.pi, 81), np.linspace(0.0, 4.0, 41))
+    flat_faces = sheet(81, 41, triangles=triangles).faces[:-1]  # without its last face it is no grid
+    surface = make_surface(np.stack([np.cos(x), np.sin(x), y], axis=-1).reshape(-1, 3), flat_faces)
+    for step in coarser_surfaces(surface):
+        outward = step.surface.vertices[step.surface.faces[:, :3]].mean(axis=1) * [1.0, 1.0, 0.0]
+        outward /= np.linalg.norm(outward, axis=1, keepdims=True)
+        assert (np.einsum("ij,ij->i", normals(step.surface), outward) > 0.5).all()
+        assert components(step.surface.faces).max() == 0
+        assert len(border_loops(step.surface.faces)) == 1
+
+
+def test_a_layout_keeps_triangles_from_being_mirrored_in_it():
+    surface = jittered(41)
+    x, y = flat(surface).T
+    layout = np.column_stack([x, y + 0.25 * np.sin(16.0 * x)])
+    assert (signed_cell_areas(surface.faces[:, :3], layout) > 0).all()
+    heedless, heedful = coarser(surface), coarser(surface, layout)
+    assert heedless is not None
+    assert heedful is not None
+    assert (signed_cell_areas(heedless.surface.faces[:, :3], layout[heedless.kept]) <= 0).any()
+    assert (signed_cell_areas(heedful.surface.faces[:, :3], layout[heedful.kept]) > 0).all()
+
+
+@pytest.mark.parametrize("around", [3, 4, 5])
+def test_a_thin_tube_stays_one(around: int):
+    """Neighbours across it may have a third one in common, on its far side."""
+    angle, height = np.meshgrid(2 * np.pi * np.arange(around) / around, np.arange(41.0))
+    vertices = np.stack([np.cos(angle), np.sin(angle), 0.8 * height], axis=-1).reshape(-1, 3)
+    i = np.arange(len(vertices)).reshape(angle.shape)
+    j = np.roll(i, -1, axis=1)
+    lower, upper = [i[:-1], j[:-1], j[1:]], [i[:-1], j[1:], i[1:]]
+    surface = make_surface(vertices, np.vstack([np.stack(half, axis=-1).reshape(-1, 3) for half in (lower, upper)]))
+    step = coarser(surface)
+    coarse = surface if step is None else step.surface
+    assert not len(non_manifold_edges(coarse.faces))
+    assert not len(non_manifold_vertices(coarse.faces))
+    assert len(border_loops(coarse.faces)) == 2
+    assert euler_characteristic(coarse.faces) == 0
+
+
+def test_a_vertex_with_very_many_neighbours_is_no_obstacle():
+    around, rings = 60, 12
+    angle = np.tile(np.linspace(0, 2 * np.pi, around, endpoint=False), rings)
+    radius = np.repeat(np.arange(1, rings + 1), around)
+    points = np.vstack([[0.0, 0.0], np.column_stack([radius * np.cos(angle), radius * np.sin(angle)])])
+    k = np.arange(around)
+    fan = np.column_stack([np.zeros(around, dtype=int), 1 + k, 1 + (k + 1) % around])
+    bands = []
+    for r in range(rings - 1):
+        a, b = 1 + r * around + k, 1 + r * around + (k + 1) % around
+        bands += [np.column_stack([a, a + around, b + around]), np.column_stack([a, b + around, b])]
+    surface = make_surface(np.column_stack([points, 0 * points[:, 0]]), np.vstack([fan, *bands]))
+    step = made(surface)
+    assert len(step.kept) < 0.5 * len(points)
+    assert not len(non_manifold_edges(step.surface.faces))
+    areas = signed_cell_areas(step.surface.faces[:, :3], flat(step.surface))
+    assert (areas > 0).all()
+    # Nothing overlaps, nothing is missing inside the border.
+    assert areas.sum() == pytest.approx(np.pi * rings**2, rel=0.05)
+
+
+def test_any_number_of_threads_makes_the_same(monkeypatch: pytest.MonkeyPatch):
+    surface = jittered(61)
+    results = []
+    for threads in ("1", "3"):
+        monkeypatch.setenv("WARPFLAT_THREADS", threads)
+        results.append(made(surface))
+    one, three = results
+    np.testing.assert_array_equal(one.surface.faces, three.surface.faces)
+    np.testing.assert_array_equal(one.face_of, three.face_of)
+    assert (one.prolongation != three.prolongation).nnz == 0
+
+
+@pytest.mark.parametrize("entries", [1, 8])
+def test_what_is_gone_is_in_the_end_made_of_what_is_kept(entries: int, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("warpflat.solver.multigrid.coarsen._ENTRIES", entries)
+    random = np.random.default_rng(3)
+    gone = random.permutation(np.repeat(np.arange(4, dtype=np.int32), 10))
+    expected = np.zeros((40, 10))
+    expected[gone == 0] = np.eye(10)
+    parent, weight = np.zeros((40, 3), dtype=np.int32), np.zeros((40, 3))
+    for number in (3, 2, 1):
+        staying = np.flatnonzero((gone == 0) | (gone > number))
+        for vertex in np.flatnonzero(gone == number):
+            parent[vertex], weight[vertex] = random.choice(staying, 3, replace=False), random.dirichlet(np.ones(3))
+            expected[vertex] = weight[vertex] @ expected[parent[vertex]]
+    given = [
+        wp.array(values, dtype=dtype, device="cpu")
+        for values, dtype in ((gone, int), (parent, wp.vec3i), (weight, wp.vec3d))
+    ]
+    np.testing.assert_allclose(_prolongation(*given, passes=3).toarray(), expected, atol=1e-15)
+
+
+def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
+    left = sheet(9, 9, triangles=True)
+    count = len(left.vertices)
+    number = np.append(count - 1, np.arange(count, 2 * count - 1))  # its first vertex is the other one's last
+    faces = np.where(left.faces >= 0, number[left.faces], -1)
+    vertices = np.vstack([left.vertices, left.vertices[1:] + left.vertices[-1]])
+    touching = Surface(
+        vertices=vertices,
+        faces=np.vstack([left.faces, faces]).astype(np.int32),
+        input_vertices=vertices,
+        input_index=np.arange(len(vertices), dtype=np.int32),
+    )
+    assert coarser(touching) is None
+
+
+def test_what_cannot_be_made_coarser_says_so():
+    triangle = make_surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
+    assert coarser(triangle, flat(triangle)) is None
+
+
+def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
+    pieces = [sheet(80, 70, triangles=True) for _ in range(2)]
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    threads: list[threading.Thread] = []
+
+    def prepare(surface: Surface) -> None:
+        threads.append(threading.current_thread())
+        _prepare_levels(surface)
+
+    monkeypatch.setattr("warpflat.solver.multigrid.coarsen._prepare_levels", prepare)
+    with levels_meanwhile(pieces[0]):
+        pass
+    # A grid's are not needed so soon.
+    with levels_meanwhile(sheet(80, 70)):
+        pass
+    assert len(threads) == 1
+    assert threads[0] is not threading.current_thread()
+    for apart, here in zip(coarser_surfaces(pieces[0]), coarser_surfaces(pieces[1]), strict=True):
+        np.testing.assert_array_equal(apart.kept, here.kept)
+        np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
+    with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70, triangles=True)):
+        _ = 1 / 0
+
+
+def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkeypatch: pytest.MonkeyPatch):
+    piece = sheet(80, 70, triangles=True)
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    with levels_meanwhile(piece):
+        pass
+    for made_once in ("cells.lay_cells", "springs.measure_edges"):
+        monkeypatch.setattr(f"warpflat.{made_once}", None)
+    for step in coarser_surfaces(piece):
+        assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
+        assert unweighed_springs(step.surface).edge_count == len(half_edges_of(step.surface).edges)
+
+
+@pytest.mark.parametrize("kind", ["triangles", "grid", "crack"])
+def test_levels_are_inherited_by_a_surface_that_has_moved(kind: str, monkeypatch):
+    surface = make_shape("bodice", resolution=41, triangles=kind == "triangles")
+    if kind == "crack":
+        column = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:23, 8]
+        cut = cut_along(surface.faces, column, vertex_count=len(surface.vertices))
+        surface = make_surface(surface.vertices[cut.vertex_origin], cut.faces)
+    steps = coarser_surfaces(surface)
+    assert len(steps) > 1
+    moved = replace(surface, vertices=surface.vertices * np.array([1.1, 1.0, 0.9]), faces=surface.faces)
+    inherit_levels(moved, surface)
+    # Nothing is collapsed again.
+    monkeypatch.setattr("warpflat.solver.multigrid.coarsen._collapsed", None)
+    inherited = coarser_surfaces(moved)
+    assert len(inherited) == len(steps)
+    fine = moved
+    for mine, step in zip(inherited, steps, strict=True):
+        np.testing.assert_array_equal(mine.surface.vertices, fine.vertices[step.kept])
+        np.testing.assert_array_equal(mine.surface.faces, step.surface.faces)
+        assert mine.transfer is step.transfer
+        assert (mine.smooth_carry is None) == (step.smooth_carry is None)
+        fine = mine.surface

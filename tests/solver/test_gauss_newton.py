@@ -1,0 +1,180 @@
+"""Whole implicit steps: their matrix against differences, and soft cloth between triangles, which they bring to rest."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from devices import DEVICE
+from numpy.typing import NDArray
+
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import find_fabric
+from warpflat.flattening.develop import develop
+from warpflat.flattening.flatten_piece import flatten
+from warpflat.flattening.result import Flattening
+from warpflat.model.join import join_networks
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.gauss_newton import WholeSteps, relax_whole, whole_steps_pay
+from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.multigrid.solve import relax_multilevel
+from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
+
+FloatArray = NDArray[np.float64]
+
+SOFT = Fabric(name="soft", stiffness_warp=1000.0, stiffness_weft=700.0, shear_stiffness=20.0, areal_density=0.15)
+
+
+def triangles(name: str, count: int) -> Surface:
+    return make_shape(name, resolution=count, triangles=True)
+
+
+def network_of(surface: Surface, positions: FloatArray, fabric: Fabric = SOFT) -> SpringNetwork:
+    return SpringNetwork.build(surface, fabric, positions, device=DEVICE)
+
+
+def developed(surface: Surface, fabric: Fabric) -> tuple[SpringNetwork, FloatArray]:
+    start = develop(surface, surface.lines["centre"]).positions
+    return network_of(surface, start, fabric), start
+
+
+def differences(forces: Any, positions: FloatArray, step: float = 1e-7) -> FloatArray:
+    """Minus the derivative of forces by places, 2 #V by 2 #V."""
+    columns = []
+    for at in range(positions.size):
+        moved = [positions.copy(), positions.copy()]
+        moved[0].flat[at] += step
+        moved[1].flat[at] -= step
+        columns.append((forces(moved[1]) - forces(moved[0])).ravel() / (2.0 * step))
+    return np.array(columns).T
+
+
+def test_the_matrix_is_the_stiffness_of_stretched_springs():
+    surface = triangles("dome", 6)
+    network, start = developed(surface, SOFT)
+    rng = np.random.default_rng(1)
+    positions = 1.6 * start + rng.normal(scale=1e-3, size=start.shape)
+    s = network.spring_arrays
+    assert (np.linalg.norm(positions[s.ends[:, 1]] - positions[s.ends[:, 0]], axis=1) > s.rest_length).all()
+
+    def forces(at: FloatArray) -> FloatArray:
+        return Relaxation(network, RelaxOptions(), start=at).forces()
+
+    found = WholeSteps(network, []).matrix(positions).toarray()
+    np.testing.assert_allclose(found, differences(forces, positions), atol=1e-4 * np.abs(found).max())
+
+
+def test_the_matrix_holds_worn_threads_along_and_across():
+    surface = make_surface([[0.0, 0.0, 0.0], [0.1, 0.0, 0.0], [0.03, 0.08, 0.0]], [[0, 1, 2]])
+    flat = surface.vertices[:, :2]
+    network = network_of(surface, flat)
+    # Pressed along both threads, and sheared.
+    positions = flat @ np.array([[0.8, 0.05], [0.0, 0.7]])
+    rest = (flat[1:] - flat[0]).T
+
+    def worn(at: FloatArray, thread: FloatArray) -> FloatArray:
+        return np.asarray(rest @ np.linalg.solve((at[1:] - at[0]).T, thread))
+
+    area = 0.5 * np.linalg.det((positions[1:] - positions[0]).T)
+    expected = np.zeros((6, 6))
+    onsets = network.cells.onset.numpy()[0]
+    for thread, stiffness, onset in zip(np.eye(2)[::-1], (1000.0, 700.0), onsets, strict=True):
+        by_place = -differences(lambda at, e=thread: worn(at, e), positions)
+        here = worn(positions, thread)
+        stretch = float(np.linalg.norm(here))
+        assert stretch > 1.0 + onset
+        along, across = here / stretch, np.array([-here[1], here[0]]) / stretch
+        pull = stretch - 1.0 - onset
+        expected += area * stiffness * np.outer(along @ by_place, along @ by_place)
+        expected += area * stiffness * pull / stretch * np.outer(across @ by_place, across @ by_place)
+    s = network.spring_arrays
+    for (i, j), k, length in zip(s.ends, s.stiffness, s.rest_length, strict=True):
+        d = positions[j] - positions[i]
+        assert np.linalg.norm(d) < length
+        row = np.zeros(6)
+        row[2 * i : 2 * i + 2], row[2 * j : 2 * j + 2] = -d / np.linalg.norm(d), d / np.linalg.norm(d)
+        expected += k * np.outer(row, row)
+    found = WholeSteps(network, []).matrix(positions).toarray()
+    np.testing.assert_allclose(found, expected, atol=1e-6 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize(("name", "fabric"), [("bodice", "satin"), ("bodice", "denim"), ("dome", "cotton")])
+def test_soft_cloth_between_triangles_comes_to_rest(name: str, fabric: str):
+    flat = flatten(triangles(name, 25), fabric=fabric, datum="centre", device=DEVICE)
+    assert flat.converged
+    assert flat.flipped_faces == 0
+    # Ten thousands of the paper's steps would take next to nothing more away.
+    state = Relaxation(flat.network, RelaxOptions(max_steps=3000), start=flat.positions, upright=held(flat))
+    before = state.piece_energies()[:, :2].sum()
+    relax(state)
+    after = state.piece_energies()[:, :2].sum()
+    assert after > (1.0 - 1e-3) * before
+
+
+def held(flat: Flattening) -> list[Upright]:
+    line = flat.network.surface.lines["centre"]
+    return [Upright(lower=int(line[0]), upper=int(line[-1]))]
+
+
+def test_they_reach_what_cycles_reach(monkeypatch: pytest.MonkeyPatch):
+    surface = triangles("dome", 41)
+    network, start = developed(surface, find_fabric("woven"))
+    assert whole_steps_pay(network)
+    energies = []
+    for patience in (0.0, np.inf):
+        monkeypatch.setattr("warpflat.solver.multigrid.solve._PATIENCE", patience)
+        state = Relaxation(network, RelaxOptions(), start=start)
+        assert relax_multilevel(state).converged
+        energies.append(state.energies().potential)
+    np.testing.assert_allclose(*energies, rtol=1e-3)
+
+
+def test_pieces_side_by_side_come_where_they_come_alone():
+    surfaces = [triangles("bodice", 13), triangles("dome", 17), triangles("saddle", 15)]
+    satin = find_fabric("satin")
+    parts, starts = zip(*(developed(surface, satin) for surface in surfaces), strict=True)
+    together = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
+    assert relax_whole(together).converged
+    alone = []
+    for part, start in zip(parts, starts, strict=True):
+        state = Relaxation(part, RelaxOptions(), start=start)
+        assert relax_whole(state).converged
+        alone.append(state.last.potential[0])
+    np.testing.assert_allclose(together.last.potential, alone, rtol=5e-3)
+
+
+def test_the_chord_of_the_datum_stays_upright_and_what_is_at_rest_stays():
+    surface = triangles("bodice", 17)
+    network, start = developed(surface, find_fabric("silk"))
+    line = surface.lines["centre"]
+    upright = [Upright(lower=int(line[0]), upper=int(line[-1]))]
+    state = Relaxation(network, RelaxOptions(), start=start, upright=upright)
+    assert relax_whole(state).converged
+    chord = state.positions()[line[-1]] - state.positions()[line[0]]
+    assert abs(chord[0]) < 1e-9 * chord[1]
+    before = state.positions()
+    again = relax_whole(state)
+    assert again.steps == 0
+    np.testing.assert_allclose(state.positions(), before, atol=1e-15)
+
+
+def test_work_is_limited():
+    network, start = developed(triangles("bodice", 17), find_fabric("silk"))
+    state = Relaxation(network, RelaxOptions(max_steps=200), start=start)
+    outcome = relax_whole(state)
+    assert not outcome.converged
+    assert 200 <= outcome.work_units < 400
+
+
+def test_they_are_for_springs_of_soft_cloth_between_triangles():
+    flat = triangles("dome", 5)
+    positions = flat.vertices[:, :2]
+    assert whole_steps_pay(network_of(flat, positions))
+    assert not whole_steps_pay(network_of(flat, positions, find_fabric("interlock")))
+    assert not whole_steps_pay(SpringNetwork.build(flat, SOFT, positions, device=DEVICE, model="membrane"))
+    quads = make_shape("dome", resolution=5)
+    assert not whole_steps_pay(network_of(quads, quads.vertices[:, :2]))

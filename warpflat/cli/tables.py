@@ -1,0 +1,327 @@
+"""What the command line shows: a progress bar, the summary of a run, tables of fabrics."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import ExitStack
+from dataclasses import asdict, fields
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
+
+from warpflat.core.activity import listening
+from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
+
+if TYPE_CHECKING:
+    from warpflat.cutting.ledger import Ledger
+    from warpflat.flattening.progress import Progress
+    from warpflat.mannequin.mannequin import Level
+
+__all__ = [
+    "ProgressBar",
+    "fabric_data",
+    "fabric_sheet",
+    "fabric_table",
+    "ledger_table",
+    "mannequin_table",
+    "run_summary",
+    "warnings_of",
+]
+
+_REFRESH = 0.1  # [s]
+_STEPS = "{desc}: {n_fmt} steps [{elapsed}{postfix}]"
+_DOING = "{desc} [{elapsed}]"
+_AMISS = 0.2  # [mm] of a seam or constraint that is told
+
+
+class ProgressBar:
+    """Steps, energy and residual on stderr while a run goes on, or what else it does; nothing where stderr is no terminal or `hidden`."""
+
+    def __init__(self, name: str, *, hidden: bool = False) -> None:
+        """Show nothing yet: `name` is what is being flattened."""
+        self._name = name
+        self._hidden = hidden or not sys.stderr.isatty()
+        self._bar: Any = None
+        self._stage = ""
+        self._listening = ExitStack()
+
+    def __enter__(self) -> ProgressBar:
+        if not self._hidden:
+            from tqdm import tqdm
+
+            self._bar = tqdm(
+                desc=self._name,
+                file=sys.stderr,
+                leave=False,
+                mininterval=_REFRESH,
+                bar_format=_DOING,
+            )
+            self._listening.enter_context(listening(self.say))
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._listening.close()
+        if self._bar is not None:
+            self._bar.close()
+
+    def say(self, words: str) -> None:
+        """Show what is being done."""
+        if self._bar is not None:
+            self._bar.bar_format = _DOING
+            self._bar.set_description_str(f"{self._name}: {words}", refresh=True)
+
+    def __call__(self, progress: Progress) -> None:
+        """Show where the run stands."""
+        if self._bar is None:
+            return
+        if progress.stage != self._stage and progress.step == 0:
+            self._bar.reset()
+        self._stage = progress.stage
+        self._bar.bar_format = _STEPS
+        self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
+        told = f"{progress.spring_energy * 1e3:.4g} mJ"
+        if math.isfinite(progress.residual):
+            told += f", residual {progress.residual:.1e}"
+        self._bar.set_postfix_str(told, refresh=False)
+        self._bar.update(max(0, progress.step - self._bar.n))
+
+
+def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
+    """The table at the end of a run, and where its files are.
+
+    Args:
+        metrics: as `metrics.json`.
+        files: their names.
+        folder: where they lie.
+    """
+    head = ("piece", "vertices", "length error", "area error", "energy", "flips", "converged")
+    rows = []
+    for name, piece in metrics["pieces"].items():
+        rows.append(
+            (
+                name,
+                f"{piece['vertices']:,}",
+                f"{100 * piece['length_error']:.3g} %",
+                f"{100 * piece['area_error']:.3g} %",
+                f"{1e3 * piece['spring_energy_j']:.4g} mJ",
+                f"{piece['flipped_faces']:,}",
+                "yes" if _converged(piece) else "NO",
+            )
+        )
+    tables = [_aligned(head, rows)]
+    if metrics.get("seams"):
+        tables.append(_seam_table(metrics["seams"]))
+    if metrics.get("constraints"):
+        tables.append(_constraint_table(metrics["constraints"]))
+    return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
+
+
+def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
+    head = ("seam", "sides", "mm", "mm", "ease", "difference", "price")
+    rows = [
+        (
+            seam["name"],
+            " = ".join(seam["sides"]),
+            *(f"{length:.1f}" for length in seam["length_mm"]),
+            f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
+            f"{seam['difference_mm']:+.2f} mm",
+            _price(seam["price_j"]),
+        )
+        for seam in seams
+    ]
+    return _aligned(head, rows, left=(0, 1))
+
+
+def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
+    rows = [(held["name"], f"{held['amiss_mm']:.2f} mm", _price(held["price_j"])) for held in constraints]
+    return _aligned(("constraint", "amiss", "price"), rows)
+
+
+def _price(joules: float | None) -> str:
+    return "" if joules is None else f"{1e3 * joules:.3g} mJ"
+
+
+def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
+    """One line for each piece that did not converge or has flipped faces, of every size, and for a pattern or marker that is missing."""
+    lines = []
+    given_up = metrics.get("sewing", {}).get("contradictory", False)
+    for name, piece in metrics["pieces"].items():
+        last = piece["stages"][-1]
+        if not _converged(piece):
+            asked = given_up and last["name"] == "sew"
+            way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
+            lines.append(
+                f"{name} did not converge within {_work(last)} ({_left(last)}); the pattern is not final: {way_out}"
+            )
+        if piece["flipped_faces"]:
+            lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+    if not metrics.get("sewing", {}).get("converged", True):
+        amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
+        amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
+        lines += [
+            f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
+            for name, by in amiss
+            if by > _AMISS
+        ]
+    for size, other in metrics.get("sizes", {}).items():
+        lines += [f"size {size}: {line}" for line in warnings_of(other)]
+    lines += [
+        f"no {what} was {done}: {metrics[what][f'not_{done}']}"
+        for what, done in (("pattern", "drawn"), ("marker", "made"))
+        if f"not_{done}" in metrics.get(what, {})
+    ]
+    return lines
+
+
+def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
+    """Height and girths of every level, from the neck down."""
+    rows = []
+    for name, level in levels.items():
+        body = level.girth if level.section is None else level.section
+        rows.append((name, f"{100 * level.height:.1f} cm", f"{100 * body:.1f} cm", f"{100 * level.girth:.1f} cm"))
+    return f"{source}\n{_aligned(('level', 'height', 'girth', 'by tape'), rows)}"
+
+
+def ledger_table(ledger: Ledger) -> str:
+    """The candidates of a ledger, the best first, with the numbers that `--apply` takes."""
+    from warpflat.cutting.ledger_picture import candidate_words
+
+    head = (
+        "",
+        "cut",
+        "per cm",
+        "released",
+        "left",
+        "length",
+        "opening",
+        "angle",
+        "length error",
+        "area error",
+        "flips",
+    )
+    rows = []
+    for number, entry in enumerate(ledger.entries, start=1):
+        errors = (
+            f"{100 * entry.length_error_before:.2f} > {100 * entry.length_error:.2f} %",
+            f"{100 * entry.area_error_before:.2f} > {100 * entry.area_error:.2f} %",
+        )
+        rows.append((str(number), entry.candidate.name, *candidate_words(entry), *errors, str(entry.flipped_faces)))
+    peaks = "\n".join(f"peak {number}: {words}" for number, words in enumerate(ledger.peaks.words, start=1))
+    refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
+    return "\n".join([peaks, _aligned(head, rows, left=(1,)), *refused])
+
+
+def fabric_table(fabrics: Iterable[Fabric]) -> str:
+    """One line per fabric, with units and grades."""
+    head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "grade", "description")
+    rows = []
+    used: set[str] = set()
+    for fabric in fabrics:
+        grades = "".join(sorted({origin.grade for origin in fabric.provenance.values() if origin.grade}))
+        used |= set(grades)
+        rows.append(
+            (
+                fabric.name,
+                f"{_mark(fabric, 'areal_density')}{fabric.areal_density:.3f}",
+                f"{_mark(fabric, 'stiffness_warp')}{fabric.stiffness_warp:,.0f}",
+                f"{_mark(fabric, 'stiffness_weft')}{fabric.stiffness_weft:,.0f}",
+                f"{_mark(fabric, 'shear_stiffness')}{fabric.shear_stiffness:,.0f}",
+                f"{fabric.poisson_ratio:.2g}",
+                f"{100 * fabric.strain_limit:.3g} %",
+                grades or "-",
+                fabric.description,
+            )
+        )
+    grades_text = ", ".join(f"{grade} {GRADES[grade]}" for grade in sorted(used))
+    notes = [
+        "K: secant tensile stiffness [N/m], G: shear stiffness [N/m per rad]; ~ estimate, > lower bound",
+        f"grades: {grades_text}",
+        f"default: {DEFAULT_FABRIC}; test loads and sources: warpflat fabrics NAME",
+    ]
+    return "\n".join([_aligned(head, rows, left=(0, 8)), "", *notes])
+
+
+def fabric_sheet(fabric: Fabric) -> str:
+    """One fabric: each value with unit, test load, grade and source."""
+    units = {
+        "areal_density": "kg/m2",
+        "stiffness_warp": "N/m",
+        "stiffness_weft": "N/m",
+        "shear_stiffness": "N/m per rad",
+    }
+    rows = []
+    sources: dict[str, str] = {}
+    for key in value_names():
+        value = getattr(fabric, key)
+        if value == ():
+            continue
+        origin = fabric.provenance.get(key, Provenance(source="default"))
+        shown = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
+        if origin.at_least:
+            shown = f">= {shown}"
+        if origin.spread is not None:
+            shown += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
+        number = sources.setdefault(origin.source, f"[{len(sources) + 1}]")
+        rows.append((key, shown, units.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
+    title = f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name
+    parts = [title]
+    if fabric.aliases:
+        parts.append(f"also: {', '.join(fabric.aliases)}")
+    parts += ["", _aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
+    for direction in ("warp", "weft"):
+        points = getattr(fabric, f"curve_{direction}")
+        if points:
+            text = ", ".join(f"{100 * strain:.3g} %: {tension:.3g} N/m" for strain, tension in points)
+            parts.append(f"curve_{direction}: {text}")
+    parts += ["", *(f"{number} {source}" for source, number in sources.items())]
+    used = sorted({origin.grade for origin in fabric.provenance.values() if origin.grade})
+    if used:
+        parts += ["", f"grades: {', '.join(f'{grade} {GRADES[grade]}' for grade in used)}"]
+    return "\n".join(parts)
+
+
+def fabric_data(fabric: Fabric) -> dict[str, Any]:
+    """A fabric as plain data: its values, and under `provenance` where each comes from."""
+    data = {field.name: getattr(fabric, field.name) for field in fields(fabric) if field.name != "provenance"}
+    return {**data, "provenance": {key: asdict(origin) for key, origin in fabric.provenance.items()}}
+
+
+def _converged(piece: Mapping[str, Any]) -> bool:
+    return all(stage["converged"] for stage in piece["stages"][-1:])
+
+
+def _work(stage: Mapping[str, Any]) -> str:
+    """What `max_steps` counts; with levels that is not the steps of the piece's own mesh alone."""
+    steps, units = stage["steps"], stage["work_units"]
+    return f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
+
+
+def _left(stage: Mapping[str, Any]) -> str:
+    """How far from rest a stage has ended: by the residual, unless forces are infinite, as of crushed faces."""
+    residual = stage["residual"]
+    if residual is None or not math.isfinite(residual):
+        return f"{1e3 * stage['spring_energy_j']:.3g} mJ left"
+    return f"residual {residual:.1e}"
+
+
+def _mark(fabric: Fabric, key: str) -> str:
+    origin = fabric.provenance.get(key)
+    if origin is None:
+        return ""
+    return "~" if origin.is_estimate else ">" if origin.at_least else ""
+
+
+def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
+    """Columns under their heads, numbers to the right, those of `left` to the left."""
+    table = [head, *rows]
+    widths = [max(len(row[column]) for row in table) for column in range(len(head))]
+    return "\n".join(
+        "  ".join(
+            cell.ljust(width) if column in left else cell.rjust(width)
+            for column, (cell, width) in enumerate(zip(row, widths, strict=True))
+        ).rstrip()
+        for row in table
+    )

@@ -1,0 +1,448 @@
+"""Files that appear whole or not at all, and all files of a run together or none of them.
+
+A single file is written under a hidden name beside the final one, then renamed. The files of a run are written into a hidden folder
+inside the output folder. At the end those that they replace are kept aside in it while the new ones are moved in one by one; if one of
+them cannot be, or the process is killed meanwhile, what was there is put back: at once, at the end of the process, or by the next run.
+This is also the one place that sees to it that no file is replaced from which a run was made.
+"""
+
+from __future__ import annotations
+
+import atexit
+import errno
+import functools
+import hashlib
+import json
+import os
+import platform
+import re
+import shutil
+import time
+import uuid
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from pathlib import Path
+
+from warpflat.core.errors import InputError, expect
+from warpflat.core.file_names import checked_name
+from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
+
+__all__ = [
+    "atomic_path",
+    "current",
+    "expect_files",
+    "file_in",
+    "hidden_file",
+    "is_input",
+    "output_folder",
+    "prepare_folder",
+    "remove_file",
+    "remove_unfinished",
+    "require_writable",
+]
+
+# .NAME-warpflat-MACHINE-PROCESS-RANDOM.SUFFIX
+_HIDDEN = re.compile(r"\..*-warpflat-(?P<machine>[0-9a-f]{8})-(?P<process>\d+)-[0-9a-f]{8}(\.\w+)?")
+# After so long without a change nobody writes it any more, on whichever machine [s].
+_ABANDONED = 24 * 3600.0
+
+
+def file_in(folder: Path, name: str, ending: str) -> Path:
+    """The file of what is called `name` in a folder: whoever names it, nothing is written elsewhere.
+
+    Raises:
+        InputError: `name` leads out of the folder, or cannot name a file for another reason.
+    """
+    return folder / f"{checked_name(name)}{ending}"
+
+
+@contextmanager
+def hidden_file(final: Path) -> Iterator[Path]:
+    """Yield a fresh name for work on a file, with its suffix (writers choose the format by it); what is there at the end is removed.
+
+    It lies beside `final`, or in the hidden folder of the run to which that belongs.
+    """
+    run = _run_into(final.parent)
+    path = _hidden(final if run is None else run.new / final.name)
+    try:
+        yield path
+    finally:
+        _clear(path)
+
+
+# Hidden files and folders that this process has made or is about to make, and the folders that go with each if nothing is left in them.
+_unfinished: dict[Path, Sequence[Path]] = {}
+
+
+def _hidden(final: Path, made: Sequence[Path] = ()) -> Path:
+    """A fresh hidden name beside `final`, remembered before anything of that name exists: no interruption comes in between."""
+    mark = f"warpflat-{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
+    path = final.absolute().with_name(f".{final.stem}-{mark}{final.suffix}")
+    _unfinished[path] = made
+    return path
+
+
+def _clear(path: Path) -> None:
+    """Remove a hidden file, or a hidden folder once what it kept aside is where it was."""
+    with suppress(OSError):
+        if path.is_dir():
+            _put_back(path)
+            shutil.rmtree(path)
+        else:
+            path.unlink(missing_ok=True)
+    if not os.path.lexists(path):
+        for each in _unfinished.get(path, ()):
+            with suppress(OSError):  # it holds files, or could not be made
+                each.rmdir()
+        _unfinished.pop(path, None)
+
+
+@atexit.register
+def _clear_all() -> None:
+    """Remove what an interruption has left that came between the making of a file and whoever was to remove it."""
+    for path in list(_unfinished):
+        if f"-{os.getpid()}-" in path.name:  # not in a child, by whom the parent's are known too
+            _clear(path)
+
+
+def remove_unfinished(folder: Path) -> None:
+    """Remove what killed runs have left hidden, and put back what they had kept aside.
+
+    A run was killed if its process is gone, or if it is another machine's and a day has passed.
+    """
+    with suppress(OSError):
+        for path in folder.iterdir():
+            found = _HIDDEN.fullmatch(path.name)
+            if found and not path.is_symlink() and _is_abandoned(path, found["machine"], int(found["process"])):
+                _clear(path)
+
+
+def _is_abandoned(path: Path, machine: str, process: int) -> bool:
+    if os.name == "posix" and machine == _machine():
+        return not _is_running(process)
+    try:
+        latest = max(each.lstat().st_mtime for each in (path, *path.rglob("*")))
+        return time.time() - latest > _ABANDONED
+    except OSError:
+        return False
+
+
+def _is_running(process: int) -> bool:
+    try:
+        os.kill(process, 0)
+    except (ProcessLookupError, OverflowError):
+        return False
+    except OSError:
+        return True  # somebody else's
+    return True
+
+
+@functools.cache
+def _machine() -> str:
+    """Eight digits for where a process's number means one process: a machine, until it starts anew, and a container on it."""
+    known = [platform.node()]
+    with suppress(OSError):
+        known.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
+        known.append(os.readlink("/proc/self/ns/pid"))
+    return hashlib.sha256("\n".join(known).encode(errors="replace")).hexdigest()[:8]
+
+
+def require_writable(final: str | os.PathLike[str]) -> None:
+    """Make sure that a file of this name can be written, without leaving one.
+
+    Raises:
+        InputError: the folder is missing or cannot be written, or `final` is a folder, or a file that the run has read.
+    """
+    final = Path(final)
+    run = _run_into(final.parent)
+    try:
+        if final.is_dir():
+            raise InputError(f"cannot write {final}: it is a folder; give the name of a file")
+        if run is not None:
+            run.refuse_inputs([final.name])
+            return
+        with hidden_file(final) as probe:
+            probe.touch(exist_ok=False)
+    except OSError as error:
+        raise _cannot_write(final, error) from error
+
+
+@contextmanager
+def atomic_path(final: str | os.PathLike[str], *, sources: Iterable[Path] = ()) -> Iterator[Path]:
+    """Yield a temporary path with the same suffix; it becomes `final` on success and is removed on failure.
+
+    A run that is killed leaves at most a hidden file, and never half a file under the final name. A file that is
+    already there stays as it is until the new one is complete, and in an :func:`output_folder` until all are.
+
+    Args:
+        final: the file.
+        sources: files from which it is made; it must be none of them.
+
+    Raises:
+        InputError: the folder is missing or cannot be written, `final` is a folder or a file that the run has read, or the disk is full.
+    """
+    final = Path(final)
+    require_writable(final)
+    refuse_to_replace(final, sources)
+    run = _run_into(final.parent)
+    try:
+        with hidden_file(final) as temporary:
+            # Created with the user's usual permissions: some libraries write through a private file of their own.
+            temporary.touch(exist_ok=False)
+            mode = temporary.stat().st_mode
+            yield temporary
+            temporary.chmod(mode)
+            if run is None:
+                os.replace(temporary, final)
+            else:
+                run.take(temporary, final.name)
+    except OSError as error:
+        raise _cannot_write(final, error) from error
+
+
+class _Run:
+    """What is being written into a folder: new files in a hidden folder, and later those aside which they replace.
+
+    Attributes:
+        folder: where the files belong.
+        hidden: the folder for the time being.
+        new: the folder in it for what is written.
+        names: of the files written, in that order.
+        removed: names of files of earlier runs that go with the change.
+    """
+
+    def __init__(self, folder: Path, hidden: Path) -> None:
+        self.folder = folder
+        self.hidden = hidden
+        self.new = hidden / _NEW
+        self.names: dict[str, None] = {}
+        self.removed: dict[str, None] = {}
+        self._expected: set[str] = set()
+        self._sources: set[Path] = set()
+
+    def expect(self, files: Iterable[str]) -> None:
+        """Names of files that are going to be written, as soon as they are known."""
+        names = set(files)
+        for name in names:
+            if (self.folder / name).is_dir():
+                raise InputError(
+                    f"{self.folder / name} is a folder, where a file is to be written; remove it, or choose another folder"
+                )
+        self._expected |= names
+        self.refuse_inputs(names)
+
+    def protect(self, source: Path) -> None:
+        """A file that has been read, which is not to be replaced."""
+        self._sources.add(source)
+        for name in self._expected:
+            refuse_to_replace(self.folder / name, [source])
+
+    def refuse_inputs(self, names: Iterable[str]) -> None:
+        """See that none of these is a file that has been read."""
+        for name in names:
+            refuse_to_replace(self.folder / name, self._sources)
+
+    def reads(self, path: Path) -> bool:
+        """Whether a file is one of those that have been read."""
+        return is_among(path, self._sources)
+
+    def take(self, temporary: Path, name: str) -> None:
+        """A file that is complete."""
+        os.replace(temporary, self.new / name)
+        self.names.pop(name, None)
+        self.names[name] = None
+        self.removed.pop(name, None)
+
+    def commit(self) -> None:
+        """Make the new files those of the folder, `metrics.json` at last; what fails here is undone when the hidden folder is cleared."""
+        if not self.names:
+            return
+        self.refuse_inputs((*self.names, *self.removed))
+        aside = self.hidden / _ASIDE
+        fresh = [name for name in self.names if not os.path.lexists(self.folder / name)]
+        name = ""
+        try:
+            aside.mkdir()
+            (self.hidden / _FRESH).write_text(json.dumps(fresh), encoding="utf-8")
+            for name in self.removed:
+                with suppress(FileNotFoundError):
+                    os.replace(self.folder / name, aside / name)
+            for name in sorted(self.names, key=lambda name: name == "metrics.json"):
+                _keep_aside(self.folder / name, aside / name)
+                os.replace(self.new / name, self.folder / name)
+        except OSError as error:
+            raise _cannot_write(self.folder / name, error) from error
+        # From here on the new files are those of the folder, whatever happens to what is hidden.
+        (self.hidden / _FRESH).unlink()
+
+
+_NEW, _ASIDE, _FRESH = "new", "aside", "fresh.json"
+
+_runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
+
+
+def _run_into(folder: Path) -> _Run | None:
+    """The run that is writing into a folder, if there is one."""
+    return next((run for run in _going_on() if run.folder == folder or is_among(folder, [run.folder])), None)
+
+
+def _going_on() -> tuple[_Run, ...]:
+    """The runs that write at present; one that was interrupted at its very end may still be listed."""
+    return tuple(run for run in _runs.get() if run.hidden in _unfinished)
+
+
+def _keep_aside(final: Path, aside: Path) -> None:
+    """Give a file a second name, where there is one; where the file system has no links, its only one until the new file is there."""
+    if not os.path.lexists(final):
+        return
+    if final.is_dir():
+        raise IsADirectoryError(errno.EISDIR, os.strerror(errno.EISDIR), str(final))
+    try:
+        os.link(final, aside, follow_symlinks=False)
+    except (OSError, NotImplementedError):
+        os.replace(final, aside)
+
+
+def _put_back(hidden: Path) -> None:
+    """Undo a change of the files that was begun and not ended; done twice it does no more than once."""
+    try:
+        fresh = json.loads((hidden / _FRESH).read_text(encoding="utf-8"))
+    except (FileNotFoundError, ValueError, RecursionError):
+        return  # it was not begun, or is complete
+    folder = hidden.parent
+    # Only plain names are followed: the list may have been put there by anybody.
+    listed = [name for name in fresh if isinstance(name, str)] if isinstance(fresh, list) else []
+    for name in listed:
+        plain = Path(name).name == name and name not in ("", "..")
+        if plain and not (hidden / _NEW / name).exists():
+            (folder / name).unlink(missing_ok=True)
+    for path in (hidden / _ASIDE).iterdir():
+        os.replace(path, folder / path.name)
+    (hidden / _FRESH).unlink()
+
+
+@contextmanager
+def output_folder(
+    path: str | os.PathLike[str], files: Iterable[str] = (), *, sources: Iterable[Path] = ()
+) -> Iterator[Path]:
+    """The folder for the files of a run: those written into it in the block appear together at its end, and none if it fails.
+
+    The folder is made if need be, and goes again if nothing has been written there. What is read in the block, and `sources`, is never
+    replaced. A block in another one for the same folder is part of that.
+
+    Args:
+        path: the folder.
+        files: names of files that will be written, as far as they are known; :func:`expect_files` adds to them.
+        sources: files that were read before.
+
+    Raises:
+        InputError: as :func:`prepare_folder`, nothing can be written into the folder, or it would replace one that was read.
+    """
+    expect(path, (str, os.PathLike), "folder", "the path of one")
+    folder = Path(path)
+    joined = _run_into(folder)
+    if joined is not None:
+        for source in sources:
+            joined.protect(source)
+        joined.expect(files)
+        yield folder
+        return
+    made = _missing(folder)
+    run = _Run(folder, _hidden(folder / "run", made))
+    before = _going_on()
+    try:
+        prepare_folder(folder)
+        for source in sources:
+            run.protect(source)
+        run.expect(files)
+        try:
+            run.new.mkdir(parents=True)
+        except OSError as error:
+            raise _no_output_folder(folder, error) from error
+        _runs.set((*before, run))
+        with listening_to_reads(run.protect):
+            yield folder
+        run.commit()
+    finally:
+        try:
+            _runs.set(before)
+        finally:
+            _clear(run.hidden)
+
+
+def expect_files(folder: Path, files: Iterable[str]) -> None:
+    """Tell a run in an :func:`output_folder`, before it takes its time, which further files it will write.
+
+    Raises:
+        InputError: one of them was read by the run, or is a folder.
+    """
+    if run := _run_into(folder):
+        run.expect(files)
+
+
+def current(path: Path) -> Path:
+    """Where the latest content of an output file lies: in an :func:`output_folder` that which was written in its block."""
+    run = _run_into(path.parent)
+    return path if run is None or path.name not in run.names else run.new / path.name
+
+
+def is_input(path: Path) -> bool:
+    """Whether the run that is writing into the folder of a file has read it."""
+    run = _run_into(path.parent)
+    return run is not None and run.reads(path)
+
+
+def remove_file(path: Path) -> None:
+    """Remove a file of an earlier run, together with the change to the new ones where they are written in an :func:`output_folder`."""
+    run = _run_into(path.parent)
+    if run is None:
+        path.unlink(missing_ok=True)
+    elif os.path.lexists(path):
+        run.removed[path.name] = None
+
+
+def prepare_folder(path: str | os.PathLike[str]) -> Path:
+    """Create the output folder, parents included.
+
+    What killed runs have left half-written there is removed (see `remove_unfinished`).
+
+    Raises:
+        InputError: it is a file, lies below a file, or cannot be created, or its name is no text.
+    """
+    expect(path, (str, os.PathLike), "folder", "the path of one")
+    folder = Path(path)
+    try:
+        str(folder).encode()
+        if folder.exists() and not folder.is_dir():
+            raise InputError(f"output folder {folder} is a file; give a folder, or a name that is not taken")
+        folder.mkdir(parents=True, exist_ok=True)
+    except UnicodeEncodeError:
+        raise InputError(
+            f"output folder {str(folder)!a} has bytes in its name that are no UTF-8; choose another one"
+        ) from None
+    except OSError as error:
+        raise _no_output_folder(folder, error) from error
+    remove_unfinished(folder)
+    return folder
+
+
+def _missing(folder: Path) -> list[Path]:
+    """The folder and its parents, as far as they do not exist."""
+    try:
+        return [each.absolute() for each in (folder, *folder.parents) if not each.exists()]
+    except OSError:
+        return []  # no folder can be called so
+
+
+def _no_output_folder(folder: Path, error: OSError) -> InputError:
+    shown = f"{str(folder)[:60]}..." if len(str(folder)) > 200 else folder
+    return InputError(f"output folder {shown} cannot be written: {_reason(error)}; choose another one")
+
+
+def _reason(error: OSError) -> str:
+    return (error.strerror or str(error)).lower()
+
+
+def _cannot_write(final: Path, error: OSError) -> InputError:
+    return InputError(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")

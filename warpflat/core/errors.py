@@ -1,0 +1,90 @@
+"""What goes wrong because of the user's input."""
+
+from __future__ import annotations
+
+import difflib
+import numbers
+from collections.abc import Collection, Iterable
+from typing import TypeGuard
+
+from warpflat.core.text import one_line, shown
+
+__all__ = ["InputError", "expect", "expect_callback", "expect_each", "is_number", "nearest"]
+
+
+#: Valid words that a message lists at most.
+MOST_LISTED = 40
+#: Letters of a word by which the nearest one is found: comparing takes their square.
+LONGEST_COMPARED = 200
+
+
+class InputError(ValueError):
+    """Bad input. The message is one line: what is wrong, where, and what would be right.
+
+    The command line prints it and exits with code 2; scripts catch it as a ``ValueError``. Whatever names of the user's the message
+    quotes, it stays one line, of bounded length and without control characters.
+    """
+
+    def __init__(self, message: str = "") -> None:
+        super().__init__(one_line(message))
+
+
+def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
+    """See that an argument is of the type that it must be.
+
+    Args:
+        value: what was given.
+        kind: the type, or several.
+        name: of the argument.
+        right: what would be right, in words.
+
+    Raises:
+        InputError: it is of another type.
+    """
+    if not isinstance(value, kind):
+        raise InputError(f"{name} is of type {type(value).__name__}; it must be {right}")
+
+
+def expect_each(values: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
+    """See that an argument is a list of what it must hold.
+
+    Args:
+        values: what was given.
+        kind: the type of each, or several.
+        name: of the argument.
+        right: what each must be, in words.
+
+    Raises:
+        InputError: it is no list, or one of its entries is of another type.
+    """
+    if isinstance(values, (str, bytes)) or not isinstance(values, Collection):
+        raise InputError(f"{name} is of type {type(values).__name__}; it must be a list, each of its entries {right}")
+    for number, value in enumerate(values):
+        expect(value, kind, f"{name}[{number}]", right)
+
+
+def expect_callback(callback: object) -> None:
+    """See that a callback can be called, or is None.
+
+    Raises:
+        InputError: it cannot.
+    """
+    if callback is not None and not callable(callback):
+        raise InputError(f"callback is of type {type(callback).__name__}; it must be a function, or None")
+
+
+def is_number(value: object, *, whole: bool = False) -> TypeGuard[float]:
+    """Whether it is a number, a whole one if that is asked for; Python's and NumPy's are, True and False are none."""
+    return isinstance(value, numbers.Integral if whole else numbers.Real) and not isinstance(value, bool)
+
+
+def nearest(word: str, valid: Iterable[str]) -> str:
+    """The end of a message about an unknown `word`: the nearest valid one, then all of them, or the first ones of very many."""
+    options = sorted(valid)
+    # Somebody who writes EMT_warp means emt_warp.
+    plain = {option.lower(): option for option in reversed(options)}
+    close = difflib.get_close_matches(word[:LONGEST_COMPARED].lower(), plain, n=1, cutoff=0.5)
+    guess = f"did you mean {shown(plain[close[0]])}? " if close else ""
+    listed = ", ".join(shown(option)[1:-1] for option in options[:MOST_LISTED])
+    more = f" and {len(options) - MOST_LISTED} more" if len(options) > MOST_LISTED else ""
+    return f"{guess}valid: {listed or 'none'}{more}"

@@ -1,0 +1,100 @@
+"""Names that become files: what a file can be called on every system."""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+
+from warpflat.core.errors import InputError
+from warpflat.core.text import control_in, plain_letters, shown
+
+__all__ = ["checked_label", "checked_name", "fitted_name", "plain_label", "plain_name", "same_file"]
+
+# Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
+_FORBIDDEN = '/\\:*?"<>|'
+_DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
+# File systems take 255; there is room left for what is added, as ".marker.svg" and the temporary name's digits.
+_MOST_BYTES = 200
+
+
+def checked_name(name: str) -> str:
+    """The name, if files can bear it on any system.
+
+    Raises:
+        InputError: it is no text, empty, too long, leads to another folder, or is refused by some system.
+    """
+    if reason := _refused(name):
+        raise InputError(
+            f"{shown(name)} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
+        )
+    return name
+
+
+def checked_label(label: str, what: str) -> str:
+    """The name of a line, an edge or a size, if it can be written into every file: any text in one line.
+
+    Raises:
+        InputError: it is no text, empty, or has a control character in it; `what` says of what it is the name.
+    """
+    if not isinstance(label, str) or not label.strip():
+        raise InputError(f"{what}: {shown(label)} is no name; a name is a text that is not empty")
+    if letter := control_in(label):
+        raise InputError(f"{what}: the name {shown(label)} has the control character {letter!r} in it; leave it out")
+    return label
+
+
+def plain_label(label: str) -> str:
+    """The name that a file of somebody else gives to a line, with "_" where it has control characters."""
+    return "".join("_" if control_in(letter) else letter for letter in label)
+
+
+def fitted_name(name: str, otherwise: str = "piece") -> str:
+    """A name that nobody chose for a file, such as that of a node in a scene, changed where no file can bear it."""
+    plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
+    short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
+    return f"_{short}" if _is_device(short) else short or otherwise
+
+
+def plain_name(name: str, others: str = " _.-") -> str:
+    """The name of a scene or cut, if it is of plain letters: it is typed in a shell, and part of other names.
+
+    Raises:
+        ValueError: it has letters beyond A to Z, a to z, 0 to 9 and `others`, or does not begin with one of the former.
+    """
+    if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
+        return name
+    better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
+    hint = f"; {shown(better)} would do" if better else ""
+    raise ValueError(
+        f"{shown(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
+        f"{'spaces and ' if ' ' in others else ''}{' '.join(others.strip())}{hint}"
+    )
+
+
+def same_file(name: str) -> str:
+    """What two names have in common that are one file on Windows or macOS, where capitals and composition do not count."""
+    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
+
+
+def _refused(name: object) -> str:
+    if not isinstance(name, str):
+        return "it is no text"
+    if not name.strip():
+        return "it is empty"
+    if forbidden := next(filter(_is_forbidden, name), ""):
+        return f"it has {forbidden!r} in it"
+    if name.startswith("."):
+        return "it begins with a dot, and would be hidden"
+    if _is_device(name):
+        return "Windows keeps it for a device"
+    if (length := len(name.encode())) > _MOST_BYTES:
+        return f"it takes {length} bytes, {_MOST_BYTES} are the most"
+    return ""
+
+
+def _is_device(name: str) -> bool:
+    return bool(_DEVICES.fullmatch(name.split(".")[0].strip()))
+
+
+def _is_forbidden(letter: str) -> bool:
+    return letter in _FORBIDDEN or bool(control_in(letter))

@@ -1,0 +1,29 @@
+"""Memory that is freed, but not yet back with the system."""
+
+from __future__ import annotations
+
+import ctypes
+import sys
+from collections.abc import Callable
+from functools import cache
+
+__all__ = ["give_back"]
+
+
+def give_back() -> None:
+    """Let the C library return what was freed; where it is not glibc's, nothing is done.
+
+    Each thread has a heap of its own, whose holes no other fills: after a development beside its coarser levels a tenth to a fifth of
+    what a relaxation takes would lie idle.
+    """
+    trim = _trim()
+    if trim is not None:
+        trim(0)
+
+
+@cache
+def _trim() -> Callable[[int], int] | None:
+    if not sys.platform.startswith("linux"):
+        return None
+    trim: Callable[[int], int] | None = getattr(ctypes.CDLL(None), "malloc_trim", None)
+    return trim

@@ -1,0 +1,77 @@
+"""Files that are read, told to whoever listens: a run never replaces one of them."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
+from pathlib import Path
+from typing import Any
+
+from warpflat.core.errors import InputError
+
+__all__ = ["is_among", "listening_to_reads", "note_read", "noting_resolver", "refuse_to_replace"]
+
+Listener = Callable[[Path], object]
+
+_listeners: ContextVar[tuple[Listener, ...]] = ContextVar("readers", default=())
+
+
+def note_read(path: str | os.PathLike[str]) -> None:
+    """Tell that a file is read; every reader of a user's file does, before it spends time on it.
+
+    Raises:
+        InputError: a run that is going on would replace the file.
+    """
+    # Absolute, since a script may change its folder before it saves what it has read.
+    file = Path(path).absolute()
+    for told in _listeners.get():
+        told(file)
+
+
+@contextmanager
+def listening_to_reads(listener: Listener) -> Iterator[None]:
+    """Call `listener` with the path of each file that is read in the body."""
+    before = _listeners.set((*_listeners.get(), listener))
+    try:
+        yield
+    finally:
+        _listeners.reset(before)
+
+
+def noting_resolver(file: Path) -> Any:
+    """A resolver for trimesh that notes the files which a mesh refers to, such as materials, textures and buffers."""
+    from trimesh.resolvers import FilePathResolver
+
+    class Noting(FilePathResolver):
+        def get(self, name: str) -> bytes:
+            for place in (name.strip(), name.strip().lstrip("/"), Path(name).name):  # where trimesh looks for it
+                note_read(Path(self.parent) / place)
+            return bytes(super().get(name))
+
+    return Noting(str(file))
+
+
+def is_among(path: Path, files: Iterable[Path]) -> bool:
+    """Whether a path is one of these files by whatever name or link, capitals included where the file system has none."""
+    return any(_is_same(path, file) for file in files)
+
+
+def refuse_to_replace(final: Path, files: Iterable[Path]) -> None:
+    """See that a file which is to be written is none of those that were read.
+
+    Raises:
+        InputError: it is.
+    """
+    if is_among(final, files):
+        raise InputError(
+            f"{final} is read by this run, which would replace it; choose another output folder (--out) or another name"
+        )
+
+
+def _is_same(one: Path, other: Path) -> bool:
+    try:
+        return os.path.samefile(one, other)
+    except (OSError, ValueError):
+        return False  # one of them does not exist

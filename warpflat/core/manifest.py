@@ -1,0 +1,163 @@
+"""What earlier runs have left in a folder, and what of it goes once the results of another run are there.
+
+`metrics.json` lists under `files`, by the name of the run, what each has written, with its SHA-256. Nothing else is ever removed,
+and of that only what is still as it was written, so that a file which somebody has drawn on, or put there under that name, stays.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from warpflat.core.atomic_files import current, is_input, remove_file
+from warpflat.core.errors import InputError
+from warpflat.core.json_file import write_json
+
+__all__ = ["note_file", "require_own_metrics", "settle", "write_metrics"]
+
+Record = dict[str, dict[str, str]]
+
+#: Files that bear no name: in a folder with several runs they are taken to be the last one's.
+_NAMELESS = ("frames.usdc", "picture.png", "wear.png", "pattern.pdf", "pattern.json")
+
+
+def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
+    """Write `metrics.json`; what the one that was there knew of the files of earlier runs is kept.
+
+    Raises:
+        InputError: it cannot be written.
+    """
+    record = _record(_read(folder))
+    write_json(folder / "metrics.json", {**metrics, **({"files": record} if record else {})})
+
+
+def settle(
+    folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]
+) -> tuple[dict[str, Any], tuple[str, ...]]:
+    """Write `metrics.json` at the end of a run, and remove what earlier ones have left and would be taken for its own.
+
+    That is what a run of the same name has written and this one has not, and of other runs those files that bear no name,
+    such as `pattern.json`; never a file from which this run was made. In an :func:`warpflat.export.output_folder` they go when the new
+    files are there.
+
+    Args:
+        folder: in which the run has written all else.
+        metrics: all of `metrics.json` but `files`.
+        name: of the run.
+        files: that it has written, by name.
+
+    Returns:
+        What `metrics.json` holds, and what was removed or left, one sentence each.
+
+    Raises:
+        InputError: `metrics.json` cannot be written.
+    """
+    record = _record(_read(folder))
+    mine = {file: _digest(current(folder / file)) for file in files if file != "metrics.json"}
+    earlier = {run: {file: was for file, was in known.items() if file not in mine} for run, known in record.items()}
+    stale = {
+        (run, file): was
+        for run, known in earlier.items()
+        for file, was in known.items()
+        if run == name or file in _NAMELESS
+    }
+    earlier[name] = {**mine, **earlier.get(name, {})}
+    removed, notes = [], []
+    for (run, file), was in stale.items():
+        if reason := _take_away(folder / file, was):
+            notes.append(f"{file} was not made by this run, and stays: {reason}")
+        else:
+            removed.append(file)
+            del earlier[run][file]
+    if removed:
+        notes.insert(0, f"removed what an earlier run had left and this one did not make: {', '.join(removed)}")
+    told = {**metrics, "files": {run: known for run, known in earlier.items() if known}}
+    write_json(folder / "metrics.json", told)
+    return told, tuple(notes)
+
+
+def note_file(folder: Path, name: str, file: str) -> None:
+    """Add a file, written again or later, to those of a run that `metrics.json` knows; without such a run do nothing.
+
+    Raises:
+        InputError: `metrics.json` cannot be written.
+    """
+    try:
+        metrics = _read(folder)
+    except InputError:
+        return  # somebody else's, which knows of no run
+    record = _record(metrics)
+    if name in record:
+        record[name][file] = _digest(current(folder / file))
+        write_json(folder / "metrics.json", {**metrics, "files": record})
+
+
+def _take_away(path: Path, was: str) -> str:
+    """Remove a file that is still as a run wrote it, or say why it stays."""
+    if is_input(path):
+        return "this run was made from it"
+    if path.is_symlink() or (path.exists() and not path.is_file()):
+        return "it is not as an earlier run left it"
+    try:
+        if path.exists() and _digest(path) != was:
+            return "it is not as an earlier run left it"
+        remove_file(path)
+    except OSError as error:
+        return f"it cannot be removed ({(error.strerror or str(error)).lower()})"
+    return ""
+
+
+def require_own_metrics(folder: Path) -> None:
+    """Make sure that a `metrics.json` which is there is of warpflat, since a run replaces it.
+
+    Raises:
+        InputError: it is something else by that name.
+    """
+    _read(folder)
+
+
+def _read(folder: Path) -> dict[str, Any]:
+    """What a folder's `metrics.json` holds; nothing where there is none.
+
+    Raises:
+        InputError: it is something else by that name.
+    """
+    file = folder / "metrics.json"
+    try:
+        data = json.loads(current(file).read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        return {}
+    except (OSError, ValueError, RecursionError):
+        data = None
+    if not isinstance(data, dict) or "warpflat" not in data:
+        raise InputError(
+            f"{file}: is not of warpflat, and a run would replace it; move it away, or choose another folder"
+        )
+    return data
+
+
+def _record(metrics: Mapping[str, Any]) -> Record:
+    """The files it lists, by run; only plain names, since a name with a folder in it is none that a run has written."""
+    listed = metrics.get("files")
+    if not isinstance(listed, dict):
+        return {}
+    return {
+        run: {file: was for file, was in known.items() if isinstance(was, str) and _is_plain(file)}
+        for run, known in listed.items()
+        if isinstance(known, dict)
+    }
+
+
+def _is_plain(file: str) -> bool:
+    return bool(file) and Path(file).name == file and file not in ("..", "metrics.json")
+
+
+def _digest(path: Path) -> str:
+    digest = hashlib.sha256()
+    with path.open("rb") as stream:
+        while block := stream.read(1 << 20):
+            digest.update(block)
+    return digest.hexdigest()

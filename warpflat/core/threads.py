@@ -1,0 +1,28 @@
+"""How many threads share the work."""
+
+from __future__ import annotations
+
+import os
+from functools import lru_cache
+
+from warpflat.core.errors import InputError
+
+__all__ = ["thread_count"]
+
+
+def thread_count() -> int:
+    """Threads used if nothing else is asked for: ``WARPFLAT_THREADS``, or the cores this process may use.
+
+    Raises:
+        InputError: the variable is not a whole number of at least 1.
+    """
+    return _thread_count(os.environ.get("WARPFLAT_THREADS", "").strip())
+
+
+@lru_cache
+def _thread_count(wished: str) -> int:
+    if not wished:
+        return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    if not wished.isdecimal() or int(wished) < 1:
+        raise InputError(f"WARPFLAT_THREADS = {wished!r}; must be a whole number of threads, 1 or more")
+    return int(wished)

@@ -1,0 +1,206 @@
+"""TOML files that people write: read and checked against a pydantic model, every mistake told in one line."""
+
+from __future__ import annotations
+
+import sys
+import types
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any, TypeVar, Union, get_args, get_origin
+
+from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic_core import ErrorDetails
+
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.input_files import note_read
+from warpflat.core.text import control_in, shown
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+__all__ = ["Table", "check_table", "read_toml"]
+
+Model = TypeVar("Model", bound=BaseModel)
+
+_RIGHT_NUMBER = "a whole number is written in 64 bits, up to 9223372036854775807"
+_DEEPEST = 50
+# Texts of several lines may have these; what reads a name refuses them.
+_BLANKS = "\t\n\r"
+
+
+class Table(BaseModel):
+    """A table of a file: no unknown keys, no "1" for 1, no NaN, and nothing changes after reading."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+def read_toml(path: Path) -> dict[str, Any]:
+    """The file's tables.
+
+    Raises:
+        InputError: no such file, a directory, unreadable, or not TOML (with the line).
+    """
+    note_read(path)
+    try:
+        text = path.read_text(encoding="utf-8-sig")  # as some editors save it, with a byte order mark
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file{_similar_file(path)}") from None
+    except IsADirectoryError:
+        raise InputError(f"{path}: is a directory; give a .toml file") from None
+    except UnicodeDecodeError as error:
+        raise InputError(f"{path}: is not a text file (byte {error.start}); give a .toml file in UTF-8") from None
+    except (OSError, ValueError) as error:
+        raise InputError(f"{path}: cannot be read: {getattr(error, 'strerror', None) or error}") from None
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise InputError(f"{path}: is not valid TOML: {error}") from None
+    except ValueError:  # Python turns no more than 4300 digits into a number
+        raise InputError(f"{path}: has a number of thousands of digits; {_RIGHT_NUMBER}") from None
+    except RecursionError:
+        raise InputError(f"{path}: is not valid TOML: nested too deeply") from None
+    _check_values(tables, path)
+    return tables
+
+
+def _check_values(tables: dict[str, Any], path: Path) -> None:
+    """See that whole numbers are TOML's, that texts are written in letters, and that no table lies too deep for those who read it.
+
+    Raises:
+        InputError: the first that is not.
+    """
+    todo: list[tuple[str, int, Any]] = [("", 0, tables)]
+    for key, depth, value in todo:
+        if depth > _DEEPEST:
+            raise InputError(f"{path}: {key}: nested too deeply; tables and lists may lie in at most {_DEEPEST} others")
+        if isinstance(value, dict):
+            for name, below in value.items():
+                inner = f"{key}.{name}" if key else name
+                if letter := control_in(name, _BLANKS):
+                    raise InputError(
+                        f"{path}: {inner}: the key has the control character {letter!r} in it; leave it out"
+                    )
+                todo.append((inner, depth + 1, below))
+        elif isinstance(value, list):
+            todo += [(key, depth + 1, below) for below in value]
+        elif isinstance(value, int) and not -(2**63) <= value < 2**63:
+            raise InputError(f"{path}: {key}: {shown(value)} is too large; {_RIGHT_NUMBER}")
+        elif isinstance(value, str) and (letter := control_in(value, _BLANKS)):
+            raise InputError(f"{path}: {key}: {shown(value)} has the control character {letter!r} in it; leave it out")
+
+
+def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
+    """The data as a `model`.
+
+    Args:
+        model: what it must be.
+        data: as read.
+        where: the file (and table), the beginning of the message.
+
+    Raises:
+        InputError: the first thing that is wrong: its key, what would be right, the nearest key for an unknown one.
+    """
+    try:
+        return model.model_validate(data)
+    except ValidationError as error:
+        problems = error.errors(include_url=False)
+        # A misspelled key is usually also a missing one: tell the cause, not the consequence.
+        problems.sort(key=lambda p: p["type"] != "extra_forbidden")
+        more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
+        told = f"{_describe(model, data, problems[0])}{more}"
+        raise InputError(f"{where}: {told}" if where else told) from None
+
+
+def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:
+    location = problem["loc"]
+    kind = problem["type"]
+    parents, parent = _walk(model, data, location[:-1] if kind in ("extra_forbidden", "missing") else location)
+    if kind == "extra_forbidden":
+        key = str(location[-1])
+        path = ".".join([*parents, key])
+        return f"{path}: unknown key {shown(key)}; {nearest(key, _keys(parent))}"
+    if kind == "missing":
+        return f"{'.'.join([*parents, str(location[-1])])}: is missing"
+    path = ".".join(parents)
+    message = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
+    given = problem["input"]
+    if kind == "value_error" or isinstance(given, (dict, list)):
+        told = message
+    else:
+        told = f"{message}, got {shown(given)}"
+        if kind in ("literal_error", "enum"):
+            told += _guess(given, parent)
+    return f"{path}: {told}" if path else told
+
+
+def _walk(model: type[BaseModel], data: Any, location: tuple[int | str, ...]) -> tuple[list[str], Any]:
+    """The keys of a location as the file has them (pydantic adds tags of unions), and the annotation they lead to."""
+    annotation: Any = model
+    keys: list[str] = []
+    for step in location:
+        if isinstance(data, Mapping) and step in data:
+            data = data[step]
+            keys.append(str(step))
+        elif isinstance(data, (list, tuple)) and isinstance(step, int) and step < len(data):
+            data = data[step]
+            if keys:
+                keys[-1] += f"[{step}]"
+        else:
+            continue
+        annotation = _below(annotation, step)
+    return keys, annotation
+
+
+def _members(annotation: Any) -> Iterator[Any]:
+    origin = get_origin(annotation)
+    if origin is Union or origin is types.UnionType:
+        for member in get_args(annotation):
+            yield from _members(member)
+    elif hasattr(annotation, "__metadata__"):
+        yield from _members(get_args(annotation)[0])
+    else:
+        yield annotation
+
+
+def _below(annotation: Any, step: int | str) -> Any:
+    found: Any = None
+    for member in _members(annotation):
+        if isinstance(member, type) and issubclass(member, BaseModel):
+            found = _fields(member).get(str(step), found)
+        elif get_origin(member) in (dict, Mapping) or get_origin(member) in (list, tuple):
+            found = get_args(member)[-1] if get_origin(member) in (dict, Mapping) else get_args(member)[0]
+    return found
+
+
+def _keys(annotation: Any) -> list[str]:
+    return [
+        key
+        for member in _members(annotation)
+        if isinstance(member, type) and issubclass(member, BaseModel)
+        for key in _fields(member)
+    ]
+
+
+def _fields(model: type[BaseModel]) -> dict[str, Any]:
+    """Annotations by the keys that a file has for them."""
+    return {field.alias or name: field.annotation for name, field in model.model_fields.items()}
+
+
+def _guess(given: Any, annotation: Any) -> str:
+    from typing import Literal
+
+    options = [str(x) for m in _members(annotation) if get_origin(m) is Literal for x in get_args(m)]
+    return f"; {nearest(str(given), options)}" if options else ""
+
+
+def _similar_file(path: Path) -> str:
+    import difflib
+
+    try:
+        names = [p.name for p in path.parent.iterdir()]
+    except OSError:
+        return ""
+    close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
+    return f"; did you mean {str(path.parent / close[0])!r}?" if close else ""

@@ -1,0 +1,1 @@
+"""Pieces are cut where the strain energy stays: candidates, ledger, remedies."""

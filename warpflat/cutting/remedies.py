@@ -1,0 +1,159 @@
+"""Cuts that would help where a garment does not fit, each tried on its piece."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import islice
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.model.fit import Misfit, WornFit, assess_fit
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+from warpflat.flattening.fit_report import Remedy
+
+__all__ = ["advise", "remedies"]
+
+# A line that passes within this distance of the worst place can take the dart for it [m].
+_NEARBY = 0.03
+
+
+# The share that is beyond the limit settles long before the energy does.
+_TRIAL_TOLERANCE = 20.0
+
+
+_MOST_TRIALS = 8
+
+
+# So many are told.
+_TOLD = 3
+
+
+# Nobody sews a dart shorter than this [m].
+_LEAST_CUT = 0.025
+
+
+def advise(result: Flattening) -> Flattening:
+    """Look for cuts that would help where a piece does not fit, and return the piece with them in `remedies`.
+
+    Where a way of wearing was asked for, up to eight cuts are made and relaxed on trial, and the best three are kept. Otherwise
+    the three nearest are named and none is tried.
+    """
+    found = remedies(result, result.fit, trial=result.wear is not None)
+    return replace(result, remedies=tuple(found)) if found else result
+
+
+def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
+    """Darts and seams for the worst places: along lines that pass by, and straight from the border.
+
+    None for a piece that fits unsewn. Cuts of a sewn piece are tried on it as it lay before, and compared with that: what sewing adds
+    or takes is not the cut's.
+
+    Args:
+        result: a flattened piece.
+        fit: how it sits.
+        trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
+    """
+    alone = result.alone or result
+    if fit.fits or alone.fit.fits:
+        return []
+    found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _TOLD))
+    if not trial:
+        return found
+    tried = [_tried(alone, remedy) for remedy in found]
+    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * alone.fit.outside]
+    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:_TOLD]
+
+
+def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
+    """For the largest places, each once; made as they are asked for, since a path over a large mesh takes a while."""
+    found: list[Remedy] = []
+    for misfit in fit.misfits[:4]:
+        for remedy in _candidates(result, misfit):
+            known = any(np.array_equal(remedy.path, other.path) for other in found)
+            if not known and remedy.length >= _LEAST_CUT:
+                found.append(remedy)
+                yield remedy
+
+
+def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
+    from warpflat.surface.paths.lines import line_between
+    from warpflat.surface.topology import border_of
+
+    surface = result.surface
+    worst = int(result.vertex_origin[misfit.vertex])
+    border = border_of(surface)
+    points = surface.vertices
+    for name, line in surface.lines.items():
+        row = np.asarray(line)
+        if len(row) < 2 or np.isin(row, border).all():
+            continue
+        nearest = int(np.argmin(np.linalg.norm(points[row] - points[worst], axis=1)))
+        if np.linalg.norm(points[row[nearest]] - points[worst]) > _NEARBY:
+            continue
+        dart = min(row[: nearest + 1], row[nearest:][::-1], key=len)
+        if len(dart) > 2 and dart[0] in border and not np.isin(dart[1:], border).any():
+            yield _remedy(result, dart, f"a dart along {name}")
+        if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
+            yield _remedy(result, row, f"a seam along {name}")
+    if worst in border:
+        # At the border itself a short cut relieves nothing: it has to reach behind the region.
+        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
+        if len(inside) == 0:
+            return
+        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
+    for start in _border_feet(points, border, worst):
+        try:
+            path = line_between(surface, int(start), worst)
+        except InputError:
+            continue
+        # A shortest path may run along the border first.
+        last = int(np.flatnonzero(np.isin(path, border))[-1])
+        if len(path) - last > 1:
+            yield _remedy(result, path[last:], "a dart from the border")
+
+
+def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
+    """The border's vertex nearest to the place, and the nearest in a direction at right angles to that or further off."""
+    away = points[border] - points[worst]
+    distance = np.linalg.norm(away, axis=1)
+    first = int(np.argmin(distance))
+    cosine = away @ away[first] / np.maximum(distance * distance[first], 1e-300)
+    others = np.flatnonzero(cosine < 0.3)
+    feet = [int(border[first])]
+    if len(others):
+        feet.append(int(border[others[np.argmin(distance[others])]]))
+    return feet
+
+
+def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy:
+    points = result.surface.vertices[path]
+    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
+    return Remedy(
+        words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm", path=path.astype(np.int32), length=length
+    )
+
+
+def _tried(result: Flattening, remedy: Remedy) -> Remedy:
+    from warpflat.cutting.cut_piece import CutPlan, cut
+
+    options = result.options
+    quick = replace(
+        options,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        max_steps=min(options.max_steps, result.stages[-1].steps + 2000),
+    )
+    try:
+        opened = cut(result, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)
+    except InputError:
+        # The path meets a cut that was made before.
+        return remedy
+    return replace(remedy, outside=assess_fit(opened.network, opened.positions).outside)

@@ -1,0 +1,1 @@
+"""Fabrics: stiffness, its measurement, and the library."""

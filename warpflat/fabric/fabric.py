@@ -1,0 +1,236 @@
+"""Fabrics: in-plane stiffness, weight and limits of a cloth, each value with where it comes from."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, is_number, nearest
+
+__all__ = ["DEFAULT_FABRIC", "GRADES", "Curve", "Fabric", "Provenance", "fabric_called", "grain_axes", "value_names"]
+
+DEFAULT_FABRIC = "isotropic"
+
+GRADES = {
+    "A": "read from data or code",
+    "B": "web page or book",
+    "C": "second-hand",
+    "D": "defined, describes no real cloth",
+    "E": "estimate",
+}
+
+Curve = tuple[tuple[float, float], ...]
+
+# Wide enough for all that is sewn, from tulle to sole leather, and narrow enough to catch a value in another unit.
+_RANGES: dict[str, tuple[float, float, str]] = {
+    "stiffness_warp": (1.0, 5e6, "N/m"),
+    "stiffness_weft": (1.0, 5e6, "N/m"),
+    "shear_stiffness": (0.1, 5e6, "N/m"),
+    "areal_density": (0.005, 5.0, "kg/m2"),
+    "poisson_ratio": (0.0, 0.99, ""),
+    "strain_limit": (0.001, 2.0, ""),
+    "compression_factor": (0.001, 1.0, ""),
+}
+
+
+@dataclass(frozen=True, kw_only=True)
+class Provenance:
+    """Where one value of a fabric comes from.
+
+    Attributes:
+        source: who measured or says so.
+        grade: a key of `GRADES`.
+        unit: the unit the value was given in; the fabric itself holds SI.
+        test_load: the load or strain at which it was measured; cloth stiffens 3 to 30 times between 5 and 500 gf/cm, so
+            a stiffness says little without it.
+        spread: lowest and highest value given (SI), where the source gives a range and the fabric holds its middle.
+        at_least: the source gives the value as a lower bound.
+    """
+
+    source: str = "not stated"
+    grade: str = ""
+    unit: str = ""
+    test_load: str = ""
+    spread: tuple[float, float] | None = None
+    at_least: bool = False
+
+    @property
+    def is_estimate(self) -> bool:
+        """True for a value that nobody measured."""
+        return self.grade == "E"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Fabric:
+    """A cloth as the flattening sees it: an orthotropic membrane along straight warp and weft threads.
+
+    A fabric is checked when it is made, so one that exists is one that can be computed with.
+
+    Attributes:
+        name: what it is called in files and messages.
+        stiffness_warp: secant tensile stiffness along the warp (load per width / strain) [N/m].
+        stiffness_weft: the same along the weft [N/m].
+        shear_stiffness: shear force per width per shear angle [N/m per rad].
+        poisson_ratio: weft contraction per warp extension under tension along the warp. Measured values are rare for
+            cloth, so 0 unless a source gives one; an isotropic sheet has G = K / (2 (1 + nu)).
+        areal_density: mass per area [kg/m2].
+        strain_limit: strain a pattern may ask of the cloth, either sign; 0.05 is usual for wovens.
+        compression_factor: stiffness under in-plane compression over that under tension. Cloth wrinkles instead of
+            being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
+        curve_warp: (strain, tension [N/m]) points of a J-shaped curve along the warp, both rising from the origin,
+            which is not listed; empty where the secant stiffness is all that is known.
+        curve_weft: the same along the weft.
+        description: one line for people.
+        aliases: other names it is found by.
+        provenance: for each value (by attribute name) where it comes from.
+    """
+
+    name: str
+    stiffness_warp: float
+    stiffness_weft: float
+    shear_stiffness: float
+    areal_density: float
+    poisson_ratio: float = 0.0
+    strain_limit: float = 0.05
+    compression_factor: float = 1.0
+    curve_warp: Curve = ()
+    curve_weft: Curve = ()
+    description: str = ""
+    aliases: tuple[str, ...] = ()
+    provenance: Mapping[str, Provenance] = field(default_factory=dict, compare=False, repr=False)
+
+    def __post_init__(self) -> None:
+        self.validate()
+
+    def validate(self) -> None:
+        """Refuse what no cloth can be.
+
+        Raises:
+            InputError: a value is missing, no number, outside its range, or contradicts another one; names the value.
+        """
+        for key, (lowest, highest, unit) in _RANGES.items():
+            value = getattr(self, key)
+            if value is None:
+                raise InputError(f"fabric {self.name!r}: {key} is missing; {_range_text(lowest, highest, unit)}")
+            if not is_number(value):
+                raise InputError(f"fabric {self.name!r}: {key} = {value!r} is not a number")
+            if not lowest <= value <= highest:  # false for NaN too
+                raise InputError(
+                    f"fabric {self.name!r}: {key} = {value:g} {unit}".rstrip()
+                    + f" is out of range; {_range_text(lowest, highest, unit)}{_unit_hint(key, float(value))}"
+                )
+        softer = min(self.stiffness_warp, self.stiffness_weft)
+        if self.shear_stiffness > softer:
+            raise InputError(
+                f"fabric {self.name!r}: shear_stiffness = {self.shear_stiffness:g} N/m is more than the softer tensile "
+                f"stiffness, {softer:g} N/m; cloth has a shear stiffness of 1/100 to 1/2 of it"
+            )
+        bound = math.sqrt(self.stiffness_warp / self.stiffness_weft)
+        if self.poisson_ratio >= bound:
+            raise InputError(
+                f"fabric {self.name!r}: poisson_ratio = {self.poisson_ratio:g} would let it release energy when "
+                f"stretched; must be below sqrt(stiffness_warp / stiffness_weft) = {bound:.3g}"
+            )
+        for key in ("curve_warp", "curve_weft"):
+            _check_curve(self.name, key, getattr(self, key))
+
+    @property
+    def softness(self) -> float:
+        """K/G: how much stiffer it is along its threads than in shear."""
+        return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
+
+    @property
+    def is_isotropic(self) -> bool:
+        """Whether it is the same in all directions, within .1 %: values are given with three or four digits."""
+        same = math.isclose(self.stiffness_warp, self.stiffness_weft, rel_tol=1e-3)
+        sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
+        return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
+
+    def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> FloatArray:
+        """Tension at given strains along one direction, by the curve where there is one.
+
+        Args:
+            strain: any shape, elongation over length; negative is compression.
+            direction: along which threads.
+
+        Returns:
+            Same shape, load per width [N/m]. Straight between the curve's points and on beyond its last two; linear
+            with the secant stiffness without a curve, and under compression (times `compression_factor`).
+        """
+        if direction not in ("warp", "weft"):
+            raise InputError(f"direction {direction!r}: {nearest(str(direction), ['warp', 'weft'])}")
+        e = np.asarray(strain, dtype=np.float64)
+        stiffness: float = getattr(self, f"stiffness_{direction}")
+        points: Curve = getattr(self, f"curve_{direction}")
+        if not points:
+            pulled = stiffness * e
+        else:
+            xs, ys = np.array([(0.0, 0.0), *points]).T
+            slope = (ys[-1] - ys[-2]) / (xs[-1] - xs[-2])
+            pulled = np.where(e > xs[-1], ys[-1] + slope * (e - xs[-1]), np.interp(e, xs, ys))
+        return np.where(e < 0.0, self.compression_factor * stiffness * e, pulled)
+
+    @property
+    def estimates(self) -> tuple[str, ...]:
+        """Names of the values that are estimates."""
+        return tuple(key for key, origin in self.provenance.items() if origin.is_estimate)
+
+
+def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
+    """Return a library's fabric of that name or alias; case, spaces and underscores do not matter.
+
+    Raises:
+        InputError: there is none; names the nearest.
+    """
+    wanted = _plain(name)
+    for fabric in library.values():
+        if wanted in (_plain(fabric.name), *map(_plain, fabric.aliases)):
+            return fabric
+    names = [*library, *(alias for fabric in library.values() for alias in fabric.aliases)]
+    raise InputError(f"unknown fabric {name!r}: {nearest(wanted, names)}")
+
+
+def grain_axes(grain_angle: float) -> tuple[FloatArray, FloatArray]:
+    """Unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
+    angle = np.deg2rad(grain_angle)
+    return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
+
+
+def value_names() -> tuple[str, ...]:
+    """The attributes of a fabric that are measured numbers or curves."""
+    return tuple(f.name for f in fields(Fabric) if f.name in _RANGES or f.name.startswith("curve_"))
+
+
+def _plain(name: str) -> str:
+    return "-".join(name.replace("_", " ").replace("-", " ").lower().split())
+
+
+def _range_text(lowest: float, highest: float, unit: str) -> str:
+    return f"must lie between {lowest:g} and {highest:g} {unit}".rstrip()
+
+
+def _unit_hint(key: str, value: float) -> str:
+    if key == "areal_density" and 5.0 < value <= 5000.0:
+        return f" (if that is in g/m2, write {value / 1000.0:g})"
+    if key == "strain_limit" and 2.0 < value <= 200.0:
+        return f" (if that is in percent, write {value / 100.0:g})"
+    return ""
+
+
+def _check_curve(fabric: str, key: str, points: Curve) -> None:
+    previous = (0.0, 0.0)
+    for number, point in enumerate(points):
+        if len(point) != 2 or not all(math.isfinite(x) for x in point):
+            raise InputError(f"fabric {fabric!r}: {key}[{number}] = {point}; must be strain and tension [N/m]")
+        if point[0] <= previous[0] or point[1] <= previous[1]:
+            raise InputError(
+                f"fabric {fabric!r}: {key}[{number}] = ({point[0]:g}, {point[1]:g}) does not rise from "
+                f"({previous[0]:g}, {previous[1]:g}); strain and tension must both increase from (0, 0)"
+            )
+        previous = (point[0], point[1])

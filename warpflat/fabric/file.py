@@ -1,0 +1,344 @@
+"""Fabric files: the format of ``data/fabrics.toml``, of a user's own library, and of a scene's ``[fabric]`` table."""
+
+from __future__ import annotations
+
+import functools
+import itertools
+from collections.abc import Mapping
+from dataclasses import fields, replace
+from importlib import resources
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.toml_file import Table, check_table, read_toml
+from warpflat.fabric.fabric import Curve, Fabric, Provenance, fabric_called
+from warpflat.fabric.instruments import (
+    FAST_LOADS,
+    GF_PER_CM,
+    KES_SHEAR_UNIT,
+    curve_from_fast,
+    curve_from_kes,
+    shear_stiffness_from_fast,
+    shear_stiffness_from_kes,
+    stiffness_from_extension,
+)
+
+__all__ = ["FabricTable", "fabric_from_table", "read_fabrics", "read_shipped_fabrics"]
+
+_TENSILE = {"N/m": 1.0, "gf/cm": GF_PER_CM, "N/cm": 100.0, "lbf/in": 175.12683524647636}
+_UNITS: dict[str, dict[str, float]] = {
+    "stiffness_warp": _TENSILE,
+    "stiffness_weft": _TENSILE,
+    "shear_stiffness": {"N/m": 1.0, "N/m per rad": 1.0, "gf/(cm deg)": KES_SHEAR_UNIT},
+    "areal_density": {"kg/m2": 1.0, "g/m2": 1e-3, "mg/cm2": 1e-2, "oz/yd2": 0.0339057474748},
+    "poisson_ratio": {"1": 1.0},
+    "strain_limit": {"1": 1.0, "percent": 0.01},
+    "compression_factor": {"1": 1.0, "percent": 0.01},
+}
+
+# Points into which a stretch of linearly varying secant stiffness (a parabola) is cut.
+_POINTS_PER_STRETCH = 4
+
+Grade = Literal["A", "B", "C", "D", "E"]
+_Pair = Annotated[list[float], Field(min_length=2, max_length=2)]
+
+
+class _Origin(Table):
+    source: str = "not stated"
+    grade: Grade | None = None
+    test_load: str = ""
+    note: str = ""
+
+
+class ValueTable(_Origin):
+    """One number with its unit and where it comes from."""
+
+    value: float
+    unit: str
+    spread: _Pair | None = None
+    at_least: bool = False
+
+
+class CurveTable(_Origin):
+    """A J-shaped curve: points of strain and tension, or secant stiffnesses at strains, linear in between."""
+
+    points: list[_Pair] | None = Field(default=None, min_length=1)
+    secants: list[_Pair] | None = Field(default=None, min_length=2)
+    unit: str = "N/m"
+
+    @model_validator(mode="after")
+    def _one_of_two(self) -> CurveTable:
+        if (self.points is None) == (self.secants is None):
+            raise ValueError("give either points = [[strain, tension], ...] or secants = [[strain, stiffness], ...]")
+        return self
+
+
+class KesTable(Table):
+    """Readings of KES-F: EMT [%], LT, the maximum load [gf/cm], shear G [gf/(cm deg)], weight W [mg/cm2]."""
+
+    emt_warp: float = Field(gt=0)
+    emt_weft: float = Field(gt=0)
+    lt_warp: float | None = Field(default=None, gt=0, le=1)
+    lt_weft: float | None = Field(default=None, gt=0, le=1)
+    max_load: float = Field(default=500.0, gt=0)
+    g: float | None = Field(default=None, gt=0)
+    w: float | None = Field(default=None, gt=0)
+    source: str = "KES-F readings"
+    grade: Grade | None = None
+
+
+class FastTable(Table):
+    """Readings of FAST: extensions E5, E20, E100 [%] along warp and weft, bias extension EB5 [%], weight W [g/m2]."""
+
+    e5_warp: float | None = Field(default=None, gt=0)
+    e5_weft: float | None = Field(default=None, gt=0)
+    e20_warp: float | None = Field(default=None, gt=0)
+    e20_weft: float | None = Field(default=None, gt=0)
+    e100_warp: float = Field(gt=0)
+    e100_weft: float = Field(gt=0)
+    eb5: float | None = Field(default=None, gt=0)
+    w: float | None = Field(default=None, gt=0)
+    source: str = "FAST readings"
+    grade: Grade | None = None
+
+
+def _number_or_table(value: Any) -> str:
+    return "table" if isinstance(value, (dict, ValueTable)) else "number"
+
+
+Quantity = Annotated[
+    Annotated[float, Tag("number")] | Annotated[ValueTable, Tag("table")],
+    Discriminator(_number_or_table),
+]
+
+
+class FabricTable(Table):
+    """One fabric. A plain number is in SI; what is not given comes from the readings, then from `base`."""
+
+    base: str | None = None
+    description: str = ""
+    aliases: list[str] = Field(default_factory=list)
+    stiffness_warp: Quantity | None = None
+    stiffness_weft: Quantity | None = None
+    shear_stiffness: Quantity | None = None
+    areal_density: Quantity | None = None
+    poisson_ratio: Quantity | None = None
+    strain_limit: Quantity | None = None
+    compression_factor: Quantity | None = None
+    curve_warp: CurveTable | None = None
+    curve_weft: CurveTable | None = None
+    kes: KesTable | None = None
+    fast: FastTable | None = None
+
+    @model_validator(mode="after")
+    def _one_instrument(self) -> FabricTable:
+        if self.kes is not None and self.fast is not None:
+            raise ValueError("give the readings of one instrument, [kes] or [fast], not both")
+        return self
+
+
+@functools.lru_cache(maxsize=1)
+def _shipped() -> tuple[Fabric, ...]:
+    with resources.as_file(resources.files("warpflat.fabric") / "data/fabrics.toml") as path:
+        return tuple(read_fabrics(path).values())
+
+
+def read_shipped_fabrics() -> dict[str, Fabric]:
+    """The package's own library, by name."""
+    return {fabric.name: fabric for fabric in _shipped()}
+
+
+def read_fabrics(path: Path, library: Mapping[str, Fabric] | None = None) -> dict[str, Fabric]:
+    """The fabrics of a file, by name.
+
+    Args:
+        path: a TOML file with one table per fabric, and optionally ``[sources]``: short key = full text.
+        library: where a `base` is looked up, besides the fabrics before it in the same file.
+
+    Raises:
+        InputError: unreadable, an unknown key, an impossible value; one line with file, fabric and key.
+    """
+    data = read_toml(path)
+    sources = data.pop("sources", {})
+    if not isinstance(sources, dict) or not all(isinstance(text, str) for text in sources.values()):
+        raise InputError(f'{path}: sources: must be a table of texts, such as smith = "Smith 2001, table 3"')
+    if not data:
+        raise InputError(f"{path}: has no fabric; write a table such as [my-cloth] with stiffness_warp = 2000")
+    known = dict(library or {})
+    found: dict[str, Fabric] = {}
+    for name, entry in data.items():
+        if not isinstance(entry, dict):
+            hint = nearest(name, FabricTable.model_fields)
+            raise InputError(f"{path}: {name}: stands outside a fabric's table; begin one with [name] ({hint})")
+        table = check_table(FabricTable, entry, f"{path}: {name}")
+        found[name] = known[name] = fabric_from_table(name, table, where=str(path), library=known, sources=sources)
+    return found
+
+
+def fabric_from_table(
+    name: str,
+    table: FabricTable,
+    *,
+    where: str,
+    library: Mapping[str, Fabric] | None = None,
+    sources: Mapping[str, str] | None = None,
+) -> Fabric:
+    """The fabric that a checked table describes.
+
+    Args:
+        name: what it is called.
+        table: its table.
+        where: the file, the beginning of messages.
+        library: where its `base` is looked up (the shipped library without one).
+        sources: full texts of the sources that values name by a short key.
+
+    Raises:
+        InputError: an unknown base or unit, a missing value, an impossible one.
+    """
+    try:
+        values: dict[str, Any] = {}
+        origins: dict[str, Provenance] = {}
+        if table.base is not None:
+            base = _base(name, table.base, read_shipped_fabrics() if library is None else library)
+            values = {f.name: getattr(base, f.name) for f in fields(Fabric) if f.name not in ("name", "aliases")}
+            origins = dict(values.pop("provenance"))
+        given, told = _readings(table)
+        own, own_told = _own_values(name, table, sources or {})
+        if table.base is not None:
+            # A curve of the base would contradict a stiffness that is given here.
+            for direction in ("warp", "weft"):
+                if f"stiffness_{direction}" in {**given, **own}:
+                    values.pop(f"curve_{direction}", None)
+                    origins.pop(f"curve_{direction}", None)
+        values.update(given | own)
+        origins.update(told | own_told)
+        for key in ("stiffness_warp", "stiffness_weft", "shear_stiffness", "areal_density"):
+            if key not in values:
+                raise InputError(f"fabric {name!r}: {key} is missing; {_how_to_give(key)}")
+        values["description"] = table.description or values.get("description", "")
+        return Fabric(name=name, aliases=tuple(table.aliases), provenance=origins, **values)
+    except InputError as error:
+        raise InputError(f"{where}: {error}") from None
+
+
+def _base(name: str, base: str, library: Mapping[str, Fabric]) -> Fabric:
+    try:
+        return fabric_called(base, library)
+    except InputError as error:
+        raise InputError(f"fabric {name!r}: base: {error}") from None
+
+
+def _own_values(
+    name: str, table: FabricTable, sources: Mapping[str, str]
+) -> tuple[dict[str, Any], dict[str, Provenance]]:
+    values: dict[str, Any] = {}
+    origins: dict[str, Provenance] = {}
+    for key, units in _UNITS.items():
+        given: float | ValueTable | None = getattr(table, key)
+        if isinstance(given, ValueTable):
+            factor = _factor(name, key, given.unit, units)
+            values[key] = given.value * factor
+            spread = (given.spread[0] * factor, given.spread[1] * factor) if given.spread else None
+            origins[key] = replace(_provenance(given, given.unit, sources), spread=spread, at_least=given.at_least)
+        elif given is not None:
+            values[key] = given
+            origins[key] = Provenance(unit=next(iter(units)))
+    for key in ("curve_warp", "curve_weft"):
+        curve: CurveTable | None = getattr(table, key)
+        if curve is not None:
+            values[key] = _curve(curve, _factor(name, key, curve.unit, _TENSILE))
+            origins[key] = _provenance(curve, curve.unit, sources)
+    return values, origins
+
+
+def _provenance(origin: _Origin, unit: str, sources: Mapping[str, str]) -> Provenance:
+    source = sources.get(origin.source, origin.source)
+    return Provenance(
+        source=f"{source}; {origin.note}" if origin.note else source,
+        grade=origin.grade or "",
+        unit=unit,
+        test_load=origin.test_load,
+    )
+
+
+def _factor(name: str, key: str, unit: str, units: Mapping[str, float]) -> float:
+    if unit not in units:
+        raise InputError(f"fabric {name!r}: {key}: unknown unit {unit!r}; {nearest(unit, units)}")
+    return units[unit]
+
+
+def _curve(curve: CurveTable, factor: float) -> Curve:
+    if curve.points is not None:
+        return tuple((strain, tension * factor) for strain, tension in curve.points)
+    points: list[tuple[float, float]] = []
+    secants = curve.secants or []
+    for (e0, k0), (e1, k1) in itertools.pairwise(secants):
+        for step in range(1, _POINTS_PER_STRETCH + 1):
+            part = step / _POINTS_PER_STRETCH
+            strain = e0 + part * (e1 - e0)
+            points.append((strain, (k0 + part * (k1 - k0)) * factor * strain))
+    return tuple(points)
+
+
+def _readings(table: FabricTable) -> tuple[dict[str, Any], dict[str, Provenance]]:
+    values: dict[str, Any] = {}
+    origins: dict[str, Provenance] = {}
+    if table.kes is not None:
+        kes = table.kes
+        load = kes.max_load * GF_PER_CM
+        for direction in ("warp", "weft"):
+            emt = getattr(kes, f"emt_{direction}")
+            linearity = getattr(kes, f"lt_{direction}")
+            values[f"stiffness_{direction}"] = stiffness_from_extension(emt, load)
+            origins[f"stiffness_{direction}"] = Provenance(
+                source=kes.source, grade=kes.grade or "", unit="percent at load", test_load=f"{load:.0f} N/m"
+            )
+            if linearity is not None:
+                values[f"curve_{direction}"] = curve_from_kes(emt, linearity, load)
+                origins[f"curve_{direction}"] = Provenance(
+                    source=f"{kes.source}; power law that meets EMT and LT",
+                    grade=kes.grade or "",
+                    unit="N/m",
+                    test_load=f"up to {load:.0f} N/m",
+                )
+        if kes.g is not None:
+            values["shear_stiffness"] = shear_stiffness_from_kes(kes.g)
+            origins["shear_stiffness"] = Provenance(source=kes.source, grade=kes.grade or "", unit="gf/(cm deg)")
+        if kes.w is not None:
+            values["areal_density"] = kes.w * 0.01
+            origins["areal_density"] = Provenance(source=kes.source, grade=kes.grade or "", unit="mg/cm2")
+    if table.fast is not None:
+        _fast(table.fast, values, origins)
+    return values, origins
+
+
+def _fast(fast: FastTable, values: dict[str, Any], origins: dict[str, Provenance]) -> None:
+    grade = fast.grade or ""
+    for direction in ("warp", "weft"):
+        e5, e20, e100 = (getattr(fast, f"{key}_{direction}") for key in ("e5", "e20", "e100"))
+        values[f"stiffness_{direction}"] = stiffness_from_extension(e100, FAST_LOADS["e100"])
+        origins[f"stiffness_{direction}"] = Provenance(
+            source=fast.source, grade=grade, unit="percent at load", test_load="98.1 N/m"
+        )
+        if e5 is not None and e20 is not None:
+            values[f"curve_{direction}"] = curve_from_fast(e5, e20, e100)
+            origins[f"curve_{direction}"] = Provenance(
+                source=fast.source, grade=grade, unit="N/m", test_load="4.9, 19.6 and 98.1 N/m"
+            )
+    if fast.eb5 is not None:
+        values["shear_stiffness"] = shear_stiffness_from_fast(fast.eb5)
+        origins["shear_stiffness"] = Provenance(source=fast.source, grade=grade, unit="percent", test_load="EB5")
+    if fast.w is not None:
+        values["areal_density"] = fast.w * 1e-3
+        origins["areal_density"] = Provenance(source=fast.source, grade=grade, unit="g/m2")
+
+
+def _how_to_give(key: str) -> str:
+    if key.startswith("stiffness"):
+        return f"write {key} = 2000.0 (N/m), a [kes] or [fast] table with readings, or base = another fabric"
+    example = {"shear_stiffness": "26.0 (N/m per rad)", "areal_density": "0.168 (kg/m2)"}[key]
+    reading = {"shear_stiffness": "kes.g or fast.eb5", "areal_density": "kes.w or fast.w"}[key]
+    return f"write {key} = {example}, the reading {reading}, or base = another fabric"

@@ -1,0 +1,1 @@
+"""A surface is flattened here: datum line, development, relaxation, result."""

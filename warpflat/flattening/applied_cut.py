@@ -1,0 +1,138 @@
+"""What a cut has become on the pattern: a dart, a fish-eye dart, or the edges of two pieces, and its measures."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.surface.cut.cut_mesh import Seam
+from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
+from warpflat.surface.cut.dart_legs import are_curved, pull_back
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import border_loops
+
+__all__ = ["AppliedCut", "measure_cut", "seam_kind"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class AppliedCut:
+    """A cut that has been made.
+
+    Attributes:
+        name: of the cut.
+        paths: along which it was made, vertices of the uncut surface.
+        seams: what it left: `path` in the uncut surface's numbering, `left` and `right` in the pattern's.
+        length: of cloth cut [m].
+        tip_back: how far the tips of its darts are drawn back [m].
+    """
+
+    name: str
+    paths: tuple[IntArray, ...]
+    seams: tuple[Seam, ...]
+    length: float
+    tip_back: float = 0.0
+
+
+def seam_kind(seam: Seam) -> str:
+    """ "dart" (one tip), "fish-eye" (two), or "parting" (none: it runs from border to border or closes)."""
+    tips = int(seam.left[0] == seam.right[0]) + int(seam.left[-1] == seam.right[-1])
+    return ("parting", "dart", "fish-eye")[tips]
+
+
+def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dict[str, Any]:
+    """The cut's entry in `metrics.json`: lengths [m], angles in degrees, a dart or gap per seam.
+
+    Args:
+        surface: the cut surface.
+        positions: #P by 2, the pattern [m].
+        cut: made on it.
+    """
+    loops = border_loops(surface.faces)
+    return {
+        "name": cut.name,
+        "length_m": cut.length,
+        "seams": [_measure_seam(surface, positions, seam, cut.tip_back, loops) for seam in cut.seams],
+    }
+
+
+def _measure_seam(
+    surface: Surface,
+    positions: FloatArray,
+    seam: Seam,
+    tip_back: float,
+    loops: list[IntArray],
+) -> dict[str, Any]:
+    kind = seam_kind(seam)
+    found: dict[str, Any] = {"kind": kind}
+    if kind == "dart":
+        dart = dart_measure(positions, seam.left, seam.right)
+        found |= {
+            "opening_m": dart.opening,
+            "angle_deg": math.degrees(dart.angle),
+            "intake_m": dart.intake,
+            "legs_m": [dart.left_leg, dart.right_leg],
+        }
+    elif kind == "fish-eye":
+        eye = fish_eye_measure(positions, seam.left, seam.right)
+        found |= {
+            "opening_m": abs(eye.intake),
+            "angle_deg": math.degrees(min(eye.first_angle, eye.last_angle)),
+            "intake_m": eye.intake,
+            "tip_to_tip_m": eye.length,
+        }
+    else:
+        gap = np.linalg.norm(positions[seam.left] - positions[seam.right], axis=1)
+        found |= {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
+    for side, line in (("left", seam.left), ("right", seam.right)):
+        steps = np.linalg.norm(np.diff(positions[line], axis=0), axis=1)
+        found[f"{side}_seam_m"] = float(steps.sum())
+    if kind != "parting":
+        found["drawn"] = _drawn(positions, seam, kind, tip_back, loops)
+    return found
+
+
+def _drawn(positions: FloatArray, seam: Seam, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
+    """The dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run; else why it is not."""
+    try:
+        if kind == "fish-eye":
+            eye = shape_fish_eye(positions, seam.left, seam.right, tip_back=tip_back)
+            return {
+                "tip_back_m": tip_back,
+                "legs_m": [eye.first_leg, eye.last_leg],
+                "intake_m": eye.intake,
+                "points_m": [p.tolist() for p in (eye.first_tip, eye.left_point, eye.last_tip, eye.right_point)],
+            }
+        x, left, right = mouth_first(positions, seam.left, seam.right)
+        outline = next(loop for loop in loops if left[0] in loop)
+        dart = shape_dart(positions, seam.left, seam.right, outline, tip_back=tip_back)
+        legs = pull_back(x[left], x[right], tip_back)
+    except InputError as reason:
+        return {"not_drawn": str(reason)}
+    if are_curved(*legs):
+        return {"tip_back_m": tip_back, "curved": True, **_curved(*legs)}
+    return {
+        "tip_back_m": tip_back,
+        "curved": False,
+        "leg_m": dart.leg_length,
+        "angle_deg": math.degrees(dart.angle),
+        "intake_m": dart.intake,
+        "points_m": [p.tolist() for p in (dart.left_end, dart.tip, dart.right_end, dart.fold_point)],
+    }
+
+
+def _curved(left: FloatArray, right: FloatArray) -> dict[str, Any]:
+    """A dart along its curved legs, both from the border to the tip."""
+    tip = left[-1]
+    to_left, to_right = left[0] - tip, right[0] - tip
+    lengths = [float(np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()) for leg in (left, right)]
+    return {
+        "leg_m": sum(lengths) / 2,
+        "angle_deg": math.degrees(np.arctan2(abs(np.linalg.det([to_left, to_right])), to_left @ to_right)),
+        "intake_m": float(np.linalg.norm(to_left - to_right)),
+        "points_m": [p.tolist() for p in (left[0], tip, right[0])],
+    }

@@ -1,0 +1,252 @@
+"""Edits of a pattern: another fabric, a surface that has moved, a cut; relaxed on from where the piece lies.
+
+An edit takes a fraction of what `flatten` takes: the piece is not developed again, what its faces tell is known already, and it lies near
+its new minimum, or is carried there from its coarser levels.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, expect, expect_callback
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.library import as_fabric
+from warpflat.flattening.applied_cut import AppliedCut
+from warpflat.flattening.datum import datum_extent
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.relax_pieces import Run, relax_runs
+from warpflat.flattening.result import Flattening
+from warpflat.solver.multigrid.coarsen import inherit_levels
+from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.surface.cells import inherit_cells
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.edge_paths import path_length
+from warpflat.surface.repair.polygons import crossed_quads
+from warpflat.surface.repair.slivers import degenerate_faces
+from warpflat.surface.repair.validate import checked_positions
+from warpflat.surface.repair.weld import weld_map
+from warpflat.surface.topology import components_of
+
+__all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
+
+
+#: A face whose width is no more than this share of the edges around it has no area to be measured by.
+_COLLAPSED = 1e-6
+
+
+def change_fabric(
+    result: Flattening,
+    fabric: Fabric | str,
+    *,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """The same piece in another cloth, relaxed from where it lies: a fraction of what `flatten` takes.
+
+    Args:
+        result: the piece, with the cuts it has; it stays as it is.
+        fabric: a `Fabric`, or a name of the library.
+        relax: options of the relaxation.
+        callback: called with a `Progress` before the first step and after every step; the stage is "fabric:NAME".
+
+    Raises:
+        InputError: an unknown fabric, an option out of its bounds, or the piece has been sewn.
+    """
+    expect(result, Flattening, "result", "a Flattening, as flatten gives it")
+    cloth = as_fabric(fabric)
+    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback)
+    return replace(_gone_on(result, run, result.positions), fabric=cloth)
+
+
+def change_surface(
+    result: Flattening,
+    surface: Surface | ArrayLike,
+    *,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """The same piece with its vertices elsewhere, relaxed from where it lies: after a feature line has been moved, or in another size.
+
+    Args:
+        result: the piece, with the cuts it has; it stays as it is.
+        surface: the same mesh, uncut, faces and all in the same order; its vertices may lie anywhere. Or these vertices only, #V by 3
+            [m], in the order of `result.surface.vertices`.
+        relax: options of the relaxation.
+        callback: called with a `Progress` before the first step and after every step; the stage is "surface:NAME".
+
+    Returns:
+        The piece on that surface, with the same cuts. Its development stays that of the surface before.
+
+    Raises:
+        InputError: the mesh is another one, a vertex is not finite, a face has collapsed or its sides cross, an option out of its bounds,
+            or the piece has been sewn.
+    """
+    expect(result, Flattening, "result", "a Flattening, as flatten gives it")
+    before, options = result.surface, given_options(relax)
+    expect_callback(callback)
+    # What the faces tell is known of the ones before.
+    surface = replace(_moved(before, surface), faces=before.faces, of_faces=before.of_faces)
+    cut = result.network.surface
+    origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
+    origin[cut.faces[used]] = before.faces[used]
+    moved = surface
+    if cut is not before:
+        moved = replace(
+            cut,
+            vertices=surface.vertices[origin],
+            name=surface.name,
+            input_vertices=surface.input_vertices,
+            input_index=surface.input_index[origin],
+        )
+    inherit_levels(moved, cut)
+    run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
+    cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
+    gone_on = _gone_on(result, run, result.positions)
+    # How long the datum is, if it was chosen, is told of the surface as it is now.
+    chosen, now = (datum_extent(of, result.datum) for of in (before, surface))
+    notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in gone_on.notes)
+    return replace(gone_on, surface=surface, cuts=cuts, notes=notes)
+
+
+def expect_unsewn(result: Flattening) -> None:
+    """Raise InputError for a piece that has been sewn or given fullness: what holds it there is not of this piece alone."""
+    if result.alone is not None:
+        raise InputError(
+            f"piece {result.surface.name!r} has been sewn: edited alone it would lose its seams, folds and gathers; run the scene or "
+            "flatten_form again with the change, or edit its `alone`, the piece as it lay before"
+        )
+
+
+def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
+    """The surface that is meant, once it is known to be the one before with its vertices elsewhere."""
+    if isinstance(given, Surface):
+        surface = given
+        if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
+            raise InputError(
+                f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
+                f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
+            )
+        vertices = checked_positions(surface.vertices)
+        # Of a surface made by `replace(surface, vertices=...)` what was read has not moved with it.
+        if not np.array_equal(given.input_vertices[given.input_index], vertices):
+            surface = replace(given, input_vertices=_as_read(before, vertices), input_index=before.input_index)
+    else:
+        surface = _with_vertices(before, given)
+        vertices = surface.vertices
+    collapsed = degenerate_faces(vertices, surface.faces, _COLLAPSED)
+    _refuse_faces(surface, collapsed, "has collapsed to a line or a point", "faces need an area")
+    crossed = crossed_quads(vertices, surface.faces)
+    _refuse_faces(
+        surface,
+        crossed,
+        "has become a quad whose sides cross, or is folded by more than 90 degrees",
+        "move its vertices along with those around them",
+    )
+    return surface
+
+
+def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right: str) -> None:
+    if len(wrong):
+        corners = ", ".join(str(v) for v in surface.faces[wrong[0]].tolist() if v >= 0)
+        more = f" (and {len(wrong) - 1:,} more like it)" if len(wrong) > 1 else ""
+        raise InputError(f"piece {surface.name!r}: face {wrong[0]} (vertices {corners}) {what}{more}; {right}")
+
+
+def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
+    try:
+        vertices = checked_positions(given)
+    except InputError as error:
+        raise InputError(
+            f"piece {before.name!r}: {error}; give a Surface, or its {len(before.vertices):,} vertices by 3 [m]"
+        ) from None
+    if len(vertices) != len(before.vertices):
+        raise InputError(
+            f"piece {before.name!r} has {len(before.vertices):,} vertices, not {len(vertices):,}: give them all, in the order of its "
+            "surface.vertices, or flatten another mesh afresh"
+        )
+    return replace(before, vertices=vertices, input_vertices=_as_read(before, vertices))
+
+
+def _as_read(before: Surface, vertices: FloatArray) -> FloatArray:
+    """#I by 3, the vertices as they were read, moved: what was read several times at one place, as in an STL, stays at one."""
+    as_read = before.input_vertices.copy()
+    if len(as_read) > len(vertices):
+        place = weld_map(before.input_vertices)
+        at_place = np.full(len(place), -1, dtype=np.int32)
+        at_place[place[before.input_index]] = np.arange(len(vertices), dtype=np.int32)
+        goes = at_place[place] >= 0
+        as_read[goes] = vertices[at_place[place[goes]]]
+    # Where several vertices lay at one place, each has its own now.
+    as_read[before.input_index] = vertices
+    return as_read
+
+
+def relax_cut(
+    result: Flattening,
+    surface: Surface,
+    positions: FloatArray,
+    *,
+    stage: str,
+    cuts: Sequence[AppliedCut],
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None = None,
+) -> Flattening:
+    """Go on from a layout of a piece whose topology has changed; `warpflat.cutting.cut_piece.cut` makes such.
+
+    Args:
+        result: of the piece before.
+        surface: `result.surface` with vertices doubled (#P), of which the first keep their numbers.
+        positions: #P by 2, where to go on from [m].
+        stage: what it is called in the history.
+        cuts: all that `surface` has.
+        options: of the relaxation.
+        callback: called with a `Progress` before the first step and after every step.
+    """
+    inherit_cells(surface, result.surface)
+    run = _later_run(result, surface, result.fabric, stage, options, callback)
+    return replace(_gone_on(result, run, positions), cuts=tuple(cuts))
+
+
+def _later_run(
+    result: Flattening,
+    surface: Surface,
+    fabric: Fabric,
+    stage: str,
+    options: RelaxOptions,
+    callback: Callable[[Progress], None] | None,
+) -> Run:
+    """A run that goes on from a result."""
+    expect_unsewn(result)
+    expect_callback(callback)
+    datum = result.datum
+    if surface is not result.surface:
+        # A cut may part the datum: then the first part of it stays upright.
+        part = components_of(surface)
+        if part.any():
+            part_of = np.full(len(surface.vertices), -1)
+            used = surface.faces >= 0
+            part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
+            datum = datum[part_of[datum] == part_of[datum[0]]]
+    device, model = result.network.device, result.network.model
+    return Run(
+        surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
+    )
+
+
+def _gone_on(result: Flattening, run: Run, positions: FloatArray) -> Flattening:
+    """The result of a run from a layout, with what it adds to the history."""
+    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[run.measured_again()])
+    return replace(
+        result,
+        network=end.network,
+        positions=end.positions,
+        stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
+        history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
+        notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
+        options=run.options,
+    )

@@ -1,0 +1,286 @@
+"""How a pattern sits, drawn: strain, tension and pressure on the flat pieces, a page per piece or a sheet per garment."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.activity import doing
+from warpflat.core.arrays import FloatArray
+from warpflat.core.atomic_files import atomic_path, require_writable
+from warpflat.core.sums import weighted_percentile
+from warpflat.export.letters import all_letters, is_drawn, titles
+from warpflat.export.picture_png import save_png
+from warpflat.flattening.fit_report import RANGES, help_words, pressure_words, strain_words
+from warpflat.model.fit import MAPS, WornFit
+from warpflat.surface.topology import border_edges
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
+    from warpflat.flattening.result import Flattening
+
+__all__ = ["write_wear_picture", "write_wear_sheet"]
+
+
+# Below these a map would show rounding.
+_LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
+# What is compared at a glance has one scale.
+_ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
+# The fabric's limit is one for its threads.
+_LIMITED = _ALIKE[0]
+_BEYOND = "#00a000"
+_MMHG = 133.322  # [Pa]
+
+_COLUMN = 2.5  # width of a column, and a piece's greatest height [in]
+_TALLEST = 4.2
+_LABEL = 2.5
+_LETTERS = 36
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Scale:
+    """Colours from low to high, and whether both ends may be passed."""
+
+    colours: str
+    low: float
+    high: float
+
+    @property
+    def extend(self) -> str:
+        return "max" if self.low == 0.0 else "both"
+
+
+def _scale_of(values: FloatArray, area: FloatArray, unit: str, *, from_nothing: bool, limit: float) -> _Scale:
+    low, high = (weighted_percentile(values, area, share) for share in (0.01, 0.99))
+    least = _LEAST_SCALE[unit]
+    if from_nothing or (low > 0.3 * high and high > least):
+        # All of it pulls: from the least to the most, or from nothing where that is near.
+        # Not so narrow that what is as good as even looks uneven.
+        start = 0.0 if low < 0.3 * high else min(low, 0.8 * high)
+        return _Scale(colours="YlOrRd", low=start, high=max(high, least, start + 0.1 * least))
+    # White is rest; red pulls, blue is slack.
+    reach = max(abs(low), abs(high), least, limit)
+    return _Scale(colours="RdBu_r", low=-reach, high=reach)
+
+
+def _scales(fits: Sequence[WornFit], groups: Sequence[Sequence[str]]) -> dict[str, _Scale]:
+    found = {}
+    area = np.concatenate([fit.area for fit in fits])
+    for group in groups:
+        _, factor, unit = MAPS[group[0]]
+        values = np.concatenate([factor * getattr(fit, name) for name in group for fit in fits])
+        limit = 1.2 * factor * max(fit.limit for fit in fits) if group[0] in _LIMITED else 0.0
+        if limit > 3.0 * float(np.abs(values).max(initial=0.0)):
+            limit = 0.0
+        scale = _scale_of(values, np.tile(area, len(group)), unit, from_nothing=group[0] == "pressure", limit=limit)
+        found.update(dict.fromkeys(group, scale))
+    return found
+
+
+@all_letters()
+def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
+    """Strains, tensions and pressure on the pattern, six maps with their scales; what lies beyond the limit is outlined.
+
+    Args:
+        path: the file, ``*.png``.
+        result: a flattened piece.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    require_writable(path)
+    doing(f"drawing {Path(path).name}")
+    span = np.ptp(result.positions, axis=0)
+    width = 3.4
+    height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
+    figure = Figure(figsize=(3 * (width + 1.1), 2 * (height + 0.75) + 0.5), dpi=110, facecolor="white")
+    FigureCanvasAgg(figure)
+    fit = result.fit
+    scales = _scales([fit], [[name] for name in MAPS])
+    for axis, (name, (label, factor, unit)) in zip(figure.subplots(2, 3).ravel(), MAPS.items(), strict=True):
+        drawn = _draw_map(axis, result, name, scales[name])
+        axis.autoscale_view()
+        axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
+        bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02)
+        bar.set_label(unit, fontsize=9)
+        bar.ax.tick_params(labelsize=8)
+        _mark_limit(bar, name, fit.limit, scales[name])
+    figure.suptitle(
+        f"{result.surface.name} in {result.fabric.name}, as worn: {_verdict(fit)}; limit {100 * fit.limit:.3g} %",
+        fontsize=12,
+    )
+    figure.tight_layout()
+    with atomic_path(path) as temporary:
+        save_png(temporary, figure, {"Software": "warpflat"})
+
+
+@all_letters()
+def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str) -> None:
+    """All pieces of a garment as worn: a row per piece, a column per map, all at one scale of length and of colour.
+
+    Args:
+        path: the file, ``*.png``.
+        results: the pieces, one or more.
+        title: the garment's name.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    require_writable(path)
+    doing(f"drawing {Path(path).name}")
+    spans = np.array([np.ptp(result.positions, axis=0) for result in results])
+    inches = min(_COLUMN / max(float(spans[:, 0].max()), 1e-9), _TALLEST / max(float(spans[:, 1].max()), 1e-9))
+    column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
+    rows = [
+        max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.3
+        for span, result in zip(spans[:, 1], results, strict=True)
+    ]
+    top, bottom = 0.95, 1.0
+    size = (_LABEL + len(MAPS) * column + 0.2, top + sum(rows) + bottom)
+    figure = Figure(figsize=size, dpi=110, facecolor="white")
+    FigureCanvasAgg(figure)
+    fits = [result.fit for result in results]
+    scales = _scales(fits, _ALIKE)
+    limit = max(fit.limit for fit in fits)
+
+    def place(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
+        """A box given in inches from the upper left corner."""
+        return (x / size[0], 1.0 - (y + height) / size[1], width / size[0], height / size[1])
+
+    y = top
+    drawn: dict[str, PolyCollection] = {}
+    called = titles([result.surface.name for result in results], is_drawn)
+    for result, height in zip(results, rows, strict=True):
+        _write_row_label(figure, result, called[result.surface.name], 0.15 / size[0], 1.0 - (y + 0.15) / size[1])
+        middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
+        for number, name in enumerate(MAPS):
+            axis = figure.add_axes(place(_LABEL + number * column, y, column, height))
+            drawn[name] = _draw_map(axis, result, name, scales[name])
+            axis.set_xlim(middle[0] - 0.5 * column / inches, middle[0] + 0.5 * column / inches)
+            axis.set_ylim(middle[1] - 0.5 * height / inches, middle[1] + 0.5 * height / inches)
+        y += height
+    for number, (name, (label, _, unit)) in enumerate(MAPS.items()):
+        x = _LABEL + number * column
+        figure.text((x + 0.5 * column) / size[0], 1.0 - 0.75 / size[1], label, ha="center", fontsize=10)
+        axis = figure.add_axes(place(x + 0.2, y + 0.25, column - 0.4, 0.13))
+        bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
+        bar.ax.tick_params(labelsize=8)
+        bar.ax.locator_params(nbins=5)
+        bar.set_label(unit, fontsize=9)
+        _mark_limit(bar, name, limit, scales[name])
+        if name == "pressure":
+            above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
+            above.tick_params(labelsize=7)
+            above.set_xlabel("mmHg", fontsize=8)
+    unfit = [result.surface.name for result in results if not result.fit.fits]
+    verdict = "fits" if not unfit else f"does not fit: {', '.join(unfit)}"
+    fabrics = ", ".join(dict.fromkeys(result.fabric.name for result in results))
+    figure.text(0.15 / size[0], 1.0 - 0.32 / size[1], f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
+    figure.text(
+        0.15 / size[0],
+        1.0 - 0.52 / size[1],
+        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack",
+        fontsize=9,
+        color="#404040",
+    )
+    with atomic_path(path) as temporary:
+        save_png(temporary, figure, {"Software": "warpflat"})
+
+
+def _to_mmhg(pascals: Any) -> Any:
+    return pascals / _MMHG
+
+
+def _from_mmhg(mmhg: Any) -> Any:
+    return mmhg * _MMHG
+
+
+def _verdict(fit: WornFit) -> str:
+    return "fits" if fit.fits else f"does not fit: {100 * fit.outside:.1f} % of the cloth beyond the limit (outlined)"
+
+
+def _median(fit: WornFit, name: str) -> float:
+    return weighted_percentile(getattr(fit, name), fit.area, 0.5)
+
+
+def _shown(value: float) -> str:
+    if abs(value) < 0.05:
+        return "0"
+    return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
+
+
+def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y: float) -> None:
+    from textwrap import fill
+
+    fit = result.fit
+    lines = [f"fits: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
+    measures = fit.as_dict()
+    lines += [f"{RANGES}:", *strain_words(measures)]
+    if pressure := pressure_words(measures):
+        p05, p95, most = (measures["pressure"][at] / _MMHG for at in ("p05", "p95", "max"))
+        lines += [pressure, f"= {p05:.1f} to {p95:.1f} mmHg [up to {most:.1f}]"]
+    if result.grain_angle:
+        lines.append(f"warp turned by {result.grain_angle:g} degrees")
+    if not fit.fits:
+        lines.append("")
+        lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
+        lines += [
+            help_words(remedy, sewn=result.alone is not None) for remedy in result.measures["wear"]["would_help"][:1]
+        ]
+    figure.text(x, y, title, fontsize=11, weight="bold", va="top")
+    y -= 0.22 / float(figure.get_size_inches()[1])
+    text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
+    figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
+
+
+def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> PolyCollection:
+    from matplotlib.collections import LineCollection, PolyCollection
+
+    fit, p = result.fit, result.positions
+    # A triangle with its last corner twice, so that all are one array: from a list every polygon is checked on its own.
+    polygons: Any = p[np.where(result.faces >= 0, result.faces, result.faces[:, 2:3])]
+    drawn = PolyCollection(
+        polygons,
+        array=MAPS[name][1] * getattr(fit, name),
+        cmap=scale.colours,
+        edgecolors="face",
+        linewidths=0.2,
+        clim=(scale.low, scale.high),
+        rasterized=True,
+    )
+    axis.add_collection(drawn)
+    lines = [p[np.asarray(line)] for line in result.network.surface.lines.values() if len(line) > 1]
+    axis.add_collection(LineCollection(lines, colors="#808080", linewidths=0.4))
+    axis.add_collection(LineCollection(list(p[border_edges(result.faces)]), colors="black", linewidths=0.9))
+    for misfit in fit.misfits if name in _LIMITED else ():
+        axis.add_collection(
+            LineCollection(list(p[border_edges(result.faces[misfit.faces])]), colors=_BEYOND, linewidths=0.7)
+        )
+    axis.set_aspect("equal")
+    axis.set_axis_off()
+    return drawn
+
+
+def _mark_limit(bar: Any, name: str, limit: float, scale: _Scale) -> None:
+    """Where the fabric's limit lies on the scale of a thread's strain."""
+    if name not in _LIMITED:
+        return
+    for sign in (-1.0, 1.0):
+        at = 100.0 * sign * limit
+        if scale.low < at < scale.high:
+            draw = bar.ax.axvline if bar.orientation == "horizontal" else bar.ax.axhline
+            draw(at, color=_BEYOND, linewidth=1.6)

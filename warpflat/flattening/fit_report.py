@@ -1,0 +1,145 @@
+"""How a garment sits, for people: what would help where it does not fit, the maps, and the lines on the console."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from warpflat.core.arrays import IntArray
+from warpflat.model.fit import TOLERATED, WornFit
+from warpflat.model.wear import Wear
+
+__all__ = [
+    "RANGES",
+    "Remedy",
+    "fit_lines",
+    "garment_wear",
+    "help_words",
+    "pressure_words",
+    "strain_words",
+    "wear_measures",
+]
+
+
+#: What ranges of strain and pressure are told of.
+RANGES = "5 to 95 % of the cloth [all of it]"
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Remedy:
+    """A cut, sewn as a dart or a seam, that may relieve a misfit.
+
+    Attributes:
+        words: what to cut.
+        path: vertices of the uncut surface.
+        length: [m].
+        outside: share of the cloth beyond the limit once it is made, by trial and unsewn; None if it was not tried.
+    """
+
+    words: str
+    path: IntArray
+    length: float
+    outside: float | None = None
+
+
+def wear_measures(
+    fit: WornFit, *, wear: Wear | None = None, unsewn: WornFit | None = None, remedies: Sequence[Remedy] = ()
+) -> dict[str, Any]:
+    """Build the entry `wear` of a piece in `metrics.json`.
+
+    Args:
+        fit: how the piece sits.
+        wear: how it is meant to be worn, if that was asked for.
+        unsewn: how it sat before it was sewn, if it was.
+        remedies: cuts that may help.
+    """
+    measures = {**(asdict(wear) if wear is not None else {}), **fit.as_dict()}
+    if unsewn is not None:
+        measures["outside_unsewn"] = unsewn.outside
+    measures["would_help"] = [
+        {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside} for remedy in remedies
+    ]
+    return measures
+
+
+def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
+    """How a garment of several pieces sits, from their entries in `metrics.json`; `fits` if every piece does.
+
+    Args:
+        pieces: by name, with `wear` and `area_m2`.
+    """
+    worn = {name: piece["wear"] for name, piece in pieces.items()}
+    area = {name: float(piece["area_m2"]) for name, piece in pieces.items()}
+    unfit = {name: wear for name, wear in worn.items() if not wear["fits"]}
+    return {
+        "fits": not unfit,
+        "outside": sum(wear["outside"] * area[name] for name, wear in worn.items()) / sum(area.values()),
+        "where_not": [f"{name}: {words}" for name, wear in unfit.items() for words in wear["where_not"]],
+        "would_help": [{"piece": name, **remedy} for name, wear in unfit.items() for remedy in wear["would_help"]],
+    }
+
+
+def help_words(remedy: Mapping[str, Any], outside: float | None = None, *, sewn: bool = False) -> str:
+    """A remedy as in `metrics.json`, in words; with the share beyond the limit before it, if that is given. Of a piece that is `sewn`, both
+    are told to be without that."""
+    after = remedy["outside_after"]
+    if after is None:
+        return f"may help: {remedy['cut']}"
+    before = "" if outside is None else f"{100 * outside:.1f} % -> "
+    unsewn = ", unsewn" if sewn else ""
+    return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit{unsewn}"
+
+
+def _no_cut_words(outside: float, *, sewn: bool) -> str:
+    if sewn and outside <= TOLERATED:
+        return "unsewn it fits: its seams, folds and constraints strain it; ask less of them, or take another fabric"
+    return "would help: another fabric, or another stretch; no single dart does"
+
+
+def strain_words(wear: Mapping[str, Any]) -> list[str]:
+    """For warp and weft of an entry `wear`, as `RANGES` says: "weft -0.6 to +8.6 % [-2.7 to +20.3]"."""
+    found = []
+    for thread in ("warp", "weft"):
+        low, least, most, high = (100 * wear[f"strain_{thread}"][at] for at in ("min", "p05", "p95", "max"))
+        found.append(f"{thread} {least:+.1f} to {most:+.1f} % [{low:+.1f} to {high:+.1f}]")
+    return found
+
+
+def pressure_words(wear: Mapping[str, Any]) -> str:
+    """The same of the pressure; nothing where the cloth does not press at all."""
+    pressure = wear["pressure"]
+    if pressure["max"] < 1.0:
+        return ""
+    return f"pressure {pressure['p05']:,.0f} to {pressure['p95']:,.0f} Pa [up to {pressure['max']:,.0f}]"
+
+
+def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """What the console says of each piece's fit: one line, and one for each place and remedy where it does not."""
+    lines = []
+    for name, piece in metrics["pieces"].items():
+        wear = piece.get("wear")
+        if wear is None:
+            continue
+        verdict = f"{name}: fits: {'yes' if wear['fits'] else 'no'}"
+        told = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
+        if pressure := pressure_words(wear):
+            told += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
+        lines.append(f"{verdict} ({told})")
+        if wear["fits"]:
+            continue
+        lines += [f"  where not: {words}" for words in wear["where_not"]]
+        sewn = "outside_unsewn" in wear
+        before = wear["outside_unsewn"] if sewn else wear["outside"]
+        lines += [f"  {help_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
+        if not wear["would_help"]:
+            lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
+    if lines:
+        lines.append(f"ranges: {RANGES}")
+    if "wear" in metrics:
+        unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
+        verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
+        lines.append(
+            f"garment: fits: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
+        )
+    return lines

@@ -1,0 +1,79 @@
+"""`flatten_all`: many surfaces of one fabric, relaxed side by side in one set of launches."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import partial
+from os import PathLike
+from pathlib import Path
+
+from numpy.typing import ArrayLike
+
+from warpflat.core.errors import InputError, expect_callback, expect_each
+from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
+from warpflat.flattening.flatten_piece import Started, check_settings, finish, given_surface, start
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.model.membrane import Model
+from warpflat.model.wear import Wear
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.mesh import Surface
+
+__all__ = ["flatten_all"]
+
+
+def flatten_all(
+    surfaces: Sequence[Surface | str | Path],
+    *,
+    fabric: Fabric | str = DEFAULT_FABRIC,
+    datum: str | Sequence[str | ArrayLike | None] | None = None,
+    grain_angle: float = 0.0,
+    units: str | None = None,
+    model: Model = "springs",
+    wear: Wear | None = None,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[int, Progress], None] | None = None,
+    device: str | None = None,
+) -> list[Flattening]:
+    """Flatten several pieces at once, say all of a garment or one in ten sizes: the patterns that :func:`warpflat.flatten` gives of
+    each, within the tolerances, in less time where the pieces are small.
+
+    Each piece is developed and measured on its own, and comes to its own minimum; only their steps are taken together. A piece that has
+    come to rest is stepped on with the others while it would not pay to leave it out, so that it may get a few steps more than alone.
+    The seconds in the "relax" stage of a piece are those of all pieces that were relaxed with it.
+
+    Args:
+        surfaces: a `Surface`, or the path of a mesh file, for each piece.
+        fabric, grain_angle, units, model, wear, relax, device: as :func:`warpflat.flatten` takes them, one for all.
+        datum: one name for all, or a sequence of what `flatten` takes, for each surface one.
+        callback: called with the number of the surface and its `Progress`, for the developments (step 0) and after every step, for one
+            surface after the other.
+
+    Returns:
+        A `Flattening` for each surface, in their order, each with a network of its own.
+
+    Raises:
+        InputError: a piece cannot be flattened; one line says which, and why.
+    """
+    expect_each(surfaces, (Surface, str, PathLike), "surfaces", "a Surface or the path of a mesh file")
+    expect_callback(callback)
+    count = len(surfaces)
+    named = datum is None or isinstance(datum, str)
+    if not named:
+        expect_each(datum, object, "datum", "for one surface, or one name for all")
+    datums: Sequence[str | ArrayLike | None] = [datum] * count if named else list(datum)  # type: ignore[arg-type, list-item]
+    if len(datums) != count:
+        raise InputError(
+            f"datum has {len(datums)} entries for {count} surfaces; give one name for all, or one for each"
+        )
+    settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
+
+    def started(number: int, surface: Surface | str | Path) -> Started:
+        own = given_surface(surface, units)
+        try:
+            return start(own, datums[number], settings, None if callback is None else partial(callback, number))
+        except InputError as error:
+            named = repr(own.name) in str(error)
+            raise InputError(str(error) if named else f"piece {own.name!r} (surface {number}): {error}") from None
+
+    return finish([started(number, surface) for number, surface in enumerate(surfaces)])

@@ -1,0 +1,88 @@
+"""A harmonic layout with a convex border, which cannot have mirrored faces."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import (
+    border_loops,
+    triangulate,
+)
+
+__all__ = ["harmonic_layout"]
+
+
+def harmonic_layout(surface: Surface) -> FloatArray:
+    """Layout that cannot fold: the border on a circle, every other vertex a convex mean of its neighbours (Floater 1997).
+
+    Mean value weights (Floater 2003), which are positive on any triangles. Holes are closed by a vertex each while the
+    map is computed. Scaled to the surface's area. #V by 2 [m].
+    """
+    from scipy.sparse import coo_matrix, diags
+    from scipy.sparse.linalg import spsolve
+
+    triangles, _ = triangulate(surface.faces)
+    loops = border_loops(surface.faces, surface.vertices)
+    points = [surface.vertices]
+    caps = [triangles]
+    for number, loop in enumerate(loops[1:]):
+        centre = np.full(len(loop), len(surface.vertices) + number)
+        points.append(surface.vertices[loop].mean(axis=0)[None])
+        caps.append(np.column_stack([np.roll(loop, -1), loop, centre]))
+    p, t = np.concatenate(points), np.concatenate(caps).astype(np.int64)
+    rows, columns, weights = [], [], []
+    for k in range(3):
+        i, j, other = t[:, k], t[:, (k + 1) % 3], t[:, (k + 2) % 3]
+        u, v = p[j] - p[i], p[other] - p[i]
+        lu, lv = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+        cosine = np.clip(np.einsum("ij,ij->i", u, v) / np.maximum(lu * lv, 1e-300), -0.999999, 0.999999)
+        half_tangent = np.sqrt((1 - cosine) / (1 + cosine))
+        rows += [i, i]
+        columns += [j, other]
+        weights += [half_tangent / np.maximum(lu, 1e-300), half_tangent / np.maximum(lv, 1e-300)]
+    size = len(p)
+    matrix = coo_matrix((np.concatenate(weights), (np.concatenate(rows), np.concatenate(columns))), shape=(size, size))
+    matrix = matrix.tocsr()
+    matrix = diags(1.0 / np.asarray(matrix.sum(axis=1)).ravel()) @ matrix
+
+    border = loops[0]
+    arc = np.linalg.norm(surface.vertices[np.roll(border, -1)] - surface.vertices[border], axis=1)
+    angle = 2 * np.pi * np.concatenate([[0.0], np.cumsum(arc)[:-1]]) / arc.sum()
+    q = surface.vertices[triangles]
+    area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
+    layout = np.zeros((size, 2))
+    layout[border] = np.sqrt(area / np.pi) * np.column_stack([np.cos(angle), np.sin(angle)])
+    inner = np.setdiff1d(np.arange(size), border)
+    if len(inner):
+        system = (diags(np.ones(len(inner))) - matrix[inner][:, inner]).tocsc()
+        layout[inner] = spsolve(system, matrix[inner][:, border] @ layout[border]).reshape(-1, 2)
+    return layout[: len(surface.vertices)]
+
+
+def refuse_tubes(surface: Surface) -> None:
+    """A flat ring turns once around at each of its borders, a closed tube at neither."""
+    for loop in border_loops(surface.faces, surface.vertices)[1:]:
+        corner_angle = _border_angles(surface)[loop]
+        turning = float((np.pi - corner_angle).sum())
+        if turning > -np.pi:
+            size = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1).sum()
+            raise InputError(
+                f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
+                f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first, in the mesh (its vertices "
+                "doubled there) or by warpflat.cutting.cut_piece.cut_surfaces; [[cuts]] cut what is flat already"
+            )
+
+
+def _border_angles(surface: Surface) -> FloatArray:
+    """#V, the sum of the angles of the triangles at each vertex [rad]."""
+    triangles, _ = triangulate(surface.faces)
+    total = np.zeros(len(surface.vertices))
+    for k in range(3):
+        i, j, o = triangles[:, k], triangles[:, (k + 1) % 3], triangles[:, (k + 2) % 3]
+        u, v = surface.vertices[j] - surface.vertices[i], surface.vertices[o] - surface.vertices[i]
+        sine = np.linalg.norm(np.cross(u, v), axis=1)
+        total += np.bincount(i, np.arctan2(sine, np.einsum("ij,ij->i", u, v)), minlength=len(total))
+    return total

@@ -1,0 +1,317 @@
+"""The result of flattening one piece: its layout, measures, history and files."""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import warp as wp
+
+from warpflat._version import __version__
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.applied_cut import AppliedCut, measure_cut
+from warpflat.flattening.develop import Development
+from warpflat.flattening.fit_report import Remedy, wear_measures
+from warpflat.flattening.progress import Stage
+from warpflat.flattening.stretched_faces import Opened, opened_faces
+from warpflat.model.fit import WornFit, assess_fit
+from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import LayoutErrors, WornStrain, layout_errors, worn_strain
+from warpflat.model.wear import Wear
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.energy_map import energy_report
+from warpflat.surface.mesh import Surface
+
+if TYPE_CHECKING:
+    from warpflat.export.picture import PicturePiece
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["Flattening", "metrics_of", "write_results"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Flattening:
+    """A relaxed pattern and what is known of it.
+
+    Attributes:
+        surface: the piece in space, uncut; with the cuts made it is `network.surface`.
+        fabric: the cloth.
+        datum: vertex indices of the line from which it was developed; the grain.
+        datum_name: its name, or how it was chosen.
+        positions: #P by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
+        stages: development and relaxation, with their energies.
+        history: #K by 4, step, spring energy [J], guard energy [J], residual, at every look.
+        notes: what was mended or chosen on the way, one sentence each.
+        cuts: made since the first relaxation, see `warpflat.cutting.cut_piece`.
+        wear: how it is meant to be worn, if that was asked for.
+        options: of its last relaxation.
+        alone: the piece as it lay before it was sewn or given fullness; None of one that was not.
+        remedies: cuts that may help where it does not fit, once `warpflat.advise` has looked for them.
+    """
+
+    surface: Surface
+    fabric: Fabric
+    datum: IntArray
+    datum_name: str
+    grain_angle: float
+    network: SpringNetwork
+    development: Development
+    positions: FloatArray
+    stages: tuple[Stage, ...]
+    history: FloatArray
+    notes: tuple[str, ...]
+    cuts: tuple[AppliedCut, ...] = ()
+    wear: Wear | None = None
+    options: RelaxOptions = field(default_factory=RelaxOptions)
+    alone: Flattening | None = None
+    remedies: tuple[Remedy, ...] = ()
+
+    @property
+    def faces(self) -> IntArray:
+        """#F by 4, the surface's faces in the pattern's numbering: cuts double vertices."""
+        return self.network.surface.faces
+
+    @cached_property
+    def vertex_origin(self) -> IntArray:
+        """#P, for each vertex of the pattern its vertex on the surface."""
+        origin = np.arange(len(self.positions), dtype=np.int32)
+        used = self.faces >= 0
+        origin[self.faces[used]] = self.surface.faces[used]
+        return origin
+
+    @property
+    def converged(self) -> bool:
+        """False if the relaxation ran into its step limit."""
+        return self.stages[-1].converged
+
+    @property
+    def flipped_faces(self) -> int:
+        """Number of mirrored or collapsed faces."""
+        return self._errors.flipped_faces
+
+    @cached_property
+    def _errors(self) -> LayoutErrors:
+        return layout_errors(self.network.surface, self.network, self.positions)
+
+    @cached_property
+    def worn(self) -> WornStrain:
+        """Worn strain and strain energy per face."""
+        return worn_strain(self.network, self.positions)
+
+    @cached_property
+    def fit(self) -> WornFit:
+        """How it sits when worn: strain, tension and pressure, against the fabric's limit."""
+        return assess_fit(self.network, self.positions)
+
+    @property
+    def face_energy_density(self) -> FloatArray:
+        """#F, strain energy per flat area [J/m2]."""
+        return self.worn.energy_density
+
+    @cached_property
+    def opened(self) -> Opened | None:
+        """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
+        if any(stage.name == "fullness" for stage in self.stages):
+            return None
+        return opened_faces(self.network, self.positions)
+
+    @property
+    def told(self) -> tuple[str, ...]:
+        """`notes`, and what is to be said of the pattern as it lies."""
+        return self.notes if self.opened is None else (*self.notes, self.opened.words(self.network.model))
+
+    @cached_property
+    def measures(self) -> dict[str, Any]:
+        """The piece's entry in `metrics.json`."""
+        errors, last = self._errors, self.stages[-1]
+        return {
+            "vertices": len(self.surface.vertices),
+            "faces": len(self.surface.faces),
+            "springs": self.network.spring_count,
+            "fabric": self.fabric.name,
+            "model": self.network.model,
+            "datum": self.datum_name,
+            "development": self.development.method,
+            "flipped_faces": errors.flipped_faces,
+            "length_error": errors.length_error,
+            "area_error": errors.area_error,
+            "boundary_error": errors.boundary_error,
+            "strain_energy_j": last.strain_energy_j,
+            "spring_energy_j": last.spring_energy_j,
+            "guard_energy_j": last.guard_energy_j,
+            "area_m2": float(self.worn.area.sum()),
+            "wear": wear_measures(
+                self.fit,
+                wear=self.wear,
+                unsewn=None if self.alone is None else self.alone.fit,
+                remedies=self.remedies,
+            ),
+            "converged": self.converged,
+            "stages": [stage.as_dict() for stage in self.stages],
+            "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
+            "energy": energy_report(self.network.surface, self.worn.energy),
+            "opened": None if self.opened is None else self.opened.as_dict(),
+            "notes": list(self.told),
+        }
+
+    def metrics(self) -> dict[str, Any]:
+        """All of `metrics.json`."""
+        return metrics_of([self])
+
+    def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
+        """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), all of them or none.
+
+        Args:
+            folder: made if need be.
+            picture: whether to draw one.
+            frames: whether to write a USD file; a run that streams its own frames does not want this one.
+
+        Returns:
+            The names of the files.
+
+        Raises:
+            InputError: the folder cannot be written, or the surface was read from a file there that would be replaced.
+        """
+        return write_results([self], folder, picture=picture, frames=frames)
+
+    def write_obj(self, folder: Path) -> str:
+        """Write `NAME.obj` and return its name."""
+        from warpflat.core.atomic_files import file_in
+        from warpflat.export.obj import write_obj
+
+        file = file_in(folder, self.surface.name, ".obj")
+        write_obj(file, self.surface, self.positions, faces=self.faces, pattern_to_surface=self.vertex_origin)
+        return file.name
+
+    def picture_piece(self) -> PicturePiece:
+        """Its row in a picture."""
+        return _picture_piece(self)
+
+    def captions(self) -> dict[str, str]:
+        """The key measures as short texts."""
+        m = self.measures
+        captions = {
+            "fabric": self.fabric.name,
+            "strain energy": f"{1e3 * m['strain_energy_j']:.3g} mJ",
+            "length error": f"{100 * m['length_error']:.2f} %",
+            "area error": f"{100 * m['area_error']:.2f} %",
+        }
+        if m["flipped_faces"]:
+            captions["flipped faces"] = f"{m['flipped_faces']:,}"
+        if not self.converged:
+            captions["converged"] = "NO"
+        return captions
+
+
+def metrics_of(results: Sequence[Flattening], more: Mapping[str, Any] | None = None) -> dict[str, Any]:
+    """All of `metrics.json` for pieces of different names, and what more there is to say of them together."""
+    device = results[0].network.device
+    return {
+        "schema": 1,
+        "warpflat": __version__,
+        "warp": wp.config.version,
+        "device": platform.machine() + " cpu" if device.is_cpu else str(device.name),
+        "pieces": {result.surface.name: result.measures for result in results},
+        **(more or {}),
+    }
+
+
+def write_results(
+    results: Sequence[Flattening],
+    folder: str | Path,
+    *,
+    picture: bool = True,
+    frames: bool = True,
+    more: Mapping[str, Any] | None = None,
+) -> list[str]:
+    """Write the files of all pieces, together or not at all, and return their names.
+
+    Args:
+        results: the pieces, of different names.
+        folder: made if need be.
+        picture: whether to draw one.
+        frames: whether to write a USD file with the development and the pattern.
+        more: entries of `metrics.json` besides the pieces.
+
+    Raises:
+        InputError: the folder cannot be written, or a piece was read from a file that would be replaced.
+    """
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.manifest import require_own_metrics, write_metrics
+    from warpflat.export.picture import write_picture
+
+    others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
+    sources = [source for result in results for source in result.surface.sources]
+    with output_folder(folder, others, sources=sources) as to:
+        require_own_metrics(to)
+        files = [result.write_obj(to) for result in results]
+        if frames:
+            _write_frames(to / "frames.usdc", results)
+        if picture:
+            write_picture(to / "picture.png", [result.picture_piece() for result in results])
+        write_metrics(to, metrics_of(results, more))
+    return [*files, *others]
+
+
+def _picture_piece(result: Flattening) -> PicturePiece:
+    """The piece's row in a picture; what was cut is shown as a crack, and named on the surface."""
+    from warpflat.export.picture import PicturePiece
+
+    own, cut = result.surface.lines, result.network.surface.lines
+    grain = result.datum_name
+    datum = {} if grain in own else {grain: result.datum}
+    cut_through = {int(v) for applied in result.cuts for path in applied.paths for v in path}
+    in_space: dict[str, Any] = {name: line for name, line in own.items() if not cut_through.issuperset(line.tolist())}
+    in_space |= {f"{applied.name} (cut)": list(applied.paths) for applied in result.cuts}
+    in_plane: dict[str, Any] = {
+        name: line for name, line in cut.items() if not result.cuts or not _runs_along_cut(name, own)
+    }
+    if grain not in in_plane and not datum:
+        # A cut has parted the datum: its parts are one line still.
+        parts = [name for name in in_plane if name.startswith(f"{grain}.")]
+        in_plane[grain] = [in_plane.pop(name) for name in parts] or result.datum
+    return PicturePiece(
+        name=result.surface.name,
+        surface=result.surface,
+        faces=result.faces,
+        positions=result.positions,
+        face_energy_density=result.face_energy_density,
+        lines={**in_plane, **datum},
+        surface_lines={**in_space, **datum},
+        datum=result.datum_name,
+        grain_angle=result.grain_angle,
+        captions=result.captions(),
+    )
+
+
+def _runs_along_cut(name: str, own: Mapping[str, Any]) -> bool:
+    """Whether a line of the cut surface is one side of a crack: the outline shows it already."""
+    return name not in own and (".left" in name or ".right" in name)
+
+
+def _write_frames(path: Path, results: Sequence[Flattening]) -> None:
+    from warpflat.export.usd import FrameWriter
+
+    with FrameWriter(path) as writer:
+        for result in results:
+            name, surface = result.surface.name, result.surface
+            writer.add_piece(name, surface)
+            if not result.cuts:
+                first = worn_strain(result.network, result.development.positions).energy_density
+                writer.write(name, positions=result.development.positions, face_energy_density=first)
+            writer.write(
+                name,
+                positions=result.positions,
+                face_energy_density=result.face_energy_density,
+                faces=result.faces,
+                lines=result.network.surface.lines,
+                cuts={cut.name: [side for s in cut.seams for side in (s.left, s.right)] for cut in result.cuts},
+            )

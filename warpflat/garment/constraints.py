@@ -1,0 +1,161 @@
+"""What a pattern maker may ask of a border or a line: straight, of a fixed length, the mirror image of the other side."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar, Literal
+
+import numpy as np
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.fabric.fabric import grain_axes
+from warpflat.model.constraint_equations import (
+    Ties,
+    length_ties,
+    level_ties,
+    mirror_ties,
+    one_group,
+    smooth_ties,
+    straight_ties,
+)
+from warpflat.surface.mirror import mirror_partners
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+
+__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "constraint_ties", "piece_of"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Straight:
+    """An edge or feature line that is straight in the pattern.
+
+    Attributes:
+        piece, line: names.
+        along: "free" lets it take its direction, "warp" lays it parallel to the grain, "weft" at right angles to that.
+    """
+
+    piece: str
+    line: str
+    along: Literal["free", "warp", "weft"] = "free"
+    kind: ClassVar[str] = "straight"
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+        return f"{self.piece}.{self.line} straight" + ("" if self.along == "free" else f" along {self.along}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class FixedLength:
+    """An edge or feature line whose every mesh edge keeps its length.
+
+    Attributes:
+        piece, line: names.
+        length: of the whole line [m], each edge having its share of it; None keeps the lengths on the body. A line of a half piece that
+            ends on the fold is whole with its mirror image: the half gets half of it.
+    """
+
+    piece: str
+    line: str
+    length: float | None = None
+    kind: ClassVar[str] = "length"
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+        return f"{self.piece}.{self.line} length" + ("" if self.length is None else f" {1e3 * self.length:g} mm")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Symmetric:
+    """A piece, cut whole, whose left is the mirror image of its right.
+
+    The axis comes to lie straight and keeps its direction in the pattern: upright, where it is the datum.
+
+    Attributes:
+        piece: name.
+        line: the axis, from border to border, faces that lie alike on both sides.
+    """
+
+    piece: str
+    line: str
+    kind: ClassVar[str] = "symmetric"
+
+    @property
+    def name(self) -> str:
+        """For reports."""
+        return f"{self.piece} symmetric about {self.line}"
+
+
+Constraint = Straight | FixedLength | Symmetric
+
+
+def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | None = None) -> tuple[Ties, bool]:
+    """The constraint's ties in the piece's own numbering, and whether they say how the piece lies on the cloth.
+
+    Args:
+        constraint, piece: what is asked of which.
+        fold: the piece's vertices on its upright fold, if it has one.
+
+    Raises:
+        InputError: the piece has no such line, or the line cannot be what is asked for.
+    """
+    surface = piece.network.surface
+    line = _line(constraint, piece)
+    if isinstance(constraint, FixedLength):
+        lengths = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1)
+        if constraint.length is not None:
+            there = lengths.sum() * (2.0 if _goes_on_beyond(fold, line) else 1.0)
+            lengths = lengths * (constraint.length / there)
+        return one_group(length_ties(line, lengths), smooth_ties(line, piece.positions, fold)), False
+    if line[0] == line[-1]:
+        raise InputError(f"{constraint.name}: the line is closed; it must run from one end to another")
+    if isinstance(constraint, Straight):
+        if constraint.along == "free":
+            return straight_ties(line), False
+        warp, weft = grain_axes(piece.grain_angle)
+        across = level_ties(line, weft if constraint.along == "warp" else warp)
+        return one_group(straight_ties(line), across), True
+    try:
+        partner = mirror_partners(surface.faces, line, vertex_count=len(surface.vertices))
+    except InputError as error:
+        raise InputError(f"{constraint.name}: {error}") from None
+    vertices = np.arange(len(partner), dtype=np.int32)
+    one_of_two = partner > vertices
+    chord = piece.positions[line[-1]] - piece.positions[line[0]]
+    across = np.array([chord[1], -chord[0]]) / np.linalg.norm(chord)
+    axis = vertices[partner == vertices]
+    pairs = np.column_stack([vertices, partner])[one_of_two]
+    return mirror_ties(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
+
+
+def _goes_on_beyond(fold: IntArray | None, line: IntArray) -> bool:
+    """Whether a line ends on the fold, and does not run along it."""
+    on_fold = np.isin(line, [] if fold is None else fold)
+    return bool((on_fold[0] or on_fold[-1]) and not on_fold.all())
+
+
+def _line(constraint: Constraint, piece: Flattening) -> IntArray:
+    lines = piece.network.surface.lines
+    if constraint.line not in lines:
+        raise InputError(
+            f"piece {constraint.piece!r} has no line {constraint.line!r}; {nearest(constraint.line, lines)}"
+        )
+    line = np.asarray(lines[constraint.line], dtype=np.int32)
+    if len(line) < 2:
+        raise InputError(f"{constraint.name}: the line has {len(line)} vertex; it needs two or more")
+    return line
+
+
+def piece_of(constraint: Constraint, pieces: Mapping[str, Flattening]) -> Flattening:
+    """The piece that a constraint is about.
+
+    Raises:
+        InputError: there is none of that name.
+    """
+    if constraint.piece not in pieces:
+        raise InputError(f"{constraint.name}: no piece {constraint.piece!r}; {nearest(constraint.piece, pieces)}")
+    return pieces[constraint.piece]

@@ -1,0 +1,125 @@
+"""What a maker wants of seams: ease, gathers. From names to the ratio of the two lengths of each of a form's seams."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpflat.core.errors import InputError, nearest
+from warpflat.garment.form_plan import FormPlan, plan_form
+from warpflat.garment.fullness import FullEdge
+
+if TYPE_CHECKING:
+    from warpflat.mannequin.forms import FormResult
+    from warpflat.mannequin.pieces import FormSeam
+    from warpflat.pattern.pieces import Seam
+
+__all__ = ["SeamWish", "WishedSeams", "wished_seams"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamWish:
+    """That one side of a seam is longer than the other.
+
+    Attributes:
+        name: the seam's, as in the pattern.
+        factor: length of the longer side over that of the other: 1.02 for an ease of 2 %.
+        gathered: the fullness falls on through the piece; otherwise it is eased in near the seam.
+        longer: the piece that is longer, or "piece.edge"; the seam's second side if not given.
+    """
+
+    name: str
+    factor: float
+    gathered: bool = False
+    longer: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WishedSeams:
+    """What wishes mean for a form.
+
+    Attributes:
+        ease: by seam of the pattern, how much longer its second side is, as a share of the first.
+        ratios: for each of the form's seams the wished length of its first side over its second.
+        full: by piece, its edges with more cloth than the body needs.
+    """
+
+    ease: Mapping[str, float]
+    ratios: tuple[float, ...]
+    full: Mapping[str, tuple[FullEdge, ...]]
+
+
+def wished_seams(form: FormResult, wishes: Sequence[SeamWish]) -> WishedSeams:
+    """Look the wishes up in a form.
+
+    A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same ratio.
+
+    Raises:
+        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not one
+            of its sides.
+    """
+    plan = plan_form(form)
+    by_name = {seam.name: seam for seam in plan.seams}
+    of_form = [_in_plan(plan, form, seam) for seam in form.seams]
+    ratios = [1.0] * len(form.seams)
+    ease: dict[str, float] = {}
+    full: dict[str, list[FullEdge]] = {}
+    for wish in wishes:
+        also = {seam.name: of_form[i][0].name for i, seam in enumerate(form.seams)}
+        name = wish.name if wish.name in by_name else also.get(wish.name, "")
+        if not name:
+            raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
+        if name in ease:
+            raise InputError(f"seam {name!r} is named twice; give its ease or gather once")
+        if not 1.0 <= wish.factor <= 5.0:
+            raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
+        longer = _longer_side(by_name[name], wish.longer)
+        ease[name] = wish.factor - 1.0 if longer == 1 else 1.0 / wish.factor - 1.0
+        for number, (seam, first_side) in enumerate(of_form):
+            if seam.name != name:
+                continue
+            side = 0 if longer == first_side else 1
+            ratios[number] = wish.factor if side == 0 else 1.0 / wish.factor
+            if wish.factor == 1.0:
+                continue  # as long as on the body: nothing to ease in
+            here = form.seams[number]
+            edge = FullEdge(vertices=here.vertices[side], factor=wish.factor, gathered=wish.gathered)
+            full.setdefault(here.pieces[side], []).append(edge)
+    return WishedSeams(ease=ease, ratios=tuple(ratios), full={name: tuple(edges) for name, edges in full.items()})
+
+
+def _longer_side(seam: Seam, longer: str | None) -> int:
+    if longer is None:
+        return 1
+    named = [{part for side in sides for part in (side.piece, str(side))} for sides in seam.sides]
+    found = [number for number in (0, 1) if longer in named[number]]
+    if not found:
+        raise InputError(
+            f"seam {seam.name!r}: {longer!r} is not one of its sides; {nearest(longer, named[0] | named[1])}"
+        )
+    if len(found) == 2:
+        edges = {str(side) for sides in seam.sides for side in sides}
+        raise InputError(f"seam {seam.name!r}: both sides are of {longer!r}; name the edge: {', '.join(sorted(edges))}")
+    return found[0]
+
+
+def _in_plan(plan: FormPlan, form: FormResult, seam: FormSeam) -> tuple[Seam, int]:
+    """The pattern's seam that a form's seam belongs to, and the side (0 or 1) there of its first side."""
+    parts = [_edge(plan, form, *side) for side in zip(seam.pieces, seam.edges, seam.vertices, strict=True)]
+    for found in plan.seams:
+        sides = [{str(side) for side in sides} for sides in found.sides]
+        for first in (0, 1):
+            if parts[0] in sides[first] and parts[1] in sides[1 - first]:
+                return found, first
+    raise AssertionError(f"the plan has no seam for {seam.name}")
+
+
+def _edge(plan: FormPlan, form: FormResult, piece: str, edge: str, vertices: np.ndarray) -> str:
+    ids = np.asarray(form.pieces[piece].edges[edge])
+    for part in plan.edges[piece]:
+        if part.source == edge and np.isin(vertices, ids[part.first : part.last + 1]).all():
+            return f"{piece}.{part.name}"
+    raise AssertionError(f"the plan has no edge {piece}.{edge}")

@@ -1,0 +1,93 @@
+"""Rules for the edges of a pattern: which are seams, hems or raw, and how wide their allowance is."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+from warpflat.core.errors import InputError, nearest
+from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS
+
+if TYPE_CHECKING:
+    pass
+
+__all__ = ["HEMMED", "EdgeRules", "unused"]
+
+#: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
+#: skirt, a band or a facing.
+HEMMED = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "wrist")
+
+
+@dataclass(frozen=True, kw_only=True)
+class EdgeRules:
+    """What a maker wants of the edges.
+
+    Attributes:
+        seam, hem: allowance [m] of all edges of these kinds.
+        kinds: kind by edge, as "piece.edge", or "edge" for every piece that has one of that name.
+        allowances: allowance [m] by edge, named likewise.
+        ease: by seam: how much longer its second side is, as a share of the first.
+    """
+
+    seam: float = DEFAULT_ALLOWANCE["seam"]
+    hem: float = DEFAULT_ALLOWANCE["hem"]
+    kinds: Mapping[str, str] = field(default_factory=dict)
+    allowances: Mapping[str, float] = field(default_factory=dict)
+    ease: Mapping[str, float] = field(default_factory=dict)
+
+    def check(self, edges: Mapping[str, Sequence[str]]) -> None:
+        """See that every name is an edge, and every kind one.
+
+        Args:
+            edges: names of the edges by piece.
+
+        Raises:
+            InputError: a name that no piece has (gives the nearest), or an unknown kind.
+        """
+        for said in self._unknown(edges).values():
+            raise InputError(said)
+        for name, kind in self.kinds.items():
+            if kind not in EDGE_KINDS:
+                raise InputError(f"kinds.{name}: unknown kind {kind!r}; {nearest(kind, EDGE_KINDS)}")
+
+    def known(self, edges: Mapping[str, Sequence[str]]) -> tuple[EdgeRules, tuple[str, ...]]:
+        """The rules without names that no piece has, and a sentence about each of these.
+
+        For names that show in the plane only; `edges` as for :meth:`check`.
+        """
+        unknown = self._unknown(edges)
+        kinds = {name: kind for name, kind in self.kinds.items() if ("kinds", name) not in unknown}
+        allowances = {name: width for name, width in self.allowances.items() if ("allowances_mm", name) not in unknown}
+        notes = tuple(f"left out of the pattern: {said}" for said in unknown.values())
+        return replace(self, kinds=kinds, allowances=allowances), notes
+
+    def _unknown(self, edges: Mapping[str, Sequence[str]]) -> dict[tuple[str, str], str]:
+        """Names that no piece has, with the table that has each, and what to say of it."""
+        known = {f"{piece}.{edge}" for piece, names in edges.items() for edge in names}
+        known |= {edge for names in edges.values() for edge in names}
+        return {
+            (key, name): f"{key}: no piece has an edge {name!r}; {nearest(name, known)}"
+            for key, mapping in (("kinds", self.kinds), ("allowances_mm", self.allowances))
+            for name in mapping
+            if name not in known
+        }
+
+    def kind(self, piece: str, edge: str, default: str) -> str:
+        """The kind of an edge."""
+        return self.kinds.get(f"{piece}.{edge}", self.kinds.get(edge, default))
+
+    def allowance(self, piece: str, edge: str, kind: str) -> float | None:
+        """The allowance [m] of an edge; None leaves it to its kind."""
+        if kind == "fold":
+            return None
+        of_kind = {"seam": self.seam, "hem": self.hem}.get(kind)
+        return self.allowances.get(f"{piece}.{edge}", self.allowances.get(edge, of_kind))
+
+
+def unused(name: str, taken: Mapping[str, Any] | set[str]) -> str:
+    """ "name 2" or the first number after that is free."""
+    number = 2
+    while f"{name} {number}" in taken:
+        number += 1
+    return f"{name} {number}" if name in taken else name

@@ -1,0 +1,233 @@
+"""Fullness: more cloth than the body needs along an edge, to be eased or gathered into a shorter one.
+
+The longer side of such a seam must not be stretched to its length, nor the shorter one pressed: the piece is *meant* to be
+wider there. Its springs and cells are at rest at the body's lengths times a fullness s that is stated along the edge and
+fades into the piece (harmonically, log s being linear): near the edge only for ease; for gathers down to the next edge that
+is sewn plainly across the fullness, or through the whole piece if there is none, as in a gathered skirt. What a pattern
+maker does by slashing and spreading.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.fabric.fabric import grain_axes
+from warpflat.flattening.progress import Stage
+from warpflat.flattening.result import Flattening
+from warpflat.model.membrane import step_matrix
+from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
+from warpflat.model.strain import strain_energy
+from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
+from warpflat.surface.cells import CellArrays, first_of_faces
+from warpflat.surface.falloff import faded
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import border_loops, half_edges_of
+
+__all__ = ["FullEdge", "fullness_of", "give_fullness"]
+
+
+# What the cloth stores beyond what the springs of a gathered piece tell of is worth a note from what so much strain everywhere along the
+# softer thread stores, if it is so many times as much as before it was gathered.
+_FELT, _MUCH_MORE = 0.01, 2.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FullEdge:
+    """An edge with more cloth than the body needs.
+
+    Attributes:
+        vertices: of the piece, along the edge.
+        factor: length of the edge over its length on the body.
+        gathered: the fullness runs on into the piece, along warp or weft, whichever is nearer to the edge's direction;
+            otherwise it is eased in near the edge, alike in all directions.
+    """
+
+    vertices: IntArray
+    factor: float
+    gathered: bool
+
+
+def give_fullness(
+    piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray], *, options: RelaxOptions | None = None
+) -> Flattening:
+    """The piece with fullness along some edges, relaxed again on its own.
+
+    Args:
+        piece: flattened, uncut.
+        edges: which edges, and how much.
+        plain: vertices along each of its edges that are sewn without fullness.
+        options: of the relaxation.
+    """
+    options = given_options(options)
+    full = fullness_of(piece, edges, plain)
+    network = _widened(piece.network, piece.positions, full)
+    warp, weft = grain_axes(piece.grain_angle)
+    mean = full.mean(axis=0)
+    spread = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
+    upright = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    state = Relaxation(network, options, start=piece.positions @ spread, upright=[upright])
+    outcome = relax(state)
+    positions = state.positions()
+    stage = Stage(
+        name="fullness",
+        spring_energy_j=outcome.energies.spring,
+        guard_energy_j=outcome.energies.guard,
+        strain_energy_j=strain_energy(network, positions),
+        steps=outcome.steps,
+        work_units=float(outcome.steps),
+        seconds=outcome.seconds,
+        converged=outcome.converged,
+        residual=outcome.residual,
+    )
+    most = max(edge.factor for edge in edges)
+    note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
+    notes = (*piece.notes, note, *_slanted(network, piece.stages[-1], stage))
+    return replace(
+        piece,
+        network=network,
+        positions=positions,
+        stages=(*piece.stages, stage),
+        notes=notes,
+        alone=piece.alone or piece,
+    )
+
+
+def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
+    """What is to be said of springs that are not the cloth any more: gathers slant the edges, along which they run, off the threads."""
+    # As it is meant to be worn, cloth is under tension, of which springs know nothing.
+    if network.model != "springs" or network.stretch is not None:
+        return []
+    missed, missed_before = _missed(stage), _missed(before)
+    thread = min(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
+    felt = 0.5 * thread * _FELT**2 * float(network.cell_arrays.area.sum())
+    if missed < max(felt, _MUCH_MORE * missed_before):
+        return []
+    stored = 1e3 * stage.strain_energy_j
+    return [
+        f"its gathers slant the mesh's edges off the grain, and springs along them tell of {stored - 1e3 * missed:.3g} mJ where "
+        f'{network.fabric.name} stores {stored:.3g}; model = "membrane" measures that exactly'
+    ]
+
+
+def _missed(stage: Stage) -> float:
+    """What the cloth stores and springs do not tell of [J]."""
+    return stage.strain_energy_j - stage.potential_j
+
+
+def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
+    """#V by 2, how much longer than on the body the cloth is meant to be along warp and weft."""
+    positions, faces = piece.positions, piece.faces
+    axes = grain_axes(piece.grain_angle)
+    log_full = np.zeros((len(positions), 2))
+    for axis in (0, 1):
+        along = [edge for edge in edges if edge.gathered and _runs_along(positions, edge.vertices, axes) == axis]
+        if along:
+            stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
+            logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
+            log_full[:, axis] += faded(faces, logs, stops, len(positions))
+    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap, and all of what is eased in; and
+    # what a slanting side has got too much.
+    wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
+    lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
+    log_full += faded(faces, lacks, border_loops(faces), len(positions))[:, None]
+    return np.asarray(np.exp(log_full))
+
+
+def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, FloatArray]) -> int:
+    """0 where the line's chord is nearer to the warp, 1 where to the weft."""
+    chord = positions[line[-1]] - positions[line[0]]
+    return int(abs(float(chord @ axes[1])) > abs(float(chord @ axes[0])))
+
+
+def _lack(
+    edge: IntArray, factor: float, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> FloatArray:
+    """At each vertex of an edge, log of what is still wanting of its factor."""
+    step = np.diff(positions[edge], axis=0)
+    along = np.stack([step @ axes[0], step @ axes[1]], axis=1)
+    here = 0.5 * (full[edge[1:]] + full[edge[:-1]])
+    length = np.maximum(np.linalg.norm(step, axis=1), np.finfo(np.float64).tiny)
+    lack = np.log(factor * length / np.linalg.norm(along * here, axis=1))
+    return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
+
+
+def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
+    axes = grain_axes(network.grain_angle)
+    springs = _wider_springs(network, positions, axes, full)
+    cells = _wider_cells(network.cell_arrays, positions, axes, full)
+    if network.model == "springs":
+        return replace(network, spring_arrays=springs, cell_arrays=cells)
+    stretch = network.stretch
+    meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
+    weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, positions, meant)
+    return replace(network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held=held)
+
+
+def _wider_springs(
+    network: SpringNetwork, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> SpringArrays:
+    """Longer springs, of the stiffness that cells of the new sides have: along a triangle's side a, K b/a."""
+    springs, surface = network.spring_arrays, network.surface
+    before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
+    here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
+    longer = _times(before, here)
+    stiffness, lack, wave = springs.stiffness * _times(before[:, ::-1], here) / longer, None, None
+    if surface.is_quad.any():
+        wider = _wider_quads(surface, positions, axes, full)
+        made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
+        of_quads = _beside_quads(surface, springs)
+        stiffness[of_quads], lack, wave = made.stiffness[of_quads], made.lack, made.wave
+    return replace(
+        springs,
+        listed_length=springs.listed(springs.rest_length * longer),
+        listed_stiffness=springs.listed(stiffness),
+        lack=lack,
+        wave=wave,
+    )
+
+
+def _beside_quads(surface: Surface, springs: SpringArrays) -> BoolArray:
+    """#S, which springs are a quad's sides or diagonals."""
+    beside = np.arange(springs.count) >= springs.edge_count
+    halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
+    beside[halves.edge[first[:, None] + np.arange(4)]] = True
+    return np.asarray(beside)
+
+
+def _wider_quads(
+    surface: Surface, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> FloatArray:
+    """#F by 2, how many times as long a quad's first edges and its others become; 1 of triangles."""
+    wider = np.ones((len(surface.faces), 2))
+    corners = surface.faces[surface.is_quad]
+    here, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
+    for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
+        wider[surface.is_quad, k] = _times(sides, here)
+    return wider
+
+
+def _times(way: FloatArray, full: FloatArray) -> FloatArray:
+    """How many times as long a way (along warp and weft) is once each of both has been made so many times as long."""
+    length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
+    return np.asarray(np.linalg.norm(way * full, axis=1) / length)
+
+
+def _wider_cells(
+    cells: CellArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
+) -> CellArrays:
+    """Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S."""
+    here = full[cells.corner].mean(axis=1)
+    widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
+    p = positions[cells.corner]
+    flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+    a, b = np.moveaxis(cells.edges @ np.linalg.solve(flat, widen @ flat), -1, 0)
+    # Laid with the first side along x again: F only matters up to a turn of the body.
+    length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
+    across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
+    return replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))

@@ -1,0 +1,274 @@
+"""A garment: the pieces of a form on a mannequin, each flattened, and the seams between them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError, expect, expect_callback, expect_each, nearest
+from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
+from warpflat.flattening.fit_report import garment_wear
+from warpflat.flattening.flatten_all import flatten_all
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
+from warpflat.garment.ease import SeamWish, wished_seams
+from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.seam_length import SeamLengths, polyline_length
+from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.mannequin.carry import Carrier
+from warpflat.mannequin.forms import FormResult
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.pieces import FormPiece, FormSeam
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.energy_map import energy_report
+
+__all__ = ["Garment", "flatten_form"]
+
+# By how much the mirror image of a piece may differ from its partner to be cut by the same pattern [m].
+_SAME_PIECE = 5e-4
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Garment:
+    """A form's pieces, flattened.
+
+    Attributes:
+        name: the garment's.
+        mannequin: whose form it is.
+        form: the pieces in space, with their edges and seams.
+        pieces: the flat pieces by name, in the form's order.
+        sewn: how they were relaxed together under their seams and constraints, and what these cost; None if they were not.
+        ratios: for each of the form's seams the wished length of its first side over its second.
+    """
+
+    name: str
+    mannequin: Mannequin
+    form: FormResult
+    pieces: Mapping[str, Flattening]
+    sewn: Sewn | None = None
+    ratios: tuple[float, ...] = ()
+
+    @property
+    def seams(self) -> tuple[SeamLengths, ...]:
+        """Every seam with the lengths of its two sides."""
+        ratios = self.ratios or (1.0,) * len(self.form.seams)
+        prices = {} if self.sewn is None else {held.name: held.price for held in self.sewn.held if held.kind == "seam"}
+        return tuple(
+            self._measured(seam, ratio, prices.get(seam.name))
+            for seam, ratio in zip(self.form.seams, ratios, strict=True)
+        )
+
+    @property
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """Pieces that are each other's mirror images, in the body's grid and, within 0.5 mm, in the pattern.
+
+        One of the two is enough for the table: cut it twice, the second time turned over.
+        """
+        found = []
+        names = list(self.pieces)
+        for number, first in enumerate(names):
+            for second in names[number + 1 :]:
+                partners = self.mirror_vertices(first, second)
+                if partners is None:
+                    continue
+                a, b = self.pieces[first].positions * [-1.0, 1.0], self.pieces[second].positions[partners]
+                if np.abs((a - a.mean(axis=0)) - (b - b.mean(axis=0))).max() < _SAME_PIECE:
+                    found.append((first, second))
+        return tuple(found)
+
+    def mirror_vertices(self, first: str, second: str) -> IntArray | None:
+        """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair."""
+        return _partners(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was completed, mended or chosen, one sentence each."""
+        of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.told)
+        return (*self.mannequin.notes, *of_pieces)
+
+    def _measured(self, seam: FormSeam, ratio: float, price: float | None) -> SeamLengths:
+        first, second = (self.pieces[piece] for piece in seam.pieces)
+        return SeamLengths(
+            name=seam.name,
+            sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
+            length_3d=polyline_length(first.surface.vertices[seam.vertices[0]]),
+            lengths=(
+                polyline_length(first.positions[seam.vertices[0]]),
+                polyline_length(second.positions[seam.vertices[1]]),
+            ),
+            ease=1.0 / ratio - 1.0,
+            price=price,
+        )
+
+    def carrier(self, piece: str) -> Carrier:
+        """What carries points and drawn lines between a piece's pattern and the body, both ways.
+
+        Raises:
+            InputError: there is no such piece.
+        """
+        if piece not in self.pieces:
+            raise InputError(f"garment {self.name!r} has no piece {piece!r}; {nearest(piece, self.pieces)}")
+        flat = self.pieces[piece]
+        return Carrier(flat.surface.vertices, flat.positions, flat.faces)
+
+    def _measures(self, name: str) -> dict[str, Any]:
+        """The piece's measures, its energy also brick by brick."""
+        piece, brick = self.pieces[name], np.array(self.form.pieces[name].face_brick)
+        bricks = {each: brick == each for each in dict.fromkeys(brick.tolist())}
+        return {**piece.measures, "energy": energy_report(piece.network.surface, piece.worn.energy, regions=bricks)}
+
+    def metrics(self) -> dict[str, Any]:
+        """All of `metrics.json`."""
+        first = next(iter(self.pieces.values()))
+        pieces = {name: self._measures(name) for name in self.pieces}
+        return {
+            **first.metrics(),
+            "pieces": pieces,
+            "wear": garment_wear(pieces),
+            "mannequin": self.mannequin.metrics(),
+            "seams": [seam.as_dict() for seam in self.seams],
+            "pairs": [list(pair) for pair in self.pairs],
+            **({} if self.sewn is None else self._sewing()),
+        }
+
+    def summary(self) -> dict[str, Any]:
+        """What `metrics.json` says of it as another size: whether its pieces came to rest and lie without flips, and its seams."""
+        return {
+            "pieces": {
+                name: {
+                    "converged": piece.converged,
+                    "flipped_faces": piece.flipped_faces,
+                    "stages": [stage.as_dict() for stage in piece.stages],
+                }
+                for name, piece in self.pieces.items()
+            },
+            "seams": [seam.as_dict() for seam in self.seams],
+            **({} if self.sewn is None else self._sewing()),
+        }
+
+    def _sewing(self) -> dict[str, Any]:
+        assert self.sewn is not None
+        return {
+            "constraints": [held.as_dict() for held in self.sewn.constraints],
+            "sewing": self.sewn.as_dict(),
+        }
+
+    def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
+        """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none; returns their names.
+
+        Raises:
+            InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
+        """
+        from warpflat.core.atomic_files import output_folder
+        from warpflat.core.manifest import require_own_metrics, write_metrics
+        from warpflat.export.picture import write_picture
+
+        others = [*(["picture.png"] if picture else []), "metrics.json"]
+        with output_folder(folder, others, sources=self.mannequin.sources) as to:
+            require_own_metrics(to)
+            files = [piece.write_obj(to) for piece in self.pieces.values()]
+            if picture:
+                write_picture(to / "picture.png", [piece.picture_piece() for piece in self.pieces.values()])
+            write_metrics(to, self.metrics())
+        return [*files, *others]
+
+
+def flatten_form(
+    mannequin: Mannequin,
+    form: FormResult,
+    *,
+    fabric: Fabric | str = DEFAULT_FABRIC,
+    grain_angle: float = 0.0,
+    relax: RelaxOptions | None = None,
+    callback: Callable[[str, Progress], None] | None = None,
+    device: str | None = None,
+    sewn: bool = True,
+    wishes: Sequence[SeamWish] = (),
+    constraints: Sequence[Constraint] = (),
+    **options: Any,
+) -> Garment:
+    """Flatten every piece of a form, each from its own datum line, then all together, so that their seams match.
+
+    Args:
+        mannequin: whose form it is.
+        form: what `Mannequin.form` gives.
+        fabric, grain_angle, relax, device, options: as :func:`warpflat.flatten` takes them.
+        callback: called with the piece's name and its `Progress` after every step of its own.
+        sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
+            keeps its own minimum.
+        wishes: ease and gathers of seams.
+        constraints: on edges and lines of pieces.
+
+    Raises:
+        InputError: a piece cannot be flattened, or a wish or constraint names what there is not; one line says which and why.
+    """
+    expect(form, FormResult, "form", "what Mannequin.form gives")
+    expect(mannequin, Mannequin, "mannequin", "a Mannequin")
+    expect_callback(callback)
+    expect_each(wishes, SeamWish, "wishes", "a SeamWish")
+    expect_each(constraints, (FixedLength, Straight, Symmetric), "constraints", "a Straight, FixedLength or Symmetric")
+    wished = wished_seams(form, wishes)
+    names = list(form.pieces)
+
+    def told(number: int, progress: Progress) -> None:
+        if callback is not None:
+            callback(names[number], progress)
+
+    flat = flatten_all(
+        [piece.surface for piece in form.pieces.values()],
+        fabric=fabric,
+        datum=[piece.datum or None for piece in form.pieces.values()],
+        grain_angle=grain_angle,
+        relax=relax,
+        callback=told if callback is not None else None,
+        device=device,
+        **options,
+    )
+    pieces = dict(zip(names, flat, strict=True))
+    if not sewn:
+        return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
+    for name, edges in wished.full.items():
+        pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
+    pairs = [
+        SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices, ratio=ratio)
+        for seam, ratio in zip(form.seams, wished.ratios, strict=True)
+    ]
+    folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
+    together = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
+    return Garment(
+        name=form.name, mannequin=mannequin, form=form, pieces=together.pieces, sewn=together, ratios=wished.ratios
+    )
+
+
+def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
+    """Vertices along each side of a seam of the piece that has no fullness."""
+    sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
+    return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
+
+
+def _partners(first: FormPiece, second: FormPiece, image: IntArray) -> IntArray | None:
+    """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair.
+
+    Told face by face: along a line that a piece is cut open at, a vertex of the mannequin is two of the piece.
+    """
+    if len(first.grid_vertices) != len(second.grid_vertices) or len(first.face_brick) != len(second.face_brick):
+        return None
+    faces = {
+        frozenset(row): dict(zip(row, face, strict=True))
+        for row, face in zip(
+            second.grid_vertices[second.surface.faces].tolist(), second.surface.faces.tolist(), strict=True
+        )
+    }
+    partners = np.full(len(first.grid_vertices), -1, dtype=np.int32)
+    for row, face in zip(image[first.grid_vertices[first.surface.faces]].tolist(), first.surface.faces, strict=True):
+        other = faces.get(frozenset(row))
+        if other is None:
+            return None
+        partners[face] = [other[vertex] for vertex in row]
+    return partners

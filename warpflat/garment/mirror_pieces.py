@@ -1,0 +1,146 @@
+"""Pieces that are each other's mirror images: one is drawn and cut twice, and sewn at the seams of both."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpflat.pattern.curves import arc_lengths
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+
+if TYPE_CHECKING:
+    from warpflat.garment.garment import Garment as FlatGarment
+
+__all__ = ["Twin", "find_twins", "sew_twins"]
+
+#: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
+SAME_LENGTH = 5e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Twin:
+    """A piece that is cut by another one's pattern, turned over.
+
+    Attributes:
+        name: of the piece that is not drawn.
+        of: the piece that is.
+        edges: names of the first one's edges, to those of the second's that are their mirror images.
+    """
+
+    name: str
+    of: str
+    edges: Mapping[str, str]
+
+
+def find_twins(
+    garments: Mapping[str, FlatGarment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
+) -> tuple[Twin, ...]:
+    """Pairs that are so in every size, with like edges, each of whose seams is the other's mirror image too.
+
+    Args:
+        garments: flattened, by size.
+        pieces: their patterns, all of them.
+        seams: between these.
+    """
+    every = [set(garment.pairs) for garment in garments.values()]
+    found: list[Twin] = []
+    for first, second in next(iter(garments.values())).pairs:
+        if not all((first, second) in pairs for pairs in every):
+            continue
+        matched = [_matched(garments[size], pieces[size], first, second) for size in garments]
+        if matched[0] is not None and all(edges == matched[0] for edges in matched):
+            found.append(Twin(name=second, of=first, edges=matched[0]))
+    # One that is sewn otherwise than its partner needs notches of its own; without it others may be so too.
+    while odd := _sewn_otherwise(found, seams):
+        found = [twin for twin in found if twin.name not in odd]
+    return tuple(found)
+
+
+def sew_twins(seams: Sequence[Seam], twins: Sequence[Twin]) -> tuple[Seam, ...]:
+    """The seams with every twin's edges replaced by those of the piece that is drawn.
+
+    Such a seam runs as its mirror image does, so that the notches of the one are those of the other.
+    """
+    by_name = {twin.name: twin for twin in twins}
+    sewn = []
+    for seam in seams:
+        sides = (_replaced(seam.sides[0], by_name), _replaced(seam.sides[1], by_name))
+        own = [side for row in sides for side in row if side.mirrored]
+        if not own:
+            sewn.append(seam)
+            continue
+        image = _mirror_seam(own[0], seams, by_name)
+        assert image is not None  # find_twins sees to it
+        other, place = image
+        ease = seam.ease
+        if next(number for number in (0, 1) if own[0] in sides[number]) != place:
+            sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
+        there = next(side for side in other.sides[place] if _key(side) == _key(own[0]))
+        if there.reversed != own[0].reversed:
+            sides = (_turned(sides[0]), _turned(sides[1]))
+        sewn.append(replace(seam, sides=sides, ease=ease))
+    return tuple(sewn)
+
+
+def _matched(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
+    """The second piece's edges by the first's that are their mirror images; None if one pattern will not do for both."""
+    one, two = (next(piece for piece in pieces if piece.name == name) for name in (first, second))
+    partners = garment.mirror_vertices(first, second)
+    edges: dict[str, str] = {}
+    for edge in one.edges:
+        if partners is None or edge.vertices is None:
+            return None
+        row = partners[np.asarray(edge.vertices)][::-1]
+        image = next((e for e in two.edges if e.vertices is not None and np.array_equal(e.vertices, row)), None)
+        if image is None or (image.kind, image.width) != (edge.kind, edge.width):
+            return None
+        if np.abs(arc_lengths(image.points[::-1]) - arc_lengths(edge.points)).max() > SAME_LENGTH:
+            return None
+        edges[image.name] = edge.name
+    return edges if len(edges) == len(two.edges) else None
+
+
+def _sewn_otherwise(twins: Sequence[Twin], seams: Sequence[Seam]) -> set[str]:
+    """Twins with an edge that is sewn where their partner's is not."""
+    by_name = {twin.name: twin for twin in twins}
+    return {
+        part.piece
+        for seam in seams
+        for side in seam.sides
+        for part, drawn in zip(side, _replaced(side, by_name), strict=True)
+        if drawn.mirrored and _mirror_seam(drawn, seams, by_name) is None
+    }
+
+
+def _mirror_seam(side: SeamSide, seams: Sequence[Seam], twins: Mapping[str, Twin]) -> tuple[Seam, int] | None:
+    """The seam at which the edge that is drawn is sewn itself, and on which side of it."""
+    for seam in seams:
+        for number in (0, 1):
+            if any(part.piece not in twins and _key(part) == _key(side) for part in seam.sides[number]):
+                return seam, number
+    return None
+
+
+def _replaced(side: Sequence[SeamSide], twins: Mapping[str, Twin]) -> tuple[SeamSide, ...]:
+    return tuple(
+        SeamSide(
+            piece=twins[part.piece].of,
+            edge=twins[part.piece].edges[part.edge],
+            reversed=not part.reversed,
+            mirrored=True,
+        )
+        if part.piece in twins
+        else part
+        for part in side
+    )
+
+
+def _turned(side: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
+    return tuple(replace(part, reversed=not part.reversed) for part in reversed(side))
+
+
+def _key(side: SeamSide) -> tuple[str, str]:
+    return side.piece, side.edge

@@ -1,0 +1,308 @@
+"""The pattern files of a run: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`, and the marker if it is asked for."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat.core.activity import doing
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import counted
+from warpflat.garment.edge_rules import EdgeRules
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.garment import Garment
+    from warpflat.pattern.drafted import DraftedGarment
+    from warpflat.pattern.marker import Cloth
+    from warpflat.pattern.pieces import Garment as Pattern
+    from warpflat.surface.border_seams import NamedSeam
+
+__all__ = [
+    "FORMATS",
+    "PatternOptions",
+    "WrittenPattern",
+    "export_pattern",
+    "export_patterns",
+    "garment_files",
+    "surface_files",
+]
+
+FORMATS = ("dxf", "svg", "pdf", "json")
+
+
+@dataclass(frozen=True, kw_only=True)
+class PatternOptions:
+    """What is written of a pattern, and how.
+
+    Attributes:
+        formats: some of "dxf", "svg", "pdf", "json".
+        dialect: of the DXF, "aama" or "astm".
+        paper: of the PDF, "A4", "Letter" or "A0".
+        tolerance: how far [m] a drawn curve may lie from the mesh's border; None takes 0.1 mm, and more only where the
+            border is so ragged that its curves would be all wiggles, as on scans.
+        rules: kinds and allowances of edges.
+        cloth: what the marker is laid on; None makes no marker.
+        marker_seconds: time for the nesting.
+    """
+
+    formats: Sequence[str] = FORMATS
+    dialect: str = "aama"
+    paper: str = "A4"
+    tolerance: float | None = None
+    rules: EdgeRules = field(default_factory=EdgeRules)
+    cloth: Cloth | None = None
+    marker_seconds: int = 5
+
+
+@dataclass(frozen=True, kw_only=True)
+class WrittenPattern:
+    """Names of the files, what the maker should know, one sentence each, and entries of `metrics.json`."""
+
+    files: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
+    metrics: Mapping[str, Any] = field(default_factory=dict)
+
+
+def garment_files(
+    garments: Mapping[str, Garment],
+    folder: str | Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    sample_size: str | None = None,
+) -> WrittenPattern:
+    """Write the pattern of a garment in one or more sizes; several lie upon each other as a nest.
+
+    A pattern that cannot be drawn is a note, not a mistake: by then the garment has been flattened and its other files
+    are good.
+
+    Args:
+        garments: flattened, by size; "" where there is none.
+        folder: made if need be.
+        name: of the files.
+        options: see the class.
+        sample_size: the one that the files show first.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.garment.to_pattern import pattern_of_garment
+
+    options = options or PatternOptions()
+    return _drawn(
+        lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
+        folder, name, options,
+    )  # fmt: skip
+
+
+def surface_files(
+    results: Sequence[Flattening],
+    folder: str | Path,
+    *,
+    name: str,
+    options: PatternOptions | None = None,
+    seams: Sequence[NamedSeam] = (),
+) -> WrittenPattern:
+    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it; else as above.
+
+    `seams` are those of its border that were named.
+    """
+    from warpflat.garment.surface_to_pattern import pattern_of_surface
+
+    options = options or PatternOptions()
+    return _drawn(
+        lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
+    )
+
+
+def export_pattern(
+    folder: Path, format: str, *, dialect: str = "aama", paper: str = "A4", sizes: Sequence[str] | None = None
+) -> str:
+    """Write one file of a run's pattern again; as :func:`export_patterns`, of which it returns the only name."""
+    return export_patterns(folder, [format], dialect=dialect, paper=paper, sizes=sizes)[0]
+
+
+def export_patterns(
+    folder: Path,
+    formats: Sequence[str],
+    *,
+    dialect: str = "aama",
+    paper: str = "A4",
+    sizes: Sequence[str] | None = None,
+) -> list[str]:
+    """Write files of a run's pattern again, all or none, from its `pattern.json`, and return their names.
+
+    Args:
+        folder: of the run.
+        formats: some of "dxf", "svg", "pdf" and "json".
+        dialect: of a DXF.
+        paper: of a PDF.
+        sizes: only these; None takes all. Not of "json", which is what the others are made from.
+
+    Raises:
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be written.
+    """
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.manifest import note_file
+    from warpflat.export.read_pattern_json import read_pattern_json
+
+    for format in formats:
+        if format not in FORMATS:
+            raise InputError(f"unknown format {format!r}; {nearest(format, FORMATS)}")
+    if "json" in formats and sizes is not None:
+        raise InputError(
+            "pattern.json holds all sizes, since the other formats are made from it: leave out the size, or take dxf, svg or pdf"
+        )
+    source = folder / "pattern.json"
+    drafted = read_pattern_json(source)
+    # As JSON it may be written over itself: that is what was asked for.
+    with output_folder(folder, sources=[] if "json" in formats else [source]):
+        files = [
+            _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
+            for format in formats
+        ]
+        for file in files:
+            note_file(folder, drafted.name, file)
+    return files
+
+
+def _drawn(
+    make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
+) -> WrittenPattern:
+    """Make, draft and write a pattern; geometry that defeats it becomes a note, and in `metrics.json` `not_drawn` of `pattern`."""
+    from shapely.errors import ShapelyError
+
+    from warpflat.core.atomic_files import output_folder
+
+    if not options.formats and options.cloth is None:
+        return WrittenPattern()
+    doing("drafting the pattern")
+    try:
+        pattern, notes = make()
+        drafted, told = _drafted(pattern, options.tolerance)
+    except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
+        why = " ".join(str(error).split())
+        return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
+    notes = (*notes, *told)
+    notes = (
+        *notes,
+        *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
+    )
+    metrics: dict[str, Any] = {"pattern": _measures(drafted)}
+    with output_folder(to) as folder:
+        files = [
+            _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
+            for kind in FORMATS
+            if kind in options.formats
+        ]
+        if options.cloth is not None:
+            marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+            files += marked
+            notes = (*notes, *told)
+            metrics["marker"] = plan
+    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
+
+
+def _measures(drafted: DraftedGarment) -> dict[str, Any]:
+    """How far curves keep from the mesh, and sides of seams from each other, at worst."""
+    edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
+    near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
+    return {
+        "fit_error_mm": 1000 * max(edge.fit_error for edge in edges),
+        "seam_difference_mm": max((abs(seam.difference_mm) for seam in drafted.seams), default=None),
+        "seam_difference_per_50mm_mm": max(near, default=None),
+        "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
+    }
+
+
+def _drafted(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
+    """The pattern drafted, and where its curves had to leave the border of the mesh."""
+    from warpflat.pattern.curves import TOLERANCE
+    from warpflat.pattern.draft import draft_garment
+
+    drafted = draft_garment(pattern, tolerance=tolerance)
+    ragged: dict[str, float] = {}
+    for pieces in drafted.pieces.values():
+        for piece in pieces:
+            for edge in piece.edges:
+                if tolerance is None and edge.tolerance > TOLERANCE:
+                    name = f"{piece.name}.{edge.name}"
+                    ragged[name] = max(ragged.get(name, 0.0), edge.fit_error)
+    if not ragged:
+        return drafted, ()
+    return drafted, (
+        f"the border is ragged at {', '.join(ragged)}: the curves keep within {max(ragged.values()) * 1000:.1f} mm of it",
+    )
+
+
+def _write(
+    drafted: DraftedGarment,
+    folder: Path,
+    kind: str,
+    *,
+    name: str,
+    dialect: str,
+    paper: str,
+    sizes: Sequence[str] | None = None,
+) -> str:
+    from warpflat.core.atomic_files import file_in
+    from warpflat.export.dxf import write_dxf
+    from warpflat.export.pattern_json import write_pattern_json
+    from warpflat.export.pdf import write_pdf
+    from warpflat.export.svg import write_svg
+
+    file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
+    doing(f"writing {file.name}")
+    if kind == "dxf":
+        write_dxf(drafted, file, dialect=dialect, sizes=sizes)
+    elif kind == "svg":
+        write_svg(drafted, file, sizes=sizes, nested=True)
+    elif kind == "pdf":
+        write_pdf(drafted, file, paper=paper, sizes=sizes)
+    else:
+        write_pattern_json(drafted, file)
+    return file.name
+
+
+def _marker(
+    drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
+) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
+    """Write `NAME.marker.svg` and `NAME.marker.json`, for one garment of each size."""
+    from warpflat.core.atomic_files import file_in
+    from warpflat.core.json_file import write_json
+    from warpflat.export.svg import write_marker_svg
+    from warpflat.pattern.marker import make_marker
+
+    doing(f"laying the marker, {seconds} s at most")
+    try:
+        marker = make_marker(drafted, cloth, seconds=seconds)
+    except InputError as error:
+        return [], (f"no marker was made: {error}",), {"not_made": str(error)}
+    files = [file_in(folder, name, ending) for ending in (".marker.svg", ".marker.json")]
+    write_marker_svg(marker, files[0])
+    placements: list[dict[str, Any]] = [
+        {
+            "piece": copy.piece.name,
+            "size": copy.piece.size,
+            "mirrored": copy.mirrored,
+            "turned": copy.turned,
+            "matrix": copy.matrix.tolist(),
+        }
+        for copy in marker.placements
+    ]
+    measures: dict[str, Any] = {
+        "width_m": marker.width,
+        "length_m": marker.length,
+        "utilisation": marker.utilisation,
+        "pieces": len(placements),
+        "garments": len(drafted.pieces),
+    }
+    write_json(files[1], {"schema": 1, **measures, "placements": placements})
+    told = (
+        f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
+        f"{counted(len(placements), 'piece')}"
+    )
+    return [file.name for file in files], (told,), measures

@@ -1,0 +1,55 @@
+"""Seams as they came out: the lengths of their two sides, what is amiss, and what they cost."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+
+__all__ = ["SeamLengths", "polyline_length"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamLengths:
+    """A seam, measured.
+
+    Attributes:
+        name: after the feature line, or the cut.
+        sides: "piece.edge" twice.
+        length_3d: of the one curve in space that both sides come from [m].
+        lengths: of its two sides in the pattern [m].
+        ease: by how much the second side is meant to be longer, as a share of the first; as in `pattern.json`.
+        price: half the work of the seam's forces: what it costs that its sides match [J]; None if they were not made to.
+    """
+
+    name: str
+    sides: tuple[str, str]
+    length_3d: float
+    lengths: tuple[float, float]
+    ease: float = 0.0
+    price: float | None = None
+
+    @property
+    def difference(self) -> float:
+        """By how much the second side is too long for the first and its ease [m]."""
+        return self.lengths[1] - self.lengths[0] * (1.0 + self.ease)
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `metrics.json`."""
+        return {
+            "name": self.name,
+            "sides": list(self.sides),
+            "length_mm": [1e3 * length for length in self.lengths],
+            "length_3d_mm": 1e3 * self.length_3d,
+            "difference_mm": 1e3 * self.difference,
+            "ease": self.ease,
+            "price_j": self.price,
+        }
+
+
+def polyline_length(points: FloatArray) -> float:
+    """Length of a polyline, #P by 2 or 3 [m]."""
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

@@ -1,0 +1,126 @@
+"""One flattened surface, cut or not: sides of darts, partings and named seams made equally long, constraints kept."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from warpflat.core.errors import InputError
+from warpflat.flattening.result import Flattening
+from warpflat.garment.constraints import Constraint
+from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.seam_length import SeamLengths, polyline_length
+from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams
+
+__all__ = ["SewnSurface", "sew_surface"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class SewnSurface:
+    """A surface relaxed under the seams of its cuts and under constraints.
+
+    Attributes:
+        result: the piece, whole, also where cuts have parted it.
+        sewn: how it went.
+        seams: of the cuts, then those that were named, measured.
+    """
+
+    result: Flattening
+    sewn: Sewn
+    seams: tuple[SeamLengths, ...]
+
+    def metrics(self) -> dict[str, Any]:
+        """What `metrics.json` says of it besides its pieces."""
+        return {
+            "seams": [seam.as_dict() for seam in self.seams],
+            "constraints": [held.as_dict() for held in self.sewn.constraints],
+            "sewing": self.sewn.as_dict(),
+        }
+
+
+def sew_surface(
+    result: Flattening,
+    constraints: Sequence[Constraint] = (),
+    *,
+    seams: Sequence[NamedSeam] = (),
+    options: RelaxOptions | None = None,
+) -> SewnSurface | None:
+    """Relax a piece on, so that its seams and darts' legs match and its constraints are kept; None if it has none.
+
+    Args:
+        result: flattened, perhaps cut.
+        constraints: on its lines.
+        seams: of its border, besides those of its cuts.
+        options: of the relaxation.
+
+    Raises:
+        InputError: a constraint or a seam names a line that the piece has not, or asks what the line cannot be.
+    """
+    found = surface_seams(result.network.surface, seams)
+    result = _with_fullness(result, found, options)
+    name = result.surface.name
+    pairs = [
+        SeamPair(
+            name=made.name if len(made.seams) == 1 else f"{made.name}_{number}",
+            pieces=(name, name),
+            vertices=(seam.left, seam.right),
+        )
+        for made in result.cuts
+        for number, seam in enumerate(made.seams, start=1)
+    ]
+    titles = [(f"{pair.name}.left", f"{pair.name}.right") for pair in pairs] + [seam.named.sides for seam in found]
+    pairs += [
+        SeamPair(
+            name=seam.named.name,
+            pieces=(name, name),
+            vertices=seam.vertices,
+            ratio=1.0 / (1.0 + seam.named.ease),
+            joints=seam.joints,
+        )
+        for seam in found
+    ]
+    if not pairs and not constraints:
+        return None
+    sewn = sew({name: result}, pairs, constraints=constraints, options=options)
+    after = sewn.pieces[name]
+    measured = tuple(
+        SeamLengths(
+            name=pair.name,
+            sides=(f"{name}.{title[0]}", f"{name}.{title[1]}"),
+            length_3d=polyline_length(after.network.surface.vertices[pair.vertices[0]]),
+            lengths=(
+                polyline_length(after.positions[pair.vertices[0]]),
+                polyline_length(after.positions[pair.vertices[1]]),
+            ),
+            ease=1.0 / pair.ratio - 1.0,
+            price=held.price,
+        )
+        for pair, title, held in zip(pairs, titles, sewn.held, strict=False)
+    )
+    return SewnSurface(result=after, sewn=sewn, seams=measured)
+
+
+def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: RelaxOptions | None) -> Flattening:
+    """The piece with more cloth along the sides that are meant to be longer."""
+    full = [
+        FullEdge(vertices=seam.vertices[seam.named.longer], factor=seam.named.factor, gathered=seam.named.gathered)
+        for seam in seams
+        if seam.named.factor > 1.0
+    ]
+    if not full:
+        return result
+    if result.cuts:
+        name = next(seam.named.name for seam in seams if seam.named.factor > 1.0)
+        raise InputError(
+            f"seam {name!r}: ease and gathers need a piece that is not cut; leave out the cuts or the ease"
+        )
+    plain = [
+        ids
+        for seam in seams
+        for side, ids in enumerate(seam.vertices)
+        if seam.named.factor == 1.0 or side != seam.named.longer
+    ]
+    return give_fullness(result, full, plain, options=options)

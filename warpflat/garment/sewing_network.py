@@ -1,0 +1,89 @@
+"""Several flattened pieces as one mesh and one network, to be relaxed together."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.sums import begins
+from warpflat.flattening.progress import Stage
+from warpflat.flattening.result import Flattening
+from warpflat.model.join import join_networks, join_surfaces
+from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import strain_energy
+from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.relax import Relaxation
+from warpflat.surface.topology import components
+
+__all__ = ["Together"]
+
+
+class Together:
+    """Several pieces as one mesh, each with its own range of vertices.
+
+    Attributes:
+        pieces: by name.
+        first: of each, the number of its first vertex.
+        surface: all of them.
+        upright: of each, the two vertices that lie one above the other.
+    """
+
+    def __init__(self, pieces: Mapping[str, Flattening]) -> None:
+        """Put the pieces, of one fabric, side by side."""
+        self.pieces = pieces
+        first = begins([len(piece.positions) for piece in pieces.values()])
+        self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
+        self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
+        self.upright = {
+            name: Upright(
+                lower=int(piece.datum[0]) + self.first[name],
+                upper=_upper_end(piece) + self.first[name],
+                vertices=slice(self.first[name], self.first[name] + len(piece.positions)),
+            )
+            for name, piece in pieces.items()
+        }
+
+    def numbers(self, name: str, vertices: IntArray) -> IntArray:
+        """Vertices of a piece in the whole's numbering."""
+        return np.asarray(vertices, dtype=np.int32) + np.int32(self.first[name])
+
+    def network(self) -> SpringNetwork:
+        """The pieces' own springs and cells, as one network on their device, nothing sewn yet; it comes to rest as a whole."""
+        # A single piece's own one would be sewn for good.
+        network = replace(join_networks([piece.network for piece in self.pieces.values()]))
+        network.parts = ()
+        return network
+
+    def split(self, state: Relaxation, *, converged: bool, seconds: float, residual: float) -> dict[str, Flattening]:
+        """Each piece with its share of the layout, and a stage "sew" in its history."""
+        layout, sewn = state.positions(), {}
+        for name, piece in self.pieces.items():
+            own = layout[self.first[name] : self.first[name] + len(piece.positions)]
+            energies = Relaxation(piece.network, state.options, start=own).energies()
+            stage = Stage(
+                name="sew",
+                spring_energy_j=energies.spring,
+                guard_energy_j=energies.guard,
+                strain_energy_j=strain_energy(piece.network, own),
+                steps=state.steps,
+                work_units=float(state.steps),
+                seconds=seconds,
+                converged=converged,
+                residual=residual,
+            )
+            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), alone=piece.alone or piece)
+        return sewn
+
+
+def _upper_end(piece: Flattening) -> int:
+    """The last vertex of the datum that hangs together with its first one: a cut may part it."""
+    if not piece.cuts:
+        return int(piece.datum[-1])
+    part = components(piece.faces)
+    part_of = np.full(len(piece.positions), -1)
+    used = piece.faces >= 0
+    part_of[piece.faces[used]] = np.broadcast_to(part[:, None], piece.faces.shape)[used]
+    return int(piece.datum[part_of[piece.datum] == part_of[piece.datum[0]]][-1])

@@ -1,0 +1,262 @@
+"""From a flattened surface, whole or parted by cuts, to a pattern: its border as edges, its cuts as darts and seams."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.flattening.applied_cut import seam_kind
+from warpflat.garment.edge_rules import EdgeRules, unused
+from warpflat.garment.to_pattern import grain_of
+from warpflat.pattern.from_mesh import line_labels, piece_from_mesh
+from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.surface.cut.dart import fish_eye_measure
+from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
+from warpflat.surface.topology import border_loops
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+    from warpflat.surface.border_seams import NamedSeam
+    from warpflat.surface.cut.cut_mesh import Seam as Cut
+    from warpflat.surface.mesh import Surface
+
+__all__ = ["check_edge_names", "pattern_of_surface"]
+
+
+#: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
+GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
+
+
+def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
+    """See that every name in the rules can be an edge's, before anything is flattened.
+
+    Lines along the border name the edges, holes are numbered. Where its corners part them, and what lies between, shows in the plane only:
+    "bottom_2" and "edge_7" pass if there is a bottom, and a stretch of border without a line.
+
+    Args:
+        surfaces: with their lines, cut as they are going to be.
+        rules: as of :func:`pattern_of_surface`.
+        cuts: names of the cuts, for the legs of their darts.
+
+    Raises:
+        InputError: a name that no piece can have (gives the nearest).
+    """
+    legs = "|".join(map(re.escape, ["dart", *cuts]))
+    edges: dict[str, list[str]] = {}
+    for surface in surfaces:
+        loops = border_loops(surface.faces)
+        lines = {label for loop in loops for label in line_labels(loop, surface.lines)}
+        names = {line or "edge" for line in lines}
+        later = re.compile(rf"({'|'.join(map(re.escape, sorted(names)))})_\d+|({legs})(_\d+)?\.(left|right)")
+        asked = {name.removeprefix(f"{surface.name}.") for name in (*rules.kinds, *rules.allowances)}
+        known = {line or "edge_1" for line in lines} | {name for name in asked if later.fullmatch(name)}
+        known |= {f"hole_{number}" for number in range(1, len(loops))}
+        edges.setdefault(surface.name, []).extend(sorted(known))
+    rules.check(edges)
+
+
+def pattern_of_surface(
+    results: Sequence[Flattening],
+    *,
+    name: str,
+    rules: EdgeRules | None = None,
+    size: str = "",
+    seams: Sequence[NamedSeam] = (),
+) -> tuple[Garment, tuple[str, ...]]:
+    """The pattern of one flattened surface, or of the pieces that cuts have left of it.
+
+    Cuts with a tip inside become darts of their names, those with two fish-eye darts, their tips moved back as the cut
+    asks for; what parted the surface is a seam between the two pieces.
+
+    Args:
+        results: pieces of different names.
+        name: of the pattern.
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are called
+            "edge_1" and so on, counter-clockwise.
+        size: for the label.
+        seams: of the border, by the lines that are sewn to each other.
+
+    Returns:
+        The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
+
+    Raises:
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip
+            is moved back too far, or a named seam's side is no edge.
+    """
+    rules = rules or EdgeRules()
+    pieces = [_piece(result, size) for result in results]
+    named = [_named(seam, results, pieces) for seam in seams]
+    names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
+    rules, notes = rules.known(names)
+    rules.check(names)
+    pieces = [
+        replace(
+            piece,
+            edges=[_ruled(piece.name, edge, rules) for edge in piece.edges],
+            holes=[_ruled_hole(piece.name, hole, rules) for hole in piece.holes],
+        )
+        for piece in pieces
+    ]
+    return Garment(name=name, pieces={size: pieces}, seams=_seams(results, pieces, rules, named)), notes
+
+
+def _piece(result: Flattening, size: str) -> Piece:
+    darts: dict[str, tuple[int, int, int]] = {}
+    eyes: dict[str, Cut] = {}
+    tip_back: dict[str, float] = {}
+    loops = border_loops(result.faces)
+    for cut in result.cuts:
+        for number, seam in enumerate(cut.seams, start=1):
+            title = cut.name if len(cut.seams) == 1 else f"{cut.name}_{number}"
+            tip_back[title] = cut.tip_back
+            kind = seam_kind(seam)
+            if kind == "fish-eye":
+                eyes[title] = seam
+            elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
+                darts[title] = places
+    piece = piece_from_mesh(
+        result.faces,
+        result.positions,
+        name=result.surface.name,
+        lines=result.network.surface.lines,
+        darts=darts,
+        eyes={title: np.union1d(seam.left, seam.right) for title, seam in eyes.items()},
+        size=size,
+        fabric=result.fabric.name,
+    )
+    for title in [title for title in (*darts, *eyes) if tip_back[title] > 0]:
+        try:
+            if title in darts:
+                piece = _drawn_back(piece, title, tip_back[title])
+            else:
+                piece = _eye_drawn_back(piece, title, eyes[title], result.positions, tip_back[title])
+        except InputError as reason:
+            raise InputError(f"piece {piece.name!r}: dart {title!r}: {reason}") from None
+    drawn = [
+        replace(dart, cut=are_curved(piece.edge(dart.left).points, piece.edge(dart.right).points))
+        for dart in piece.darts
+    ]
+    on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
+    datum = None if on_border else result.positions[result.datum]
+    grain = _beside(grain_of(piece.outline, result, datum), piece)
+    return replace(piece, darts=drawn, grain=grain)
+
+
+def _beside(grain: FloatArray, piece: Piece) -> FloatArray:
+    """The grain line, moved aside as far as it takes to keep off holes and fish-eye darts."""
+    import shapely
+
+    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    across = np.array([along[1], -along[0]])
+    free = shapely.Polygon(piece.outline, [hole.points for hole in piece.holes]).buffer(-GRAIN_CLEAR)
+    for step in range(31):
+        for side in (1, -1):
+            moved = grain + side * step * GRAIN_STEP * across
+            if free.contains(shapely.LineString(moved)):
+                return moved
+    return grain
+
+
+def _drawn_back(piece: Piece, title: str, tip_back: float) -> Piece:
+    """The piece with a dart whose legs meet so far [m] short of the end of the cut, as the cut asks for."""
+    left, right = piece.edge(f"{title}.left"), piece.edge(f"{title}.right")
+    legs = pull_back(left.points, right.points[::-1], tip_back)
+    moved = {left.name: legs[0], right.name: legs[1][::-1]}
+    edges = [replace(edge, points=moved.get(edge.name, edge.points)) for edge in piece.edges]
+    return replace(piece, edges=edges)
+
+
+def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: FloatArray, tip_back: float) -> Piece:
+    """Likewise with both ends of a fish-eye dart."""
+    station = fish_eye_measure(positions, seam.left, seam.right).station
+    left, right = pull_back_eye(positions[seam.left], positions[seam.right], station, tip_back)
+    ring = np.concatenate([right[:-1], left[:0:-1]])
+    return replace(piece, holes=[replace(h, points=ring) if h.name == title else h for h in piece.holes])
+
+
+def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | None:
+    """Left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
+    at_end = cut.left[-1] == cut.right[-1]
+    tip = int(cut.left[-1] if at_end else cut.left[0])
+    mouths = [int(side[0] if at_end else side[-1]) for side in (cut.left, cut.right)]
+    for loop in loops:
+        where = {vertex: place for place, vertex in enumerate(loop.tolist())}
+        if all(vertex in where for vertex in (tip, *mouths)):
+            first, second = sorted(mouths, key=lambda v: (where[tip] - where[v]) % len(loop))
+            return first, tip, second
+    return None
+
+
+def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
+    if edge.kind == "dart":
+        # For a dart that is cut away, not folded.
+        return replace(edge, allowance=rules.allowance(piece, edge.name, "seam"))
+    kind = rules.kind(piece, edge.name, edge.kind)
+    return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
+
+
+def _ruled_hole(piece: str, hole: Hole, rules: EdgeRules) -> Hole:
+    if hole.kind == "dart":
+        return hole
+    kind = rules.kind(piece, hole.name, "seam")
+    if kind not in ("seam", "hem", "cut"):
+        raise InputError(f"kinds.{hole.name}: a hole cannot be of kind {kind!r}; give it 'seam', 'hem' or 'cut'")
+    width = rules.allowance(piece, hole.name, kind)
+    return replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
+
+
+def _named(seam: NamedSeam, results: Sequence[Flattening], pieces: Sequence[Piece]) -> Seam:
+    """A named seam by the edges that its two lines have become; these run against each other."""
+    first, second = (_edges_along(line, results, pieces) for line in seam.sides)
+    back = tuple(replace(part, reversed=True) for part in reversed(second))
+    return Seam(name=seam.name, sides=(first, back), ease=seam.ease)
+
+
+def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:
+    """The edges along a line, in order, as the border runs."""
+    for result, piece in zip(results, pieces, strict=True):
+        ids = result.network.surface.lines.get(line)
+        if ids is None:
+            continue
+        own = [e for e in piece.edges if e.vertices is not None and e.kind != "dart" and np.isin(e.vertices, ids).all()]
+        if sum(len(edge.points) - 1 for edge in own) != len(ids) - 1:
+            continue
+        ends = {int(edge.vertices[-1]) for edge in own if edge.vertices is not None}
+        start = next((k for k, e in enumerate(own) if e.vertices is not None and int(e.vertices[0]) not in ends), 0)
+        return tuple(SeamSide(piece=piece.name, edge=edge.name) for edge in own[start:] + own[:start])
+    raise InputError(f"line {line!r} is no whole stretch of a piece's border; a cut or another line parts it")
+
+
+def _seams(
+    results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
+) -> tuple[Seam, ...]:
+    """Edges that are one curve in space are sewn together, besides those that are named."""
+    ends: dict[tuple[bytes, ...], list[tuple[SeamSide, FloatArray]]] = {}
+    done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    for result, piece in zip(results, pieces, strict=True):
+        vertices = result.network.surface.vertices
+        for edge in piece.edges:
+            if edge.kind not in ("seam", "cut") or edge.vertices is None:
+                continue
+            if (piece.name, edge.name) in done:
+                continue
+            curve = vertices[edge.vertices]
+            key = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
+            ends.setdefault(key, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
+    seams: list[Seam] = [*named]
+    for edges in ends.values():
+        for i, (first, curve) in enumerate(edges):
+            for second, other in edges[i + 1 :]:
+                against = not np.array_equal(curve, other)
+                if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
+                    name = first.edge.removesuffix(".left").removesuffix(".right")
+                    name = unused(name, {seam.name for seam in seams})
+                    sides = ((first,), (replace(second, reversed=against),))
+                    seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+    return tuple(seams)

@@ -1,0 +1,253 @@
+"""Ties: seams and constraints as equations on vertices, in the arrays that `kernels.seams` takes."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
+
+__all__ = [
+    "Ties",
+    "join_ties",
+    "length_ties",
+    "level_ties",
+    "mirror_ties",
+    "one_group",
+    "seam_ties",
+    "smooth_ties",
+    "straight_ties",
+    "stretch_ties",
+]
+
+
+# What may be amiss of an edge's length, and of the sum along a line [m].
+_EDGE_TOLERANCE = 2e-5
+_SUM_TOLERANCE = 1e-4
+# How far a vertex may lie from its line or from its mirror image [m].
+_PLACE_TOLERANCE = 5e-5
+# Waves up to this length [m] are kept out of a line whose lengths are ruled, by springs of this stiffness over the stiffer thread's
+# where two edges are as long as a wave.
+WAVE, SMOOTH = 0.04, 0.3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Ties:
+    """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.seams` for the first five).
+
+    Attributes:
+        ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.
+        tolerance: #P, by how much c may miss zero [m].
+        soft: #P, of ties that are no equations, only springs, their stiffness over that of the stiffer thread: what they miss is
+            neither made good nor counted; 0 of all others.
+        group: #P, the seam or constraint that a tie belongs to.
+        sum_tolerance: #groups, by how much the sum of its c may miss zero [m]; infinite where sums mean nothing.
+    """
+
+    ends: IntArray
+    kind: IntArray
+    ratio: FloatArray
+    target: FloatArray
+    lever: FloatArray
+    tolerance: FloatArray
+    soft: FloatArray
+    group: IntArray
+    sum_tolerance: FloatArray = field(default_factory=lambda: np.array([np.inf]))
+
+    def __len__(self) -> int:
+        """#P."""
+        return len(self.ends)
+
+    def sums(self, misses: FloatArray) -> FloatArray:
+        """#groups, the sum of the misses (#P) of each."""
+        counted = np.where(self.soft > 0, 0.0, misses)
+        return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
+
+    def amiss(self, misses: FloatArray) -> float:
+        """The largest of what ties and sums are amiss by, each over its tolerance: they agree up to 1."""
+        own, sums = np.abs(misses) / self.tolerance, np.abs(self.sums(misses)) / self.sum_tolerance
+        return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
+
+
+def one_group(*ties: Ties) -> Ties:
+    """Ties of one seam or constraint."""
+    joined = join_ties(ties)
+    return replace(joined, group=np.zeros_like(joined.group), sum_tolerance=ties[0].sum_tolerance)
+
+
+def join_ties(ties: Sequence[Ties]) -> Ties:
+    """The ties of several seams and constraints, a group each."""
+    if not ties:
+        return _ties(np.zeros((0, 4)), LENGTHS, tolerance=_EDGE_TOLERANCE, sum_tolerance=None)
+    return Ties(
+        ends=np.concatenate([t.ends for t in ties]),
+        kind=np.concatenate([t.kind for t in ties]),
+        ratio=np.concatenate([t.ratio for t in ties]),
+        target=np.concatenate([t.target for t in ties]),
+        lever=np.concatenate([t.lever for t in ties]),
+        tolerance=np.concatenate([t.tolerance for t in ties]),
+        soft=np.concatenate([t.soft for t in ties]),
+        group=np.concatenate([np.full(len(t), number, dtype=np.int32) for number, t in enumerate(ties)]),
+        sum_tolerance=np.concatenate([t.sum_tolerance for t in ties]),
+    )
+
+
+def seam_ties(first: IntArray, second: IntArray, ratio: float = 1.0) -> Ties:
+    """Every edge of the first row of vertices `ratio` times as long as its partner of the second."""
+    ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
+    return _ties(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+
+
+def stretch_ties(
+    first: IntArray, second: IntArray, joints: IntArray, body: FloatArray, positions: FloatArray, ratio: float = 1.0
+) -> Ties:
+    """Two rows of other vertices sewn by their length on the body, the first `ratio` times as long as the second.
+
+    Between two joints both rows stretch evenly from where they lie. The two vertices of a joint need not lie at the same share
+    of the length: from the first one's joint to its next, the second row is taken between the same shares.
+
+    Args:
+        first, second: vertices.
+        joints: #J by 2, places in both rows that belong together, their ends among them.
+        body: #V by 3 [m].
+        positions: #V by 2, the layout before it is sewn [m].
+        ratio: of the whole lengths.
+    """
+    rows = (first, second)
+    shares = [arc / arc[-1] for arc in (_arc(body[row]) for row in rows)]
+    arcs = [_arc(positions[row]) for row in rows]
+    steps = [np.diff(arc) for arc in arcs]
+    ties = []
+    for side, row in enumerate(rows):
+        inner = np.setdiff1d(np.arange(1, len(row) - 1), joints[:, side])
+        ends = np.column_stack([row[inner - 1], row[inner], row[inner], row[inner + 1]])
+        ties.append(_ties(ends, LENGTHS, ratio=steps[side][inner - 1] / steps[side][inner], tolerance=_EDGE_TOLERANCE))
+    i, j = joints[:-1].T
+    ends = np.column_stack([first[i], first[i + 1], second[j], second[j + 1]])
+    there = np.diff(np.interp(shares[0][joints[:, 0]], shares[1], arcs[1]))
+    share = [steps[side][places] / np.diff(arcs[side][joints[:, side]]) for side, places in ((0, i), (1, j))]
+    own = np.diff(arcs[1][joints[:, 1]])
+    between = _ties(ends, LENGTHS, ratio=ratio * there / own * share[0] / share[1], tolerance=_EDGE_TOLERANCE)
+    return replace(one_group(*ties, between), sum_tolerance=np.array([_SUM_TOLERANCE]))
+
+
+def _arc(points: FloatArray) -> FloatArray:
+    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+
+
+def length_ties(line: IntArray, lengths: FloatArray) -> Ties:
+    """Every edge of a row of vertices so long [m]."""
+    ends = np.column_stack([line[:-1], line[1:], line[:-1], line[1:]])
+    return _ties(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+
+
+def straight_ties(line: IntArray) -> Ties:
+    """Every inner vertex of a row on the straight line between its ends."""
+    inner = line[1:-1]
+    ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
+    return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
+
+
+def smooth_ties(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> Ties:
+    """Every inner vertex of a row held, softly, at its present distance from chords of the row around it.
+
+    Where ties ask for more length than the cloth gives, a row of vertices would find it in waves, at the price of a little
+    shear. A wave changes the distance from a chord of its own length by its whole height, a curve that bends otherwise by a
+    share of the square of the chord. What pushes a row into waves are threads that are to be longer, and they push the more the
+    shorter the waves. So the chords span two edges, four, eight and so on up to `WAVE`, and their springs go with the threads'
+    stiffness and against the square of the span, however fine the mesh and however soft the cloth is in shear.
+
+    Args:
+        line: vertices.
+        positions: #V by 2, where the distances are taken [m].
+        fold: vertices on an upright fold, if there is one. A row that ends there goes on beyond it as its mirror image, and
+            each half has half of what holds the end.
+    """
+    step = float(np.linalg.norm(np.diff(positions[line], axis=0), axis=1).mean())
+    ties, reach = [], 1
+    while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
+        soft = SMOOTH * WAVE / (2 * step) / reach**2
+        ties.append(_from_chords(line, positions, reach, soft))
+        if fold is not None:
+            ties.append(_from_mirror_image(line, positions, fold, reach, soft))
+        reach *= 2
+    return one_group(*ties)
+
+
+def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> Ties:
+    """Each vertex held at its distance from the chord of those so many edges before and after it."""
+    here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
+    chord, away = positions[after] - positions[before], positions[here] - positions[before]
+    cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
+    distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
+    ties = _ties(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
+    return replace(ties, soft=np.full(len(here), soft))
+
+
+def _from_mirror_image(line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float) -> Ties:
+    """The ends on an upright fold held at their distance from the chord of the vertex so many edges before and its mirror image."""
+    rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
+    ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
+    lever = np.zeros((len(rows), 4, 2))
+    lever[:, 0, 1], lever[:, 1, 1] = -1.0, 1.0
+    target = np.einsum("pjk,pjk->p", lever, positions[ends])
+    ties = _ties(ends, LINEAR, target=target, lever=lever, tolerance=np.inf)
+    return replace(ties, soft=np.full(len(rows), soft / 2))
+
+
+def level_ties(line: IntArray, across: FloatArray) -> Ties:
+    """The ends of a row of vertices at the same place across a direction: `across` is the unit vector at right angles."""
+    ends = np.array([[line[0], line[-1], line[0], line[0]]])
+    lever = np.zeros((1, 4, 2))
+    lever[0, 0], lever[0, 1] = -across, across
+    return _ties(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
+
+
+def mirror_ties(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> Ties:
+    """The first vertex of each pair (#Q by 2) the mirror image of the second, and those of the axis (#A) on it.
+
+    Args:
+        pairs, axis: vertices.
+        across: unit vector at right angles to the axis.
+        place: of the axis along `across` [m].
+    """
+    along = np.array([-across[1], across[0]])
+    first, second = pairs[:, 0], pairs[:, 1]
+    both = np.column_stack([first, second, first, first])
+    own = np.column_stack([axis, axis, axis, axis])
+    lever = np.zeros((2 * len(pairs) + len(axis), 4, 2))
+    count = len(pairs)
+    lever[:count, 0] = lever[:count, 1] = across
+    lever[count : 2 * count, 0], lever[count : 2 * count, 1] = along, -along
+    lever[2 * count :, 0] = across
+    target = np.concatenate([np.full(count, 2.0 * place), np.zeros(count), np.full(len(axis), place)])
+    return _ties(np.concatenate([both, both, own]), LINEAR, target=target, lever=lever, tolerance=_PLACE_TOLERANCE)
+
+
+def _ties(
+    ends: ArrayLike,
+    kind: int,
+    *,
+    ratio: FloatArray | float = 0.0,
+    target: FloatArray | float = 0.0,
+    lever: FloatArray | None = None,
+    tolerance: float,
+    sum_tolerance: float | None = np.inf,
+) -> Ties:
+    rows = np.asarray(ends, dtype=np.int32).reshape(-1, 4)
+    count = len(rows)
+    return Ties(
+        ends=rows,
+        kind=np.full(count, int(kind), dtype=np.int32),
+        ratio=np.broadcast_to(np.asarray(ratio, dtype=np.float64), (count,)).copy(),
+        target=np.broadcast_to(np.asarray(target, dtype=np.float64), (count,)).copy(),
+        lever=np.zeros((count, 4, 2)) if lever is None else lever,
+        tolerance=np.full(count, tolerance),
+        soft=np.zeros(count),
+        group=np.zeros(count, dtype=np.int32),
+        sum_tolerance=np.zeros(0) if sum_tolerance is None else np.array([sum_tolerance]),
+    )

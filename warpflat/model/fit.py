@@ -1,0 +1,223 @@
+"""Tightness: how a pattern sits when it is worn, and how much smaller it is cut to sit tight.
+
+Worn, the cloth lies on the body point for point as it was flattened. Strain and tension follow from that, and what the
+cloth presses onto the skin is its tension times the curvature of the body along it (Laplace's law).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.fabric.fabric import Fabric
+from warpflat.model.network import SpringNetwork
+from warpflat.model.strain import worn_cells
+from warpflat.model.wear import SKIN_LENGTH, curvature_along, smoothed_along
+from warpflat.surface.energy_map import place_in_words
+from warpflat.surface.mesh import Surface
+
+__all__ = ["MAPS", "Misfit", "WornFit", "assess_fit", "assess_pattern"]
+
+
+# A pattern fits if less than this share of its cloth is strained beyond the limit: a corner's last face may be.
+TOLERATED = 0.01
+
+MAPS: dict[str, tuple[str, float, str]] = {
+    "strain_warp": ("worn strain along warp", 100.0, "%"),
+    "strain_weft": ("worn strain along weft", 100.0, "%"),
+    "strain_bias": ("worn strain on the bias", 100.0, "%"),
+    "tension_warp": ("tension along warp", 1.0, "N/m"),
+    "tension_weft": ("tension along weft", 1.0, "N/m"),
+    "pressure": ("pressure on the skin", 1.0, "Pa"),
+}
+"""What is known of each face: a name for people, the factor to their unit, and that unit."""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Misfit:
+    """A connected region of cloth that is strained beyond the fabric's limit.
+
+    Attributes:
+        surface: whose cloth.
+        faces: of the region.
+        area: flat [m2].
+        worst: the strain furthest beyond the limit. limit: the fabric's.
+        thread: "warp" or "weft".
+        vertex: a corner of the worst face.
+    """
+
+    surface: Surface = field(repr=False)
+    faces: IntArray
+    area: float
+    worst: float
+    limit: float
+    thread: str
+    vertex: int
+
+    @cached_property
+    def words(self) -> str:
+        """What is wrong and where, for a pattern maker. Seldom asked for: a rough mesh has thousands of regions."""
+        state = "stretched" if self.worst > 0 else "slack"
+        return (
+            f"{state} {100 * abs(self.worst):.1f} % along {self.thread} (limit {100 * self.limit:.3g} %), "
+            f"{place_in_words(self.surface, self.vertex)}; {1e4 * self.area:.3g} cm2 beyond the limit"
+        )
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class WornFit:
+    """A pattern as worn. Arrays are #F, means over each face by flat area.
+
+    Attributes:
+        strain_warp, strain_weft: length on the body over length flat, minus 1.
+        strain_bias: the larger of those along both bisectors of warp and weft.
+        shear: angle by which warp and weft are off the right angle [rad].
+        tension_warp, tension_weft: force along the threads per width of the cloth as worn [N/m].
+        pressure: on the skin [Pa]; 0 where the body is hollow and the cloth would lift off.
+        area: flat [m2].
+        limit: the fabric's.
+        misfits: regions beyond the limit, largest first.
+        outside: share of the flat area that is beyond the limit.
+        hollow: share of the flat area where the tension would lift the cloth off.
+    """
+
+    strain_warp: FloatArray
+    strain_weft: FloatArray
+    strain_bias: FloatArray
+    shear: FloatArray
+    tension_warp: FloatArray
+    tension_weft: FloatArray
+    pressure: FloatArray
+    area: FloatArray
+    limit: float
+    misfits: tuple[Misfit, ...] = field(default=())
+    outside: float = 0.0
+    hollow: float = 0.0
+
+    @property
+    def fits(self) -> bool:
+        """Whether no more than 1 % of the cloth is strained beyond the fabric's limit, either way."""
+        return self.outside <= TOLERATED
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `metrics.json`: fractions, N/m and Pa, each at 5, 50 and 95 % of the area, least, most and mean."""
+        return {
+            "fits": self.fits,
+            "strain_limit": self.limit,
+            "outside": self.outside,
+            "hollow": self.hollow,
+            "where_not": [misfit.words for misfit in self.misfits[:3]],
+            **{name: _spread(getattr(self, name), self.area) for name in MAPS},
+        }
+
+
+def _spread(values: FloatArray, area: FloatArray) -> dict[str, float]:
+    from warpflat.core.sums import weighted_percentiles
+
+    percents = (5, 50, 95)
+    at = weighted_percentiles(values, area, [percent / 100 for percent in percents])
+    spread = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
+    mean = float(values @ area) / max(float(area.sum()), 1e-300)
+    return {"min": float(values.min()), **spread, "max": float(values.max()), "mean": mean}
+
+
+def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grain_angle: float = 0.0) -> WornFit:
+    """How a given pattern of a surface sits in a fabric.
+
+    Args:
+        surface: the piece on the body.
+        fabric: the cloth.
+        pattern: #V by 2 [m], the piece flat, its grain along +y, or turned from it by `grain_angle` degrees.
+        grain_angle: of the warp against +y, degrees.
+
+    Raises:
+        InputError: the pattern is no such array.
+    """
+    flat = np.asarray(pattern, dtype=np.float64)
+    if flat.shape != (len(surface.vertices), 2) or not np.isfinite(flat).all():
+        raise InputError(f"pattern has shape {flat.shape}; must be ({len(surface.vertices)}, 2) finite numbers [m]")
+    return assess_fit(SpringNetwork.build(surface, fabric, flat, grain_angle=grain_angle, device="cpu"), flat)
+
+
+def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_length: float = SKIN_LENGTH) -> WornFit:
+    """How a layout (#V by 2 [m]) of the network's surface sits in the network's fabric, whatever the model.
+
+    Args:
+        network: of the piece.
+        positions: #V by 2, its pattern [m].
+        smoothing_length: over which the pressure is averaged [m].
+    """
+    fabric, surface = network.fabric, network.surface
+    # By the fabric's own law with its curves, whatever the model.
+    strain, stress, _, area = (np.array(of.numpy()) for of in worn_cells(network, positions, "membrane"))
+    area = np.maximum(area, 0.0)
+    along_warp, along_weft, crossed = curvature_along(network, positions)
+    lengths = 1.0 + strain[:, :2]
+    # sigma = P F^T / J: force per worn width, and per worn area times curvature.
+    spread = np.maximum(np.sqrt(np.maximum((lengths[:, 0] * lengths[:, 1]) ** 2 - strain[:, 2] ** 2, 0.0)), 1e-12)
+    pull = stress[:, :2] * lengths / spread[:, None]
+    load = pull[:, 0] * along_warp + pull[:, 1] * along_weft + 2.0 * stress[:, 2] * crossed / spread
+    unit = lengths[:, 0] ** 2 + lengths[:, 1] ** 2
+    bias = np.sqrt(np.maximum(0.5 * (unit + 2.0 * np.abs(strain[:, 2])), 0.0)) - 1.0
+    sine = np.clip(strain[:, 2] / np.maximum(lengths[:, 0] * lengths[:, 1], 1e-12), -1.0, 1.0)
+
+    face, faces = network.cell_arrays.face, len(surface.faces)
+    face_area = np.bincount(face, area, minlength=faces).astype(np.float64)
+
+    def mean(values: FloatArray) -> FloatArray:
+        total = np.bincount(face, area * values, minlength=faces)
+        return np.asarray(np.divide(total, face_area, out=np.zeros(faces), where=face_area > 0.0))
+
+    pressure = smoothed_along(surface, mean(load), smoothing_length)
+    weight = np.maximum(face_area, 0.0)
+    strain_warp, strain_weft = mean(strain[:, 0]), mean(strain[:, 1])
+    excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
+    total_area = max(float(weight.sum()), 1e-300)
+    return WornFit(
+        strain_warp=strain_warp,
+        strain_weft=strain_weft,
+        strain_bias=mean(bias),
+        shear=mean(np.arcsin(sine)),
+        tension_warp=mean(pull[:, 0]),
+        tension_weft=mean(pull[:, 1]),
+        pressure=np.maximum(pressure, 0.0),
+        area=weight,
+        limit=fabric.strain_limit,
+        misfits=_misfits(surface, strain_warp, strain_weft, excess, weight, fabric.strain_limit),
+        outside=float(weight[excess > 1e-9].sum()) / total_area,
+        hollow=float(weight[pressure < -1e-9 * max(float(np.abs(pressure).max()), 1e-300)].sum()) / total_area,
+    )
+
+
+def _misfits(
+    surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
+) -> tuple[Misfit, ...]:
+    from warpflat.surface.topology import components, order_by
+
+    outside = np.flatnonzero(excess > 1e-9)
+    if len(outside) == 0:
+        return ()
+    part = components(surface.faces[outside])
+    order, begin = order_by(part.astype(np.int32), int(part.max()) + 1)
+    found = []
+    for faces in np.split(outside[order], begin[1:-1]):
+        worst = faces[np.argmax(excess[faces])]
+        on_warp = abs(warp[worst]) >= abs(weft[worst])
+        found.append(
+            Misfit(
+                surface=surface,
+                faces=faces.astype(np.int32),
+                area=float(area[faces].sum()),
+                worst=float(warp[worst] if on_warp else weft[worst]),
+                limit=limit,
+                thread="warp" if on_warp else "weft",
+                vertex=int(surface.faces[worst, 0]),
+            )
+        )
+    return tuple(sorted(found, key=lambda misfit: -misfit.area))

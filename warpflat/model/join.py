@@ -1,0 +1,121 @@
+"""Pieces side by side: their surfaces as one mesh, their networks as one network, for one set of launches."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.sums import begins
+from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import SpringArrays, SpringsAround
+from warpflat.surface.cells import CellArrays
+from warpflat.surface.mesh import Surface
+from warpflat.surface.unfold import ByVertex
+
+__all__ = ["join_networks", "join_surfaces"]
+
+
+def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
+    """One surface of several, without their lines: the vertices and faces of the first one, then of the next."""
+    vertices = np.concatenate([surface.vertices for surface in surfaces])
+    first = begins([len(surface.vertices) for surface in surfaces])
+    return Surface(
+        vertices=vertices,
+        faces=np.concatenate(
+            [np.where(s.faces >= 0, s.faces + at, -1) for s, at in zip(surfaces, first, strict=False)]
+        ),
+        name=" + ".join(surface.name for surface in surfaces),
+        input_vertices=vertices,
+        input_index=np.arange(len(vertices), dtype=np.int32),
+    )
+
+
+def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
+    """The networks as one, with them for its parts; nothing is sorted or measured again. A single one is returned as it is.
+
+    Args:
+        networks: of one fabric, grain, model and device; of all or of none a stretch is meant. Nothing is sewn or guided yet.
+    """
+    first = networks[0]
+    if len(networks) == 1:
+        return first
+    vertex = begins([net.vertex_count for net in networks])
+    stretches = [net.stretch for net in networks if net.stretch is not None]
+    held = [net.held for net in networks if net.held is not None]
+    hold = np.concatenate([np.broadcast_to(net.shear_hold, net.face_count) for net in networks])
+    return SpringNetwork(
+        surface=join_surfaces([net.surface for net in networks]),
+        fabric=first.fabric,
+        grain_angle=first.grain_angle,
+        spring_arrays=_join_springs(networks, vertex),
+        cell_arrays=_join_cells(networks, vertex),
+        device=first.device,
+        model=first.model,
+        stretch=np.concatenate(stretches) if stretches else None,
+        held=np.concatenate(held) if held else None,
+        shear_hold=float(hold[0]) if (hold == hold[0]).all() else hold,
+        parts=tuple(networks),
+    )
+
+
+def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> FloatArray | None:
+    """#F by so many, what `SpringArrays` have of their faces under a name; None where no piece has any."""
+    arrays = [getattr(net.spring_arrays, name) for net in networks]
+    if not any(array is not None for array in arrays):
+        return None
+    return np.concatenate(
+        [np.zeros((net.face_count, depth)) if of is None else of for net, of in zip(networks, arrays, strict=True)]
+    )
+
+
+def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> SpringArrays:
+    """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
+    springs = [net.spring_arrays for net in networks]
+    edge = begins([s.edge_count for s in springs])
+    diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
+    around = [s.around for s in springs]
+
+    def numbers() -> IntArray:
+        own = [a.entry for a in around]
+        entries = [
+            of + np.where(of < s.edge_count, edge[k], diagonal[k] - np.int32(s.edge_count))
+            for k, (s, of) in enumerate(zip(springs, own, strict=True))
+        ]
+        return np.concatenate(entries)
+
+    return SpringArrays(
+        around=SpringsAround(
+            offset=_join_offsets([a.offset for a in around]),
+            numbering=numbers,
+            neighbor=np.concatenate([a.neighbor + at for a, at in zip(around, vertex, strict=False)]),
+        ),
+        listed_length=np.concatenate([s.listed_length for s in springs]),
+        listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
+        edge_count=int(edge[-1]),
+        lack=_join_of_faces(networks, "lack", 2),
+        wave=_join_of_faces(networks, "wave", 4),
+    )
+
+
+def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArrays:
+    cells = [net.cell_arrays for net in networks]
+    face, cell = begins([len(c.faces) for c in cells]), begins([len(c.laid) for c in cells])
+    around = [c.around for c in cells]
+    return CellArrays(
+        faces=np.concatenate(
+            [np.where(c.faces >= 0, c.faces + at, np.int32(-1)) for c, at in zip(cells, vertex, strict=False)]
+        ),
+        first=np.concatenate([c.first + at for c, at in zip(cells, cell, strict=False)]),
+        laid=np.concatenate([c.laid for c in cells]),
+        around=ByVertex(
+            offset=_join_offsets([a.offset for a in around]),
+            entry=np.concatenate([a.entry + 4 * at for a, at in zip(around, face, strict=False)]),
+        ),
+    )
+
+
+def _join_offsets(offsets: Sequence[IntArray]) -> IntArray:
+    first = begins([int(offset[-1]) for offset in offsets])
+    return np.concatenate([*(offset[:-1] + at for offset, at in zip(offsets, first, strict=False)), first[-1:]])

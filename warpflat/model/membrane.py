@@ -1,0 +1,144 @@
+"""The fabric as the membrane that is measured as worn (`warpflat.kernels.membrane`), and the matrix of its steps."""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+import warp as wp
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.fabric.fabric import Curve, Fabric
+from warpflat.kernels.membrane import Cloth
+
+__all__ = ["MODELS", "Model", "check_model", "cloth_of", "corner_sums", "step_matrix"]
+
+
+Model = Literal["springs", "membrane"]
+MODELS: tuple[Model, ...] = ("springs", "membrane")
+
+
+def check_model(model: str) -> None:
+    """Raise InputError for an unknown model; names the nearest."""
+    if model not in MODELS:
+        raise InputError(f"model {model!r} is unknown: {nearest(str(model), MODELS)}")
+
+
+def plane_stress(fabric: Fabric) -> tuple[float, float, float]:
+    """c_warp, c_weft, c_cross [N/m] of an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21)."""
+    nu = fabric.poisson_ratio
+    share = 1.0 / (1.0 - nu * nu * fabric.stiffness_weft / fabric.stiffness_warp)
+    return fabric.stiffness_warp * share, fabric.stiffness_weft * share, nu * fabric.stiffness_weft * share
+
+
+def cloth_of(
+    fabric: Fabric,
+    axes: tuple[FloatArray, FloatArray],
+    device: wp.Device,
+    *,
+    curves: bool = True,
+    held: FloatArray | None = None,
+) -> Cloth:
+    """The fabric as the kernels take it.
+
+    Args:
+        fabric: with its curves, if `curves`; else with its secant stiffnesses only.
+        axes: unit vectors of warp and weft in the plane.
+        device: for its arrays.
+        curves: whether J-shaped curves count.
+        held: 3 #C, what the matrix of the step holds of each cell's corners [N/m]; for forces only.
+    """
+    cloth = Cloth()
+    cloth.warp, cloth.weft = wp.vec2d(*axes[0]), wp.vec2d(*axes[1])
+    cloth.c_warp, cloth.c_weft, cloth.c_cross = plane_stress(fabric)
+    cloth.shear = fabric.shear_stiffness
+    cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
+    # Half of a thread's own: then no more is asked of the step than along the threads.
+    cloth.lock = 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
+    cloth.compression = fabric.compression_factor
+    for direction in ("warp", "weft"):
+        strain, tension = _points(fabric, direction, curves)
+        setattr(cloth, f"strain_{direction}", wp.array(strain, dtype=wp.float64, device=device))
+        setattr(cloth, f"tension_{direction}", wp.array(tension, dtype=wp.float64, device=device))
+    cloth.held = wp.array(np.zeros(0) if held is None else held, dtype=wp.float64, device=device)
+    return cloth
+
+
+def _points(fabric: Fabric, direction: str, curves: bool) -> tuple[FloatArray, FloatArray]:
+    points: Curve = getattr(fabric, f"curve_{direction}") if curves else ()
+    if not points:
+        points = ((1.0, getattr(fabric, f"stiffness_{direction}")),)
+    strain, tension = np.array([(0.0, 0.0), *points]).T
+    return strain, tension
+
+
+def step_matrix(
+    fabric: Fabric,
+    axes: tuple[FloatArray, FloatArray],
+    corner: IntArray,
+    edges: FloatArray,
+    area: FloatArray,
+    positions: FloatArray,
+    stretch: FloatArray,
+) -> tuple[FloatArray, FloatArray]:
+    """k_ij [N/m] that bound the membrane's stiffness at small strain, whatever the mesh.
+
+    The energy of a small displacement u is at most that of a scalar Laplacian with the conductivities
+    max(c_warp + c_cross, 2 G) along the warp and max(c_weft + c_cross, 2 G) along the weft; its weights are cotangents in
+    that metric, and negative ones may be left out of a bound. On rectangles along the grain they are the structural
+    springs'.
+
+    Args:
+        fabric: stiffnesses [N/m].
+        axes: unit vectors of warp and weft in the plane.
+        corner, edges, area: the cells, as `warpflat.surface.cells.CellArrays` has them.
+        positions: #V by 2, a layout that says how each cell lies in the plane [m].
+        stretch: #C by 2, length worn over length flat that is meant along warp and weft.
+
+    Returns:
+        #C by 3, weights of the cell's edges 0-1, 1-2, 2-0, and #C by 3, their sums at its corners.
+    """
+    p = positions[corner]
+    D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
+    det = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    safe = np.where(det > 0.0, det, 1.0)
+    inverse = (
+        np.stack(
+            [
+                np.stack([edges[:, 1, 1], -edges[:, 0, 1]], axis=-1),
+                np.stack([-edges[:, 1, 0], edges[:, 0, 0]], axis=-1),
+            ],
+            axis=-2,
+        )
+        / safe[:, None, None]
+    )
+    turn = D @ inverse
+    angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
+    # Rows of `inverse` are the gradients of corners 1 and 2 in the cell's own frame; the cell turned by `angle` is the cloth.
+    c, s = np.cos(angle), np.sin(angle)
+    gradients = np.stack([-(inverse[:, 0] + inverse[:, 1]), inverse[:, 0], inverse[:, 1]], axis=1)
+    turned = np.stack(
+        [
+            c[:, None] * gradients[..., 0] - s[:, None] * gradients[..., 1],
+            s[:, None] * gradients[..., 0] + c[:, None] * gradients[..., 1],
+        ],
+        axis=-1,
+    )
+    along = np.stack([turned @ axes[0], turned @ axes[1]], axis=-1) * stretch[:, None, :]
+    c_warp, c_weft, c_cross = plane_stress(fabric)
+    shear = 2.0 * fabric.shear_stiffness
+    conductivity = np.array([max(c_warp + c_cross, shear), max(c_weft + c_cross, shear)])
+    flat = np.where(det > 0.0, area / (stretch[:, 0] * stretch[:, 1]), 0.0)
+    weights = np.stack(
+        [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
+        axis=1,
+    )
+    return weights, corner_sums(weights)
+
+
+def corner_sums(weights: FloatArray) -> FloatArray:
+    """#C by 3, sums at the cells' corners of the weights along their edges 0-1, 1-2, 2-0."""
+    return np.stack(
+        [weights[:, 2] + weights[:, 0], weights[:, 0] + weights[:, 1], weights[:, 1] + weights[:, 2]], axis=1
+    )

@@ -1,0 +1,173 @@
+"""Worn strain, stress and strain energy of a layout, and its errors as a map of the surface.
+
+The cloth is flat when relaxed and strained when worn. Strain here is *worn* strain, L3/l2 - 1: a thread that is shorter
+flat than on the body is in tension when worn.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import warp as wp
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.launch import launch_each
+from warpflat.fabric.fabric import Fabric, grain_axes
+from warpflat.kernels.strain import (
+    Membrane,
+    average_over_faces,
+    compute_membrane_strain,
+    compute_strain_energy,
+    compute_worn_strain,
+)
+from warpflat.model.membrane import Model, cloth_of, plane_stress
+from warpflat.model.network import SpringNetwork
+from warpflat.surface.mesh import Surface
+from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.untangle import signed_cell_areas
+
+__all__ = [
+    "LayoutErrors",
+    "WornStrain",
+    "face_areas",
+    "layout_errors",
+    "membrane_of",
+    "strain_energy",
+    "worn_cells",
+    "worn_strain",
+]
+
+
+# A cell that is smaller in the plane than this share of its area on the body is crushed to a point or a line.
+_COLLAPSED = 1e-9
+
+
+def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
+    """The fabric as an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21), and so on."""
+    warp, weft = grain_axes(grain_angle)
+    membrane = Membrane()
+    membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
+    membrane.c_warp, membrane.c_weft, membrane.c_cross = plane_stress(fabric)
+    membrane.shear = fabric.shear_stiffness
+    return membrane
+
+
+@dataclass(frozen=True, kw_only=True)
+class WornStrain:
+    """Per face, the mean over its cells by flat area.
+
+    Attributes:
+        strain: #F by 3: along warp, along weft, shear angle [1, 1, rad].
+        stress: #F by 3: sigma_warp, sigma_weft, tau [N/m].
+        energy: #F, strain energy, paper eq. (3) [J].
+        area: #F, flat area [m2].
+    """
+
+    strain: FloatArray
+    stress: FloatArray
+    energy: FloatArray
+    area: FloatArray
+
+    @property
+    def energy_density(self) -> FloatArray:
+        """#F [J/m2], per flat area of cloth; of a face that is crushed to a point, the most that a film's numbers can say."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            density = self.energy / np.where(self.area > 0, self.area, np.inf)
+        most = float(np.finfo(np.float32).max)
+        return np.minimum(np.nan_to_num(density, nan=most, posinf=most), most)
+
+
+def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
+    """Worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric.
+
+    Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
+    """
+    offset, device = network.cell_arrays.of_face, network.device
+    cells = [
+        wp.array(offset, dtype=wp.int32, device=device, copy=False),
+        *worn_cells(network, positions, network.model),
+    ]
+    strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
+    launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
+    return WornStrain(strain=strain.numpy(), stress=stress.numpy(), energy=energy.numpy(), area=area.numpy())
+
+
+def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
+    """Strain energy [J] of a layout (#V by 2 [m]), the sum of what `worn_strain` gives per face."""
+    if network.model == "membrane":
+        return float(worn_cells(network, positions, network.model)[2].numpy().sum())
+    device = network.device
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    energy = wp.empty(network.face_count, dtype=wp.float64, device=device)
+    given = [at, network.cells, membrane_of(network.fabric, network.grain_angle)]
+    launch_each(compute_strain_energy, network.face_count, given, [energy], device=device)
+    return float(energy.numpy().sum())
+
+
+def worn_cells(network: SpringNetwork, positions: FloatArray, law: Model) -> list[wp.array]:
+    """Strain and stress (#C by 3), energy [J] and area [m2] (#C), see `kernels.strain`; stress and energy by plane stress, or by the
+    membrane's law with the fabric's curves."""
+    device = network.device
+    at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
+    cells = _worn_arrays(network.cell_count, device)
+    kernel, cloth = compute_worn_strain, membrane_of(network.fabric, network.grain_angle)
+    if law == "membrane":
+        kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
+    inputs = [at, network.cells, cloth]
+    launch_each(kernel, network.face_count, inputs, cells, device=device)
+    return cells
+
+
+def _worn_arrays(count: int, device: wp.Device) -> list[wp.array]:
+    return [wp.empty(count, dtype=kind, device=device) for kind in (wp.vec3d, wp.vec3d, wp.float64, wp.float64)]
+
+
+@dataclass(frozen=True, kw_only=True)
+class LayoutErrors:
+    """How far a layout is from an isometry.
+
+    Attributes:
+        length_error: sum |l2 - L3| / sum L3 over the mesh edges (Wang 2002, E_c).
+        area_error: sum |a2 - A3| / sum A3 over the faces (Wang 2002, E_s).
+        boundary_error: |border length in the plane - in space| / in space.
+        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed, to less than a
+            billionth of its area on the body.
+    """
+
+    length_error: float
+    area_error: float
+    boundary_error: float
+    flipped_faces: int
+
+
+def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
+    """Errors of a layout (#V by 2 [m]) of the network's surface."""
+    he = half_edges_of(surface)
+    edges = he.edges
+    in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
+    corner, face, weight = corner_triangles(network.cell_arrays.faces)
+    signed = weight * signed_cell_areas(corner, positions)
+    flat, body = face_areas(network, positions)
+    border = he.count == 1
+    border_space, border_plane = in_space[border].sum(), in_plane[border].sum()
+    return LayoutErrors(
+        length_error=float(np.abs(in_plane - in_space).sum() / in_space.sum()),
+        area_error=float(np.abs(flat - body).sum() / body.sum()),
+        boundary_error=float(abs(border_plane - border_space) / border_space),
+        flipped_faces=len(np.unique(face[signed <= _COLLAPSED * network.cell_arrays.area])),
+    )
+
+
+def face_areas(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """#F each, the faces' areas in a layout (#V by 2 [m]), negative where mirrored, and on the body [m2]."""
+    cells = network.cell_arrays
+    corner, face, weight = corner_triangles(cells.faces)
+    faces = len(network.surface.faces)
+    flat = np.bincount(face, weight * signed_cell_areas(corner, positions), minlength=faces)
+    body = np.bincount(face, cells.area, minlength=faces)
+    return np.asarray(flat, dtype=np.float64), np.asarray(body, dtype=np.float64)
+
+
+def _lengths(points: FloatArray, edges: IntArray) -> FloatArray:
+    return np.linalg.norm(points[edges[:, 1]] - points[edges[:, 0]], axis=1)

@@ -1,0 +1,216 @@
+"""Drafted pieces: cutting lines, sewing lines, notches, darts and labels in the plane."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.pattern.curves import Curve, arc_lengths
+from warpflat.pattern.label import Label
+from warpflat.pattern.pieces import Dart, Edge, Garment, Piece
+from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
+
+__all__ = [
+    "DraftedCutout",
+    "DraftedDart",
+    "DraftedEdge",
+    "DraftedGarment",
+    "DraftedPiece",
+    "DrillHole",
+    "Notch",
+    "SeamReport",
+]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedEdge:
+    """An edge of the sewing line as a clean curve.
+
+    Attributes:
+        edge: as it came in.
+        curve: fitted, from corner to corner.
+        line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
+        width: the allowance [m] that it got.
+        places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
+        fit_error: how far [m] the curve keeps from these points, at most.
+        tolerance: how far [m] it was allowed to, beside what equal length takes.
+    """
+
+    edge: Edge
+    curve: Curve
+    line: FloatArray
+    width: float
+    places: FloatArray
+    fit_error: float
+    tolerance: float
+
+    @property
+    def name(self) -> str:
+        return self.edge.name
+
+    @property
+    def kind(self) -> str:
+        return self.edge.kind
+
+    @property
+    def length(self) -> float:
+        """Length [m] along the sewing line."""
+        return float(arc_lengths(self.line)[-1])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedDart:
+    """A dart's lines: the legs are edges; `fold` is #P by 2 [m], from the tip to the cut line (None where it is cut)."""
+
+    dart: Dart
+    tip: FloatArray
+    fold: FloatArray | None
+    fold_to: str
+    opening: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedCutout:
+    """A hole that is cut out: its sewing and its cutting line (#P by 2 [m], closed), one if its allowance is 0 [m]."""
+
+    sew_line: FloatArray
+    cut_line: FloatArray
+    width: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrillHole:
+    """A point [m] marked through the cloth."""
+
+    name: str
+    at: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedPiece:
+    """One piece in one size with all its lines, in metres, grain upwards, its fixed point of grading in the origin.
+
+    Attributes:
+        piece: as it came in.
+        frame: 2 by 3, from the piece's coordinates to these (a rotation and a shift, never a scale).
+        edges: the sewing line in order, dart legs included.
+        cut_line: #P by 2 [m], closed, counter-clockwise, first point not repeated.
+        darts, drill_holes, notches: see their classes.
+        internal_lines, fisheyes: #P by 2 [m] by name; the latter closed.
+        cutouts: by name.
+        grain: 2 by 2 [m], from and to, upwards.
+        label: what is written on it, and where.
+        notes: what the cutter should know, one sentence each.
+    """
+
+    piece: Piece
+    frame: FloatArray
+    edges: tuple[DraftedEdge, ...]
+    cut_line: FloatArray
+    darts: tuple[DraftedDart, ...]
+    drill_holes: tuple[DrillHole, ...]
+    notches: tuple[Notch, ...]
+    internal_lines: Mapping[str, FloatArray]
+    cutouts: Mapping[str, DraftedCutout]
+    fisheyes: Mapping[str, FloatArray]
+    grain: FloatArray
+    label: Label
+    notes: tuple[str, ...]
+
+    @property
+    def name(self) -> str:
+        return self.piece.name
+
+    @property
+    def size(self) -> str:
+        return self.piece.size
+
+    @property
+    def sew_line(self) -> FloatArray:
+        """#P by 2 [m], the closed sewing line, dart legs included, first point not repeated."""
+        return np.concatenate([edge.line[:-1] for edge in self.edges])
+
+    @property
+    def fold_edges(self) -> tuple[DraftedEdge, ...]:
+        """The edges that lie on the fold of the cloth."""
+        return tuple(edge for edge in self.edges if edge.kind == "fold")
+
+    def edge(self, name: str) -> DraftedEdge:
+        """The edge of that name; InputError with the nearest name otherwise."""
+        self.piece.edge(name)
+        return next(edge for edge in self.edges if edge.name == name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DraftedGarment:
+    """All pieces by size, and how well the sides of every seam agree."""
+
+    garment: Garment
+    pieces: Mapping[str, tuple[DraftedPiece, ...]]
+    seams: tuple[SeamReport, ...]
+
+    @property
+    def name(self) -> str:
+        return self.garment.name
+
+    def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
+        """One piece in every size, in the order of the sizes."""
+        return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Notch:
+    """One notch.
+
+    Attributes:
+        seam: the seam, or the dart, that it belongs to.
+        edge: the edge on which it stands.
+        length: its place [m] along the seam from the seam's start, measured on this side.
+        at: its point [m] on the sewing line.
+        base: where it starts on the cut line [m]; a double notch has two.
+        direction: unit vector into the piece.
+        depth: [m].
+    """
+
+    seam: str
+    edge: str
+    length: float
+    at: FloatArray
+    base: tuple[FloatArray, ...]
+    direction: FloatArray
+    depth: float
+
+    @property
+    def double(self) -> bool:
+        return len(self.base) == 2
+
+
+@dataclass(frozen=True, kw_only=True)
+class SeamReport:
+    """How the two sides of a seam agree in one size.
+
+    Attributes:
+        name, size: of the seam.
+        sides: each side's edges, as "piece.edge + piece.edge".
+        length_mm: of both sides [mm].
+        ease: what the seam asks for.
+        difference_mm: what the second side is too long (or, negative, too short) for that ease [mm].
+        local_mm: the same over the worst 50 mm of the first side, without its sign, measured between the vertices of
+            the mesh that both sides share; None where they come from no mesh, or not with the same vertices.
+    """
+
+    name: str
+    size: str
+    sides: tuple[str, str]
+    length_mm: tuple[float, float]
+    ease: float
+    difference_mm: float
+    local_mm: float | None = None
+
+    @property
+    def matches(self) -> bool:
+        near = self.local_mm is None or self.local_mm <= LOCAL_TOLERANCE * 1000
+        return near and abs(self.difference_mm) <= SEAM_TOLERANCE * 1000

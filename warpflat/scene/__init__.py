@@ -1,0 +1,1 @@
+"""Scene files: their schema, loading, running and comparing."""

@@ -1,0 +1,159 @@
+"""The same garment in several fabrics: how far the patterns differ, in figures, a picture and a true-size drawing."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.scene.comparison import Comparison
+from warpflat.scene.cuts import CutStory
+from warpflat.scene.load import Scene, scene_fabric
+from warpflat.scene.run import flatten_scene, scene_cuts
+
+__all__ = ["COMPARED_FILES", "compare_fabrics", "comparison_table", "laid_upon", "save_comparison"]
+
+COMPARED_FILES = ("compare.json", "compare.png", "compare.svg")
+
+
+def compare_fabrics(
+    scene: Scene,
+    fabrics: Sequence[str],
+    *,
+    on_progress: Callable[[str, Progress], None] | None = None,
+    device: str | None = None,
+) -> Comparison:
+    """Run a scene in each fabric, all else alike: its cuts, seams and constraints are kept in each of them.
+
+    Args:
+        scene: a surface with its cuts, all of which are made, or a garment on a mannequin; its own fabric does not count.
+        fabrics: two names or more, of the library or the scene's fabric files; others are compared with the first.
+        on_progress: called with the fabric and its `Progress` after every step.
+        device: Warp device, before the scene's own.
+
+    Raises:
+        InputError: fewer than two fabrics, one given twice or unknown, or the scene is wrong.
+    """
+    if len(fabrics) < 2:
+        raise InputError(
+            f"{len(fabrics)} fabric given to compare; name two or more, such as --fabric denim --fabric jersey"
+        )
+    dressed = {}
+    for name in fabrics:
+        one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
+        fabric = scene_fabric(one)
+        if fabric.name in dressed:
+            raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
+        dressed[fabric.name] = one
+    # Cuts are the scene's, found once, and all of them made, so that all patterns have the same points.
+    story = None
+    if scene.settings.mannequin is None:
+        story = replace(scene_cuts(scene, device=device), auto=None)
+    results: dict[str, Mapping[str, Flattening]] = {}
+    sewing: dict[str, Mapping[str, Any]] = {}
+    for name, one in dressed.items():
+
+        def told(progress: Progress, name: str = name) -> None:
+            if on_progress is not None:
+                on_progress(name, progress)
+
+        results[name], sewing[name] = _run(one, story, told, device)
+    first = next(iter(results.values()))
+    layouts = {
+        name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
+        for name, pieces in results.items()
+    }
+    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing)
+
+
+def _run(
+    scene: Scene, story: CutStory | None, told: Callable[[Progress], None], device: str | None
+) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
+    """The pieces as a run of the scene gives them, and how they were sewn."""
+    from warpflat.cutting.cut_piece import separate
+    from warpflat.cutting.remedies import advise
+    from warpflat.scene.run_garment import plan_garment
+
+    if story is None:
+        garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: told(progress))
+        how = garment.summary()
+        return {name: advise(piece) for name, piece in garment.pieces.items()}, {
+            key: how[key] for key in how if key != "pieces"
+        }
+    result, sewn = flatten_scene(scene, story, callback=told, device=device)
+    return {piece.surface.name: advise(piece) for piece in separate(result)}, {} if sewn is None else sewn.metrics()
+
+
+def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
+    """The layout turned and shifted to lie as near as it can to the target (Kabsch 1976)."""
+    centre, aim = layout.mean(axis=0), target.mean(axis=0)
+    u, _, v = np.linalg.svd((layout - centre).T @ (target - aim))
+    turn = u @ np.diag([1.0, float(np.sign(np.linalg.det(u @ v)))]) @ v
+    return np.asarray((layout - centre) @ turn + aim)
+
+
+def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
+    """Write `compare.json`, `compare.png` and `compare.svg` (outlines in true size), all of them or none.
+
+    Raises:
+        InputError: the folder cannot be written, or a surface was read from a file there that would be replaced.
+    """
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.json_file import write_json
+    from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
+
+    sources = [
+        file for pieces in comparison.results.values() for piece in pieces.values() for file in piece.surface.sources
+    ]
+    with output_folder(folder, COMPARED_FILES, sources=sources) as to:
+        write_overlay_svg(to / "compare.svg", comparison)
+        write_overlay_picture(to / "compare.png", comparison)
+        write_json(to / "compare.json", comparison.as_dict())
+    return list(COMPARED_FILES)
+
+
+def comparison_table(comparison: Comparison) -> str:
+    """Area, border lengths, energies, worst strain and distances, a column per fabric, a block per piece."""
+    blocks = []
+    for piece in comparison.pieces:
+        rows: list[tuple[str, list[str]]] = []
+        measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
+        borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
+        rows.append(("area [cm2]", [f"{1e4 * m['area_m2']:.1f}" for m in measures]))
+        for name in borders[0]:
+            rows.append((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]))
+        rows.append(("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]))
+        rows.append(
+            ("minimised energy [mJ]", [f"{1e3 * (m['spring_energy_j'] + m['guard_energy_j']):.4g}" for m in measures])
+        )
+        rows.append(("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]))
+        for thread in ("warp", "weft"):
+            worst = [m["wear"][f"strain_{thread}"] for m in measures]
+            rows.append((f"strain {thread} [%]", [f"{100 * w['min']:+.1f} to {100 * w['max']:+.1f}" for w in worst]))
+        rows.append(("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]))
+        rows.append(("fits", ["yes" if m["wear"]["fits"] else "no" for m in measures]))
+        rows.append(("converged", ["yes" if m["converged"] else "NO" for m in measures]))
+        apart = comparison.distances(piece)
+        for point in next(iter(apart.values())):
+            rows.append((f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in apart.values())]))
+        blocks.append(_columns(piece, comparison.fabrics, rows))
+    note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
+    return "\n\n".join(blocks) + f"\n\n{note}"
+
+
+def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:
+    left = max(len(title), *(len(name) for name, _ in rows))
+    widths = [max(len(fabric), *(len(cells[k]) for _, cells in rows)) for k, fabric in enumerate(fabrics)]
+    lines = ["  ".join([title.ljust(left), *(f.rjust(w) for f, w in zip(fabrics, widths, strict=True))])]
+    lines += [
+        "  ".join([name.ljust(left), *(cell.rjust(w) for cell, w in zip(cells, widths, strict=True))])
+        for name, cells in rows
+    ]
+    return "\n".join(lines)

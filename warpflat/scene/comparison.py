@@ -1,0 +1,111 @@
+"""The patterns of one garment in several fabrics, and how far they differ."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from warpflat._version import __version__
+from warpflat.core.arrays import FloatArray
+from warpflat.flattening.result import Flattening
+from warpflat.surface.topology import border_loops
+
+__all__ = ["Comparison", "outline"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Comparison:
+    """One scene in several fabrics.
+
+    Attributes:
+        name: of the scene.
+        results: by fabric, then by piece; the first fabric is what the others are compared with.
+        layouts: by fabric, then by piece: #P by 2 [m], laid upon the first fabric's pattern as well as it goes, turned
+            and shifted only.
+        sewing: by fabric, how its seams and constraints came out, as in `metrics.json`; empty where nothing was sewn.
+    """
+
+    name: str
+    results: Mapping[str, Mapping[str, Flattening]]
+    layouts: Mapping[str, Mapping[str, FloatArray]]
+    sewing: Mapping[str, Mapping[str, Any]]
+
+    @property
+    def fabrics(self) -> list[str]:
+        """Names of the fabrics, in the order asked for."""
+        return list(self.results)
+
+    @property
+    def pieces(self) -> list[str]:
+        """Names of the pieces."""
+        return list(self.results[self.fabrics[0]])
+
+    def points(self, piece: str) -> dict[str, int]:
+        """Named points of a piece, vertices of its pattern: where its lines end on the outline; joint ends are one."""
+        surface = self.results[self.fabrics[0]][piece].network.surface
+        border = set(np.concatenate(border_loops(surface.faces)).tolist())
+        names: dict[int, list[str]] = {}
+        for name, line in surface.lines.items():
+            if len(line) < 2 or line[0] == line[-1]:
+                continue
+            for vertex, end in ((int(line[0]), "start"), (int(line[-1]), "end")):
+                if vertex in border:
+                    names.setdefault(vertex, []).append(f"{name} {end}")
+        return {" / ".join(label): vertex for vertex, label in names.items()}
+
+    def distances(self, piece: str) -> dict[str, dict[str, float]]:
+        """By fabric, how far each named point lies from that of the first fabric, and the outline's most [m]."""
+        first = self.layouts[self.fabrics[0]][piece]
+        border = np.concatenate(border_loops(self.results[self.fabrics[0]][piece].faces))
+        found = {}
+        for fabric in self.fabrics[1:]:
+            apart = np.linalg.norm(self.layouts[fabric][piece] - first, axis=1)
+            found[fabric] = {name: float(apart[vertex]) for name, vertex in self.points(piece).items()}
+            found[fabric]["outline, most"] = float(apart[border].max())
+            found[fabric]["outline, mean"] = float(apart[border].mean())
+        return found
+
+    def borders(self, fabric: str, piece: str) -> dict[str, float]:
+        """Lengths of the lines on the outline, and of the whole of it [m]."""
+        result = self.results[fabric][piece]
+        loops = border_loops(result.faces)
+        edges = {
+            frozenset(edge) for loop in loops for edge in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
+        }
+        lengths = {"outline": sum(_length(result.positions[np.append(loop, loop[0])]) for loop in loops)}
+        for name, line in result.network.surface.lines.items():
+            row = line.tolist()
+            if len(row) > 1 and all(frozenset(edge) in edges for edge in pairwise(row)):
+                lengths[name] = _length(result.positions[line])
+        return lengths
+
+    def as_dict(self) -> dict[str, Any]:
+        """As in `compare.json`."""
+        return {
+            "schema": 1,
+            "warpflat": __version__,
+            "scene": self.name,
+            "compared_with": self.fabrics[0],
+            "fabrics": {
+                fabric: {
+                    piece: {**result.measures, "border_lengths_m": self.borders(fabric, piece)}
+                    for piece, result in pieces.items()
+                }
+                for fabric, pieces in self.results.items()
+            },
+            "sewing": {fabric: dict(how) for fabric, how in self.sewing.items()},
+            "distances_m": {piece: self.distances(piece) for piece in self.pieces},
+        }
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+
+
+def outline(result: Flattening, layout: FloatArray) -> list[FloatArray]:
+    """The closed border curves of a piece in a layout, each #B by 2 [m]."""
+    return [layout[np.append(loop, loop[0])] for loop in border_loops(result.faces)]

@@ -1,0 +1,179 @@
+"""Cuts in scene files: `[[cuts]]` along lines, between points, along planes, and `[auto_cut]`, which looks for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from warpflat.core.arrays import IntArray
+from warpflat.scene.schema import AutoCutTable, CutTable
+
+if TYPE_CHECKING:
+    from warpflat.cutting.cut_piece import CutPlan
+    from warpflat.cutting.ledger import AutoCut, Ledger
+    from warpflat.flattening.result import Flattening
+    from warpflat.solver.relax import RelaxOptions
+    from warpflat.surface.mesh import Surface
+    from warpflat.surface.paths.trace import SurfacePath
+
+__all__ = ["CutStory", "plan_automatic_cuts", "plan_cuts", "story_of_entry"]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class CutStory:
+    """What is to be cut, worked into the surface so that no face changes on the way.
+
+    Attributes:
+        surface: with every path along its edges.
+        plans: the cuts in their order.
+        auto: when those found automatically are enough; they begin at plan `first_auto`.
+        notes: what was chosen, one sentence each.
+    """
+
+    surface: Surface
+    plans: tuple[CutPlan, ...] = ()
+    auto: AutoCut | None = None
+    first_auto: int = 0
+    notes: tuple[str, ...] = ()
+
+    @property
+    def counts(self) -> range:
+        """How many of the cuts may be made in the end."""
+        return range(len(self.plans) if self.auto is None else self.first_auto, len(self.plans) + 1)
+
+    def goes_on(self, result: Flattening, number: int) -> bool:
+        """Whether the cut of that number is made on the piece as it is by then."""
+        return self.auto is None or number < self.first_auto or not self.auto.is_enough(result)
+
+
+def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
+    """The surface with the paths of all cuts worked into its edges, and the cuts.
+
+    Raises:
+        InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
+    """
+    from warpflat.cutting.cut_piece import CutPlan, draw_line, line_part
+    from warpflat.scene.load import told_by
+
+    names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
+    drawn: dict[int, str] = {}
+    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+        if table.line is None:
+            line, copy = name, 2
+            while line in surface.lines:
+                line, copy = f"{name} {copy}", copy + 1
+            with told_by(f"cuts[{number}]"):
+                surface = draw_line(surface, line, _path(surface, table))
+            drawn[number] = line
+    paths: dict[str, list[IntArray]] = {}
+    tip_back: dict[str, float] = {}
+    for number, (name, table) in enumerate(zip(names, tables, strict=True)):
+        with told_by(f"cuts[{number}]"):
+            part = (0.0, 1.0) if table.part is None else (table.part[0], table.part[1])
+            row = line_part(surface, table.line or drawn[number], part)
+            _check_tip_back(surface, row, table.tip_back)
+        paths.setdefault(name, []).append(row)
+        tip_back[name] = max(tip_back.get(name, 0.0), table.tip_back)
+    plans = tuple(CutPlan(name=name, paths=tuple(rows), tip_back=tip_back[name]) for name, rows in paths.items())
+    return CutStory(surface=surface, plans=plans, first_auto=len(plans))
+
+
+def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:
+    """See that something is left of the dart, or of the fish-eye with two tips inside, that the path opens into."""
+    from warpflat.surface.cut.dart_legs import check_tip_back
+    from warpflat.surface.paths.edge_paths import path_length
+    from warpflat.surface.topology import border_loops
+
+    border = {vertex for loop in border_loops(surface.faces) for vertex in loop.tolist()}
+    inside = sum(vertex not in border for vertex in path[[0, -1]].tolist())
+    if inside and tip_back > 0.0:
+        check_tip_back(tip_back, path_length(surface, [path]) / inside, "cut's length" if inside == 1 else "cut's half")
+
+
+def _path(surface: Surface, table: CutTable) -> SurfacePath:
+    from warpflat.surface.paths.edge_paths import as_vertex
+    from warpflat.surface.paths.section import plane_path, plane_section
+    from warpflat.surface.paths.trace import polyline_path
+
+    if table.plane is not None and table.plane.towards is None:
+        return plane_section(surface, table.plane.point, table.plane.normal)
+    if table.plane is not None:
+        as_vertex(surface, table.plane.point)  # says so if the point is off the piece
+        return plane_path(surface, table.plane.point, table.plane.normal, towards=table.plane.towards)
+    stops: list[int | list[float]] = []
+    for place in (table.from_, *table.through, table.to):
+        assert place is not None  # the schema sees to it
+        vertex = as_vertex(surface, place, as_read=True)
+        stops.append(place if isinstance(place, list) else vertex)
+    return polyline_path(surface, stops)
+
+
+def plan_automatic_cuts(
+    story: CutStory,
+    table: AutoCutTable,
+    *,
+    flatten: Callable[[Surface, RelaxOptions], Flattening],
+    relax: RelaxOptions,
+) -> tuple[CutStory, tuple[Ledger, ...]]:
+    """Look for the best cuts, coarsely; which of them are needed is decided once each has been relaxed fully.
+
+    Args:
+        story: what is cut before.
+        table: the settings.
+        flatten: flattens a surface with the scene's other settings.
+        relax: the scene's options.
+
+    Returns:
+        The cuts, none where there is nothing to cut for or no line to cut along, as a note then says; the ledger of each round.
+
+    Raises:
+        InputError: a cut that is made before is refused.
+    """
+    from warpflat.core.errors import InputError
+    from warpflat.cutting.cut_piece import replace_paths
+    from warpflat.cutting.ledger import AutoCut, coarse, cut_automatically
+
+    auto = AutoCut(**table.model_dump())
+    # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
+    search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
+    result = flatten_and_cut(story, flatten=flatten, relax=coarse(relax))
+    why = "none would release energy without overlapping"
+    try:
+        result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
+    except InputError as nowhere:
+        ledgers, why = (), str(nowhere)
+    plans = tuple(replace_paths(made, made.paths) for made in result.cuts)
+    found = [plan.name for plan in plans[len(story.plans) :]]
+    note = f"cuts found: {'; '.join(found)}" if found else f"no cut was found: {why}"
+    planned = CutStory(
+        surface=result.surface, plans=plans, auto=auto, first_auto=len(story.plans), notes=(*story.notes, note)
+    )
+    return planned, ledgers
+
+
+def flatten_and_cut(
+    story: CutStory, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
+) -> Flattening:
+    """The piece after all cuts of a story."""
+    from warpflat.cutting.cut_piece import cut
+
+    result = flatten(story.surface, relax)
+    for plan in story.plans:
+        result = cut(result, plan, relax=relax)
+    return result
+
+
+def story_of_entry(ledger: Ledger, number: int) -> CutStory:
+    """The cuts that a ledger's piece has, and its candidate of that number, from 1.
+
+    Raises:
+        InputError: there is no such number.
+    """
+    from warpflat.core.errors import InputError
+    from warpflat.cutting.cut_piece import replace_paths
+
+    if not 1 <= number <= len(ledger.entries):
+        raise InputError(f"there is no candidate {number}; valid: 1 to {len(ledger.entries)}")
+    result = ledger.entries[number - 1].result
+    return CutStory(surface=result.surface, plans=tuple(replace_paths(made, made.paths) for made in result.cuts))

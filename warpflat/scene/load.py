@@ -1,0 +1,161 @@
+"""Scene files are read and checked here."""
+
+from __future__ import annotations
+
+import os
+import re
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import checked_name, fitted_name
+from warpflat.core.toml_file import check_table, read_toml
+from warpflat.fabric.fabric import Fabric
+from warpflat.fabric.file import FabricTable, fabric_from_table
+from warpflat.fabric.library import find_fabric, load_library
+from warpflat.solver.relax import RelaxOptions
+
+if TYPE_CHECKING:
+    from warpflat.model.wear import Wear
+from warpflat.scene.schema import SceneTable
+
+__all__ = [
+    "Scene",
+    "expand_variables",
+    "load_scene",
+    "make_scene",
+    "scene_fabric",
+    "scene_relax_options",
+    "scene_wear",
+    "told_by",
+]
+
+_VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}|\$([A-Za-z_][A-Za-z0-9_]*)")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Scene:
+    """A checked scene, ready to be run.
+
+    Attributes:
+        name: of its piece and of its files.
+        settings: what the file says.
+        folder: from where relative paths are taken.
+        where: what messages begin with: the file.
+        sources: the files from which it was read.
+    """
+
+    name: str
+    settings: SceneTable
+    folder: Path
+    where: str
+    sources: tuple[Path, ...] = ()
+
+
+def load_scene(path: str | Path) -> Scene:
+    """The scene of a TOML file.
+
+    Raises:
+        InputError: unreadable, not TOML, an unknown key (names the nearest), a value of the wrong kind
+            or out of bounds; one line with file and key.
+    """
+    path = Path(path)
+    data = read_toml(path)
+    if not data:
+        raise InputError(
+            f'{path}: is empty; a scene needs at least a [surface] table with file = ... or shape = "dome"'
+        )
+    scene = make_scene(data, name=path.stem, folder=path.parent, where=str(path))
+    return replace(scene, sources=(path.absolute(),))
+
+
+def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Scene:
+    """The scene of data laid out like a scene file.
+
+    Args:
+        data: nested tables.
+        name: of the scene, unless the data have one; with "_" where no file can bear it.
+        folder: from where relative paths are taken.
+        where: what messages begin with.
+
+    Raises:
+        InputError: as `load_scene`.
+    """
+    settings = check_table(SceneTable, data, where)
+    if settings.name is not None:
+        with told_by(f"{where}: name"):
+            checked_name(settings.name)
+    return Scene(name=settings.name or fitted_name(name), settings=settings, folder=folder, where=where)
+
+
+def scene_fabric(scene: Scene) -> Fabric:
+    """The scene's fabric.
+
+    Raises:
+        InputError: an unknown name (names the nearest), or impossible values.
+    """
+    settings = scene.settings
+    with told_by(f"{scene.where}: fabric_files"):
+        files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
+    library = load_library(files)
+    if isinstance(settings.fabric, FabricTable):
+        return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
+    with told_by(f"{scene.where}: fabric"):
+        return find_fabric(settings.fabric, library)
+
+
+def scene_wear(scene: Scene) -> Wear | None:
+    """How the scene's garment is meant to be worn, if it says so.
+
+    Raises:
+        InputError: a value out of its bounds.
+    """
+    from warpflat.model.wear import Wear
+
+    if scene.settings.wear is None:
+        return None
+    with told_by(scene.where):
+        return Wear(**scene.settings.wear.model_dump())
+
+
+def scene_relax_options(scene: Scene) -> RelaxOptions:
+    """The scene's settings of the relaxation; what it does not set keeps its default.
+
+    Raises:
+        InputError: a value out of its bounds.
+    """
+    given = {key: value for key, value in scene.settings.relax.model_dump().items() if value is not None}
+    options = RelaxOptions(**given)
+    with told_by(scene.where):
+        options.validate()
+    return options
+
+
+def expand_variables(text: str) -> str:
+    """The text with ${NAME} and $NAME replaced from the environment.
+
+    Raises:
+        InputError: a variable that is not set.
+    """
+
+    def value(match: re.Match[str]) -> str:
+        name = match.group(1) or match.group(2)
+        if not os.environ.get(name):
+            rest = text[match.end() :].lstrip("/") or "the file"
+            raise InputError(f"environment variable {name} is not set; set it to the folder that holds {rest}")
+        return os.environ[name]
+
+    return _VARIABLE.sub(value, text)
+
+
+@contextmanager
+def told_by(where: str) -> Iterator[None]:
+    """Begin the messages of mistakes inside with `where`, once: what is called there may have said so itself."""
+    try:
+        yield
+    except InputError as error:
+        told = str(error)
+        raise InputError(told if told.startswith(f"{where}: ") else f"{where}: {told}") from None

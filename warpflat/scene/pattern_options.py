@@ -1,0 +1,40 @@
+"""Pattern options of a scene: its tables `pattern` and `marker`."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from warpflat.garment.edge_rules import EdgeRules
+
+if TYPE_CHECKING:
+    from warpflat.scene.schema import MarkerTable, PatternTable
+from warpflat.garment.pattern_files import PatternOptions
+
+__all__ = ["pattern_options"]
+
+
+def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternOptions:
+    """What the tables `pattern` and `marker` of a scene ask for.
+
+    Raises:
+        InputError: a gap that is wide against the cloth.
+    """
+    from warpflat.pattern.marker import Cloth
+
+    cloth = None
+    if marker is not None:
+        cloth = Cloth(width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap)
+    return PatternOptions(
+        formats=tuple(table.formats),
+        dialect=table.dialect,
+        paper=table.paper,
+        tolerance=None if table.tolerance_mm is None else table.tolerance_mm / 1000,
+        rules=EdgeRules(
+            seam=table.allowance_mm / 1000,
+            hem=table.hem_mm / 1000,
+            kinds=table.kinds,
+            allowances={edge: width / 1000 for edge, width in table.allowances_mm.items()},
+        ),
+        cloth=cloth,
+        marker_seconds=5 if marker is None else marker.seconds,
+    )

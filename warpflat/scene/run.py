@@ -1,0 +1,275 @@
+"""Scene files: what a run is made of, as data, and the one function that runs it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+from warpflat.core.errors import InputError
+from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.scene.cuts import CutStory
+from warpflat.scene.frames import FrameSchedule
+from warpflat.scene.load import (
+    Scene,
+    scene_fabric,
+    scene_relax_options,
+    scene_wear,
+    told_by,
+)
+from warpflat.scene.surface import scene_surface
+from warpflat.scene.write import SceneResult, write_surface
+from warpflat.solver.relax import RelaxOptions
+from warpflat.surface.mesh import Surface
+
+if TYPE_CHECKING:
+    from warpflat.cutting.ledger import Ledger
+    from warpflat.flattening.progress import Progress
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.edge_rules import EdgeRules
+    from warpflat.garment.sew_surface import SewnSurface
+    from warpflat.scene.frames import Film
+
+__all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
+
+
+def run_scene(
+    scene: Scene,
+    out: str | Path,
+    *,
+    on_progress: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+    cuts: CutStory | None = None,
+) -> SceneResult:
+    """Flatten the scene's surface, or the pieces of its form, and write the result.
+
+    Files: `metrics.json`, `NAME.obj` per piece, `frames.usdc`, `picture.png`, and the pattern (see
+    `warpflat.garment.pattern_files`). Files that an earlier run has left there and this one does not make are removed at the
+    end (see `warpflat.core.manifest`). All of that happens together; a run that fails leaves the folder
+    as it was, and no run replaces a file that it has read.
+
+    Args:
+        scene: what to do.
+        out: folder for the files, made if need be.
+        on_progress: called after each step.
+        device: Warp device, before the scene's own.
+        cuts: to be made instead of the scene's own (see `warpflat.scene.cuts.story_of_entry`).
+
+    Raises:
+        InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
+            is made from would be replaced.
+    """
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.manifest import require_own_metrics
+
+    sources = (*scene.sources, *(() if cuts is None else cuts.surface.sources))
+    with output_folder(out, files_of_run(scene), sources=sources) as folder:
+        require_own_metrics(folder)
+        if scene.settings.mannequin is not None:
+            from warpflat.scene.run_garment import run_garment
+
+            return run_garment(scene, folder, on_progress=on_progress, device=device)
+        return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)
+
+
+def _run_surface(
+    scene: Scene,
+    folder: Path,
+    *,
+    on_progress: Callable[[Progress], None] | None,
+    device: str | None,
+    cuts: CutStory | None,
+) -> SceneResult:
+    from warpflat.cutting.cut_piece import separate
+    from warpflat.cutting.remedies import advise
+    from warpflat.export.usd import FrameWriter
+    from warpflat.scene.frames import Film
+    from warpflat.scene.pattern_options import pattern_options
+    from warpflat.scene.seams import scene_surface_seams
+
+    settings = scene.settings
+    scene_relax_options(scene)  # a mistake is told before anything is made
+    with told_by(scene.where):
+        drawing = pattern_options(settings.pattern, settings.marker)
+        seams = scene_surface_seams(settings.seams, scene.name)
+    story = cuts or scene_cuts(scene, device=device)
+    _check_edges(scene, story, drawing.rules)
+    wanted = FrameSchedule(settings.output).wanted
+    require_memory_for_run(len(story.surface.vertices), frames=wanted)
+    with ExitStack() as stack:
+        writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
+        film = Film(writer, story.surface, lambda: FrameSchedule(settings.output))
+
+        def each_step(progress: Progress) -> None:
+            film(progress)
+            if on_progress is not None:
+                on_progress(progress)
+
+        result, sewn = flatten_scene(scene, story, film=film, callback=each_step, device=device)
+    pieces = [advise(piece) for piece in separate(result)]
+    return write_surface(
+        scene,
+        pieces,
+        folder,
+        drawing=drawing,
+        seams=seams,
+        more={} if sewn is None else sewn.metrics(),
+        frames=wanted,
+        notes=(*result.told, *story.notes),
+    )
+
+
+def files_of_run(scene: Scene) -> list[str]:
+    """The files that a run will write, as far as they are known before it: not those with the name of a form's or a cut's piece."""
+    settings, name = scene.settings, scene.name
+    output, formats, garment = settings.output, settings.pattern.formats, settings.mannequin is not None
+    worn = output.picture and settings.wear is not None
+    asked = {
+        "metrics.json": True,
+        f"{name}.obj": not garment,
+        "frames.usdc": FrameSchedule(output).wanted,
+        "picture.png": output.picture,
+        "wear.png": worn and garment,
+        f"{name}.wear.png": worn and not garment,
+        **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},
+        **{f"pattern.{ending}": ending in formats for ending in ("pdf", "json")},
+        f"{name}.marker.svg": settings.marker is not None,
+        f"{name}.marker.json": settings.marker is not None,
+    }
+    return [file for file, wanted in asked.items() if wanted]
+
+
+def flatten_scene(
+    scene: Scene,
+    story: CutStory,
+    *,
+    film: Film | None = None,
+    callback: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> tuple[Flattening, SewnSurface | None]:
+    """The scene's surface flattened, cut and sewn, as its constraints hold it; and how it was sewn, if it was.
+
+    Args:
+        scene: with its fabric and settings.
+        story: what is cut, of :func:`scene_cuts`.
+        film: takes the last frame of every stage.
+        callback: called after each step.
+        device: Warp device, before the scene's own.
+
+    Raises:
+        InputError: a seam or a constraint asks what the piece cannot be, or a setting is wrong.
+    """
+    from warpflat.cutting.cut_piece import cut
+    from warpflat.garment.sew_surface import sew_surface
+    from warpflat.scene.frames import Film
+    from warpflat.scene.seams import scene_constraints, scene_surface_seams
+
+    settings, relax = scene.settings, scene_relax_options(scene)
+    film = film or Film(None, story.surface, lambda: FrameSchedule(settings.output))
+    with told_by(scene.where):
+        seams = scene_surface_seams(settings.seams, scene.name)
+        result = _flatten(scene, story.surface, relax, callback=callback, device=device)
+        film.last(result)
+        for number, plan in enumerate(story.plans):
+            if story.goes_on(result, number):
+                film.mark(result, plan)
+                result = cut(result, plan, relax=relax, callback=callback)
+                film.last(result)
+        lines = {result.surface.name: result.network.surface.lines}
+        sewn = sew_surface(result, scene_constraints(settings.constraints, lines), seams=seams, options=relax)
+    if sewn is None:
+        return result, None
+    film.last(sewn.result)
+    return sewn.result, sewn
+
+
+def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
+    """See that the pattern's kinds and allowances are of edges, whichever of the automatic cuts will be made.
+
+    Raises:
+        InputError: a name that no piece can have, or a cut that cannot be made.
+    """
+    from warpflat.cutting.cut_piece import cut_surfaces
+    from warpflat.garment.surface_to_pattern import check_edge_names
+
+    if not (rules.kinds or rules.allowances):
+        return
+    with told_by(scene.where):
+        surfaces = [piece for count in story.counts for piece in cut_surfaces(story.surface, list(story.plans[:count]))]
+    with told_by(f"{scene.where}: pattern"):
+        check_edge_names(surfaces, rules, cuts=[plan.name for plan in story.plans])
+
+
+def _flatten(
+    scene: Scene,
+    surface: Surface,
+    relax: RelaxOptions,
+    *,
+    callback: Callable[[Progress], None] | None = None,
+    device: str | None = None,
+) -> Flattening:
+    from warpflat.flattening.flatten_piece import flatten
+
+    settings = scene.settings
+    return flatten(
+        surface,
+        fabric=scene_fabric(scene),
+        datum=settings.datum,
+        grain_angle=settings.grain_angle,
+        model=settings.model,
+        wear=scene_wear(scene),
+        relax=relax,
+        callback=callback,
+        device=device or settings.device,
+    )
+
+
+def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
+    """The scene's surface with the paths of its cuts worked in, and the cuts; looks for those of `auto_cut`.
+
+    Raises:
+        InputError: the surface, a line or a cut is wrong.
+    """
+    from warpflat.scene.cuts import plan_automatic_cuts, plan_cuts
+
+    settings = scene.settings
+    surface = scene_surface(scene)
+    with told_by(scene.where):
+        story = plan_cuts(surface, settings.cuts)
+        if settings.auto_cut is not None:
+            story, _ = plan_automatic_cuts(
+                story,
+                settings.auto_cut,
+                flatten=lambda piece, options: _flatten(scene, piece, options, device=device),
+                relax=scene_relax_options(scene),
+            )
+    return story
+
+
+def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", device: str | None = None) -> Ledger:
+    """Candidates for the next cut of the scene's piece, after those that the scene makes, each tried and ranked; unsewn, as a note says.
+
+    Raises:
+        InputError: as :func:`scene_cuts`, or there is no candidate.
+    """
+    from warpflat.cutting.ledger import make_ledger
+    from warpflat.scene.cuts import flatten_and_cut
+
+    if scene.settings.mannequin is not None:
+        raise InputError(f"{scene.where}: cuts are compared on a [surface], not on the pieces of a form")
+    relax = scene_relax_options(scene)
+    story = scene_cuts(scene, device=device)
+    with told_by(scene.where):
+        result = flatten_and_cut(
+            story, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
+        )
+        ledger = make_ledger(result, relax=relax, by=by)
+    asked = [key for key in ("seams", "constraints") if getattr(scene.settings, key)]
+    if not asked:
+        return ledger
+    return replace(
+        ledger,
+        notes=(f"candidates are compared without the scene's {' and '.join(asked)}; a run keeps them, --apply too",),
+    )

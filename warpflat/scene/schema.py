@@ -1,0 +1,394 @@
+"""The tables of a scene file that say what is flattened and what is written."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from warpflat.core.file_names import plain_name
+from warpflat.core.toml_file import Table
+from warpflat.fabric.fabric import DEFAULT_FABRIC
+from warpflat.fabric.file import FabricTable
+from warpflat.mannequin.table import MannequinTable
+from warpflat.solver.relax import RelaxOptions
+
+if TYPE_CHECKING:
+    pass
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from warpflat.solver.relax import RelaxOptions
+
+import dataclasses
+from typing import TYPE_CHECKING, get_type_hints
+
+from pydantic import BeforeValidator, ConfigDict, create_model
+
+from warpflat.core.errors import is_number
+from warpflat.core.text import shown
+from warpflat.solver.relax import RelaxOptions
+
+__all__ = [
+    "AutoCutTable",
+    "BorderTable",
+    "ConstraintTable",
+    "CutPlane",
+    "CutTable",
+    "FileSurface",
+    "LineTable",
+    "MarkerTable",
+    "OutputTable",
+    "PatternTable",
+    "PlaneTable",
+    "Point",
+    "PointOrVertex",
+    "RelaxTable",
+    "SceneTable",
+    "SeamTable",
+    "ShapeSurface",
+    "Share",
+    "Vertex",
+    "kind_of_surface",
+    "text_or_table",
+]
+
+# The square of a much larger one is no number any more.
+Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
+Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
+Vertex = Annotated[int, Field(ge=0)]
+PointOrVertex = Annotated[
+    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
+    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
+]
+
+
+class PlaneTable(Table):
+    """A plane by a point on it [m] and its normal (any length)."""
+
+    point: Point
+    normal: Point
+
+
+def _as_component(value: Any) -> Any:
+    if value != "largest" and not (is_number(value, whole=True) and value >= 0):
+        raise ValueError(f'should be "largest" or a number from 0, largest first; got {shown(value)}')
+    return value
+
+
+Component = Annotated[Literal["largest"] | int, BeforeValidator(_as_component)]
+
+
+def text_or_table(value: Any) -> str:
+    return "text" if isinstance(value, str) else "table"
+
+
+class FileSurface(Table):
+    """A mesh file; `file` starts in the scene's folder and may name environment variables, ${WARPFLAT_DATA}/x.obj."""
+
+    file: str = Field(min_length=1)
+    units: str | None = None
+    component: Component | None = None
+    prim: str | None = None
+
+    @model_validator(mode="before")
+    @classmethod
+    def _one_source(cls, data: Any) -> Any:
+        if isinstance(data, dict) and {"file", "shape"} <= data.keys():
+            raise ValueError("give the surface by its file or by a shape, not both")
+        return data
+
+
+class ShapeSurface(Table):
+    """A surface by formula; its other keys are the parameters of that function of `warpflat.surface.shapes`."""
+
+    model_config = ConfigDict(extra="allow")
+    shape: str
+
+
+def kind_of_surface(value: Any) -> str:
+    given = value if isinstance(value, dict) else getattr(value, "__dict__", {})
+    return "by-formula" if "shape" in given and "file" not in given else "from-file"
+
+
+class BorderTable(Table):
+    """A stretch of the border between two of its vertices, or the ones nearest to two points [m]."""
+
+    start: PointOrVertex
+    end: PointOrVertex
+    direction: Literal["shortest", "with", "against"] = "shortest"
+
+
+class LineTable(Table):
+    """A feature line, given in one of five ways. Vertices count those of the file, from 0; points are in metres.
+
+    `vertices` lists every vertex, `from` and `to` are the ends of a shortest path, `plane` cuts the piece, `border` is
+    a side (bottom, left, right, top) or a stretch, `curve` the points of a polyline or the prim path of a USD curve.
+    """
+
+    vertices: Annotated[list[Vertex], Field(min_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    plane: PlaneTable | None = None
+    border: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[BorderTable, Tag("table")],
+            Discriminator(text_or_table),
+        ]
+        | None
+    ) = None
+    curve: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[list[Point], Field(min_length=2), Tag("points")],
+            Discriminator(lambda value: "text" if isinstance(value, str) else "points"),
+        ]
+        | None
+    ) = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> LineTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a shortest path needs both from and to")
+        ways = [self.vertices, self.from_, self.plane, self.border, self.curve]
+        if sum(way is not None for way in ways) != 1:
+            raise ValueError("give the line in one way: vertices, from and to, plane, border, or curve")
+        return self
+
+
+class SeamTable(Table):
+    """A seam: on a form one of those that it has, on a [surface] two lines along its border that are sewn together.
+
+    A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
+    as "left" or "piece.left"; they may be equally long.
+
+    `ease` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
+    piece. `longer` names the piece, "piece.edge" or line that is longer; the seam's second side if not given.
+    """
+
+    name: str = Field(min_length=1)
+    sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
+    ease: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    gather: Annotated[float, Field(ge=1, le=5)] | None = None
+    longer: str | None = None
+
+    @model_validator(mode="after")
+    def _one_way(self) -> SeamTable:
+        given = (self.ease is not None) + (self.gather is not None)
+        if given > 1 or (given == 0 and self.sides is None):
+            raise ValueError("give either ease = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
+        return self
+
+
+class ConstraintTable(Table):
+    """What is asked of an edge or a feature line, in one piece or in all that have it.
+
+    `straight` lays it on a straight line: of any direction ("free"), parallel to the grain ("warp") or at right angles to it
+    ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length,
+    that of the whole line, unfolded. `symmetric` makes the piece, cut whole, its own mirror image about the line.
+    """
+
+    line: str = Field(min_length=1)
+    piece: str | None = None
+    straight: Literal["free", "warp", "weft"] | None = None
+    length_mm: (
+        Annotated[
+            Annotated[Literal["body"], Tag("word")] | Annotated[float, Field(ge=1, le=20_000), Tag("number")],
+            Discriminator(lambda value: "word" if isinstance(value, str) else "number"),
+        ]
+        | None
+    ) = None
+    symmetric: bool = False
+
+    @model_validator(mode="after")
+    def _something(self) -> ConstraintTable:
+        if self.straight is None and self.length_mm is None and not self.symmetric:
+            raise ValueError('ask for something: straight = "free", length_mm = "body", or symmetric = true')
+        return self
+
+
+class WearTable(Table):
+    """How the garment is meant to be worn (see `warpflat.model.wear.Wear`); an empty table asks how it sits, no more."""
+
+    stretch_warp: float = 0.0
+    stretch_weft: float = 0.0
+    pressure: float | None = None
+
+
+class OutputTable(Table):
+    """What is written besides `metrics.json` and `NAME.obj`."""
+
+    frames: Annotated[int, Field(ge=0, le=100_000)] = 60
+    """About how many frames, close together at first, when the pattern moves most; 0 for no `frames.usdc`."""
+    frame_every: Annotated[int, Field(ge=1)] | None = None
+    """A frame every so many steps instead."""
+    picture: bool = True
+
+
+class PatternTable(Table):
+    """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
+
+    formats: list[Literal["dxf", "svg", "pdf", "json"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
+    """Which of them; an empty list writes none."""
+    dialect: Literal["aama", "astm"] = "aama"
+    paper: Literal["A4", "Letter", "A0"] = "A4"
+    allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
+    hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
+    kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)
+    """By edge, "front.neck", or "neck" for every piece that has one."""
+    allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
+    """Likewise."""
+    tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
+    """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
+    sizes: list[str] = Field(default_factory=list)
+    """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
+
+
+class MarkerTable(Table):
+    """The lay plan on a cloth (see `warpflat.pattern.Cloth`); one garment of each size. Lengths in metres."""
+
+    width: Annotated[float, Field(ge=0.1, le=10)]
+    one_way: bool = False
+    reversible: bool = False
+    gap: Annotated[float, Field(ge=0, le=0.1)] = 0.002
+    seconds: Annotated[int, Field(ge=1, le=600)] = 5
+
+
+_RELAX_FIELDS: dict[str, Any] = {
+    field.name: (get_type_hints(RelaxOptions)[field.name] | None, None) for field in dataclasses.fields(RelaxOptions)
+}
+if TYPE_CHECKING:
+    RelaxTable = Table
+else:
+    # The fields of RelaxOptions, each optional, so that the two cannot differ.
+    RelaxTable = create_model("RelaxTable", __base__=Table, **_RELAX_FIELDS)
+
+
+class SceneTable(Table):
+    """A scene file; `datum` names a line given here, one that the file or shape brings, or a side of the border."""
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(plain_name)] | None = None
+    fabric: Annotated[
+        Annotated[str, Tag("text")] | Annotated[FabricTable, Tag("table")],
+        Discriminator(text_or_table),
+    ] = DEFAULT_FABRIC
+    fabric_files: list[str] = Field(default_factory=list)
+    surface: (
+        Annotated[
+            Annotated[FileSurface, Tag("from-file")] | Annotated[ShapeSurface, Tag("by-formula")],
+            Discriminator(kind_of_surface),
+        ]
+        | None
+    ) = None
+    mannequin: MannequinTable | None = None
+    form: (
+        Annotated[
+            Annotated[str, Tag("text")] | Annotated[dict[str, Any], Tag("table")],
+            Discriminator(text_or_table),
+        ]
+        | None
+    ) = None
+    """A form's name, or a table of your own (see `warpflat.mannequin.form_from_mapping`)."""
+    half: bool = False
+    """Symmetric pieces as their left half, on the fold."""
+    lines: dict[str, LineTable] = Field(default_factory=dict)
+    cuts: list[CutTable] = Field(default_factory=list)
+    auto_cut: AutoCutTable | None = None
+    seams: list[SeamTable] = Field(default_factory=list)
+    constraints: list[ConstraintTable] = Field(default_factory=list)
+    datum: str | None = None
+    grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
+    model: Literal["springs", "membrane"] = "springs"
+    wear: WearTable | None = None
+    device: str | None = None
+    relax: RelaxTable = Field(default_factory=RelaxTable)
+    output: OutputTable = Field(default_factory=OutputTable)
+    pattern: PatternTable = Field(default_factory=PatternTable)
+    marker: MarkerTable | None = None
+
+    @model_validator(mode="after")
+    def _one_source(self) -> SceneTable:
+        if (self.surface is None) == (self.mannequin is None):
+            raise ValueError("a scene needs either a [surface] table or a [mannequin] table with a form")
+        if (self.mannequin is None) != (self.form is None):
+            raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
+        if self.mannequin is not None and (self.lines or self.datum):
+            raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+        if self.mannequin is not None and (self.cuts or self.auto_cut):
+            raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.surface is not None and self.half:
+            raise ValueError(
+                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] kinds = { left = \"fold\" }"
+            )
+        for number, seam in enumerate(self.seams):
+            if self.mannequin is None and seam.sides is None:
+                raise ValueError(
+                    f'seams[{number}]: on a [surface] give the two lines that are sewn, sides = ["left", "right"]; both sides '
+                    "of its cuts are equally long anyway"
+                )
+            if self.mannequin is not None and seam.sides is not None:
+                raise ValueError(
+                    f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
+                )
+        if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
+            raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
+        if self.pattern.sizes and self.mannequin is not None and self.mannequin.measurements:
+            raise ValueError(
+                "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
+            )
+        return self
+
+
+Share = Annotated[float, Field(ge=0.0, le=1.0)]
+
+
+class CutPlane(PlaneTable):
+    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
+
+    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
+    """
+
+    towards: Point | None = None
+
+
+class CutTable(Table):
+    """A cut, given in one of three ways. Vertices count those of the file, from 0; points are in metres.
+
+    `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
+    straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
+    between points or along a plane runs through are divided. Tables with one `name` are one cut.
+    """
+
+    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
+    line: str | None = None
+    part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
+    from_: PointOrVertex | None = Field(default=None, alias="from")
+    to: PointOrVertex | None = None
+    through: list[PointOrVertex] = Field(default_factory=list)
+    plane: CutPlane | None = None
+    tip_back: Annotated[float, Field(ge=0.0)] = 0.0
+    """How far the tips of its darts are drawn back, [m]."""
+
+    @model_validator(mode="after")
+    def _one_way(self) -> CutTable:
+        if (self.from_ is None) != (self.to is None):
+            raise ValueError("a path needs both from and to")
+        if sum(way is not None for way in (self.line, self.from_, self.plane)) != 1:
+            raise ValueError("give the cut in one way: line, from and to, or plane")
+        if self.part is not None and self.line is None:
+            raise ValueError("part takes a part of a line; give line")
+        if self.through and self.from_ is None:
+            raise ValueError("through lists places between from and to; give both")
+        return self
+
+
+class AutoCutTable(Table):
+    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
+
+    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
+    """At most so many; a mirrored pair counts as one."""
+    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
+    """What is minimised, springs and guard, that is low enough, [J]."""
+    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
+    """Worn strain along warp or weft that is low enough on 98 % of the cloth."""
+    by: Literal["released", "per_cm"] = "released"
+    """What makes a cut the best: the energy it releases in all, or per centimetre."""

@@ -1,0 +1,84 @@
+"""The surface of a scene, with its feature lines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.scene.schema import (
+    BorderTable,
+    LineTable,
+    ShapeSurface,
+)
+from warpflat.surface.io.read import read_surface
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.border import SIDES, line_on_border
+from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
+
+if TYPE_CHECKING:
+    pass
+from warpflat.scene.load import Scene, expand_variables, told_by
+
+__all__ = ["scene_surface"]
+
+
+def scene_surface(scene: Scene) -> Surface:
+    """The scene's surface with its feature lines.
+
+    Raises:
+        InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.
+    """
+    from warpflat.scene.seams import scene_surface_seams
+    from warpflat.surface.border_seams import surface_seams
+
+    table = scene.settings.surface
+    if table is None:
+        raise InputError(f"{scene.where}: the scene has no [surface]; this needs one piece, not a garment")
+    if isinstance(table, ShapeSurface):
+        from warpflat.surface.shapes import make_shape
+
+        with told_by(f"{scene.where}: surface"):
+            surface = make_shape(table.shape, **(table.model_extra or {}))
+    else:
+        with told_by(f"{scene.where}: surface.file"):
+            path = scene.folder / expand_variables(table.file)
+        surface = read_surface(path, units=table.units, component=table.component, prim=table.prim, name=scene.name)
+    surface = replace(surface, name=scene.name)
+    for name, line in scene.settings.lines.items():
+        with told_by(f"{scene.where}: lines.{name}"):
+            surface = with_lines(surface, {name: _line(surface, line)})
+    wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
+    wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
+    named = scene_surface_seams(scene.settings.seams, scene.name)
+    wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
+    for key, name in wanted.items():
+        if name not in surface.lines:
+            with told_by(f"{scene.where}: {key}"):
+                if name not in SIDES:
+                    raise InputError(f"unknown line {name!r}; {nearest(name, {*surface.lines, *SIDES})}")
+                surface = with_lines(surface, {name: line_on_border(surface, name)})
+    with told_by(f"{scene.where}: seams"):
+        surface_seams(surface, named)
+    return surface
+
+
+def _line(surface: Surface, table: LineTable) -> IntArray:
+    if table.vertices is not None:
+        return line_from_indices(surface, table.vertices, as_read=True)
+    if table.from_ is not None and table.to is not None:
+        return line_between(surface, table.from_, table.to, as_read=True)
+    if table.plane is not None:
+        return line_on_plane(surface, table.plane.point, table.plane.normal)
+    if isinstance(table.border, BorderTable):
+        border = table.border
+        return line_on_border(surface, start=border.start, end=border.end, direction=border.direction, as_read=True)
+    if table.border is not None:
+        return line_on_border(surface, table.border)
+    if isinstance(table.curve, list):
+        return line_from_curve(surface, table.curve)
+    name = str(table.curve).rstrip("/").rpartition("/")[2]
+    if name not in surface.lines:
+        raise InputError(f"the file has no curve {table.curve!r} on the piece; {nearest(name, surface.lines)}")
+    return surface.lines[name]

@@ -1,0 +1,86 @@
+"""What a scene's run leaves in its folder, and which of its steps become frames."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.pattern_files import PatternOptions
+    from warpflat.scene.load import Scene
+    from warpflat.surface.border_seams import NamedSeam
+
+__all__ = ["SceneResult", "write_surface"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class SceneResult:
+    """What a run did.
+
+    Attributes:
+        metrics: as `metrics.json`.
+        files: names of the files that were written.
+        notes: what was mended or chosen on the way, one sentence each.
+    """
+
+    metrics: dict[str, Any]
+    files: tuple[str, ...]
+    notes: tuple[str, ...]
+
+
+def write_surface(
+    scene: Scene,
+    pieces: Sequence[Flattening],
+    folder: Path,
+    *,
+    drawing: PatternOptions,
+    seams: Sequence[NamedSeam],
+    more: Mapping[str, Any],
+    frames: bool,
+    notes: Sequence[str],
+) -> SceneResult:
+    """Write all files of a flattened surface but its film, and remove what earlier runs have left.
+
+    Args:
+        scene: whose surface it is.
+        pieces: those into which cuts have parted it.
+        folder: exists.
+        drawing: what is written of the pattern.
+        seams: those of the surface's border that were named.
+        more: entries of `metrics.json` besides the pieces.
+        frames: whether the folder has got `frames.usdc`.
+        notes: what was mended or chosen until now.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.core.atomic_files import file_in
+    from warpflat.core.manifest import settle
+    from warpflat.export.letters import note_on_names
+    from warpflat.flattening.result import metrics_of, write_results
+    from warpflat.garment.pattern_files import surface_files
+
+    settings = scene.settings
+    files = write_results(pieces, folder, picture=settings.output.picture, frames=False, more=more)
+    if settings.wear is not None and settings.output.picture:
+        from warpflat.flattening.fit_picture import write_wear_picture
+
+        for piece in pieces:
+            picture = file_in(folder, piece.surface.name, ".wear.png")
+            write_wear_picture(picture, piece)
+            files.append(picture.name)
+    if frames:
+        files.append("frames.usdc")
+    pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
+    metrics, settled = settle(
+        folder,
+        {**metrics_of(pieces, more), **pattern.metrics},
+        name=scene.name,
+        files=(*files, *pattern.files),
+    )
+    unnamed = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
+    told = (*notes, *pattern.notes, *unnamed, *settled)
+    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=told)

@@ -1,0 +1,1 @@
+"""The minimum of the energy of a model is found here."""

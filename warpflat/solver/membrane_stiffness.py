@@ -1,0 +1,44 @@
+"""The matrix of a membrane's steps, kept to the stiffness that the membrane has in the present layout."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from warpflat.kernels.membrane import bound_membrane
+from warpflat.model.membrane import corner_sums
+from warpflat.model.network import SpringNetwork
+from warpflat.model.springs import springs_of_sides
+
+__all__ = ["TangentMatrix"]
+
+
+class TangentMatrix:
+    """The k_ij of a network whose model is the membrane.
+
+    A network is built with the k_ij of a cloth at rest. A cell that lies in the plane very differently from how it lies on
+    the body, say a sliver that the development has opened, is much softer than that, and with the stiffness it would have
+    at rest its corners creep back for ten thousand steps.
+    """
+
+    def __init__(self, network: SpringNetwork) -> None:
+        """Of this network; nothing is changed before `follow` is called."""
+        self._network = network
+        self._side = springs_of_sides(network.spring_arrays, network.cell_arrays)
+        self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
+
+    def follow(self, position: wp.array) -> None:
+        """Let the k_ij bound the membrane's stiffness at these positions (#V vec2d [m]), none of its cells mirrored."""
+        network = self._network
+        assert network.cloth is not None
+        wp.launch(
+            bound_membrane,
+            dim=network.face_count,
+            inputs=[position, network.cells, network.cloth, 0],
+            outputs=[self._weight],
+            device=network.device,
+        )
+        weight = np.array(self._weight.numpy())
+        stiffness = np.bincount(self._side, weight, minlength=network.spring_count).astype(np.float64)
+        network.weigh(stiffness)
+        network.cloth.held.assign(corner_sums(weight.reshape(-1, 3)).ravel())

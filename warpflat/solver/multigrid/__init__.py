@@ -1,0 +1,1 @@
+"""The multigrid solver: a hierarchy of coarser levels and cycles through them."""

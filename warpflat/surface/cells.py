@@ -1,0 +1,123 @@
+"""The cells of a surface: triangles (a quad gives its four corner triangles) laid flat, on which the cloth is compared with the
+body."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.launch import launch_each
+from warpflat.kernels.cells import find_least_shares
+from warpflat.kernels.surface_cells import add_areas
+from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
+from warpflat.surface.topology import border_of, corner_triangles
+from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
+
+__all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class CellArrays:
+    """The cells, face by face (see `kernels.cells`).
+
+    Attributes:
+        faces: #F by 4, -1 in the last column of a triangle.
+        first: #F, the first of each face's cells.
+        laid: #C by 3, the cells laid flat [m].
+        around: the faces' corners around each vertex, 4 times the face plus the corner.
+    """
+
+    faces: IntArray
+    first: IntArray
+    laid: FloatArray
+    around: ByVertex
+
+    # Seldom asked for, and not kept: they take as much memory as what a relaxation needs of the cells.
+
+    @property
+    def of_face(self) -> IntArray:
+        """#F+1, where the cells of each face begin."""
+        return np.append(self.first, np.int32(len(self.laid)))
+
+    @property
+    def _corners(self) -> tuple[IntArray, IntArray, FloatArray]:
+        return corner_triangles(self.faces)
+
+    @property
+    def corner(self) -> IntArray:
+        """#C by 3, the cells' vertices."""
+        return self._corners[0]
+
+    @property
+    def face(self) -> IntArray:
+        """#C, the face of each."""
+        return self._corners[1]
+
+    @property
+    def weight(self) -> FloatArray:
+        """#C, 1 for a triangle, 1/2 for each of a quad's four corner triangles."""
+        return self._corners[2]
+
+    @property
+    def edges(self) -> FloatArray:
+        """#C by 2 by 2, the edges of the laid cells from corner 0 to corners 1 and 2, as columns [m]."""
+        edges = np.zeros((len(self.laid), 2, 2))
+        edges[:, 0, 0], edges[:, 0, 1], edges[:, 1, 1] = self.laid.T
+        return edges
+
+    @property
+    def area(self) -> FloatArray:
+        """#C, weighted areas on the body [m2]."""
+        return np.asarray(0.5 * self.weight * self.laid[:, 0] * self.laid[:, 2])
+
+    @property
+    def vertex_areas(self) -> FloatArray:
+        """#V [m2], a third of each cell's share of the cloth at each of its corners."""
+        around, total = self.around, np.empty(len(self.around.offset) - 1)
+        given = [self.faces, self.first, self.laid, around.offset, around.entry]
+        launch_each(add_areas, len(total), given, [total])
+        return total
+
+    def least_shares(self, positions: FloatArray) -> FloatArray:
+        """#F, signed area in a layout (#V by 2 [m]) over that on the body, the least of each face's cells."""
+        share = np.empty(len(self.faces))
+        given = [np.ascontiguousarray(positions, dtype=np.float64), self.faces, self.first, self.laid]
+        launch_each(find_least_shares, len(share), given, [share])
+        return share
+
+
+@once_per_surface
+def creases_of(surface: Surface) -> NDArray[np.int8]:
+    """#F, as `quad_creases` has it, worked out once."""
+    if not surface.is_quad.any():
+        return quad_creases(surface.vertices, surface.faces)
+    around = corners_of(surface)
+    return quad_creases(
+        surface.vertices, surface.faces, border=border_of(surface), around=(around.offset, around.entry)
+    )
+
+
+@once_per_surface
+def cells_of(surface: Surface) -> CellArrays:
+    """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
+    faces, first = surface.faces, first_of_faces(surface, 4, 1)
+    laid = lay_cells(surface.vertices, faces, creases_of(surface), first)
+    return read_only(CellArrays(faces=faces, first=first, laid=laid, around=corners_of(surface)))
+
+
+def inherit_cells(surface: Surface, whole: Surface) -> None:
+    """Let a surface that a cut has made of another have its creases and cells: no face has moved, or has another place in their order."""
+    cells = replace(cells_of(whole), faces=surface.faces, around=corners_of(surface))
+    tell(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
+
+
+def first_of_faces(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
+    """#F, the first of each face's cells or sides, where a quad and a triangle have so many."""
+    is_quad = surface.is_quad
+    if is_quad.all():
+        return np.arange(0, of_quad * len(is_quad), of_quad, dtype=np.int32)
+    counts = np.where(is_quad, np.int32(of_quad), np.int32(of_triangle))
+    return np.cumsum(counts, dtype=np.int32) - counts

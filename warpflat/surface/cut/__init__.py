@@ -1,0 +1,1 @@
+"""A surface is cut along lines here."""

@@ -1,0 +1,290 @@
+"""A few triangles of a large mesh, divided vertex by vertex until given points and lines are part of them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.surface.paths.trace import Place
+
+__all__ = ["Refinement"]
+
+_Triangle = tuple[int, int, int]
+
+
+class Refinement:
+    """The triangles around some vertices, open to being divided.
+
+    Every triangle knows the undivided one ("base") it is a part of and every vertex its place on the undivided mesh, so
+    all divisions happen in the plane of a base triangle and conserve its shape.
+
+    Attributes:
+        triangles: #T by 3, the undivided mesh.
+        new_places: for each new vertex its place; it is numbered #V and on.
+        positions: for each new vertex its position [m].
+    """
+
+    def __init__(self, vertices: FloatArray, triangles: IntArray, around: Iterable[int], snap: float) -> None:
+        """
+        Args:
+            vertices: #V by 3, positions [m].
+            triangles: #T by 3, consistently wound.
+            around: vertices whose triangles may be divided.
+            snap: share of an edge's length within which a crossing is moved to a vertex.
+        """
+        self.triangles = triangles
+        self.new_places: list[Place] = []
+        self.positions: list[list[float]] = []
+        self._vertices = vertices
+        self._snap = snap
+        near = np.flatnonzero(np.isin(triangles, list(around)).any(axis=1))
+        self._corner: dict[int, _Triangle] = {t: (a, b, c) for t, (a, b, c) in _rows(near, triangles[near])}
+        self._base = {t: t for t in self._corner}
+        self._children: dict[int, list[int]] = {t: [t] for t in self._corner}
+        self._base_of = {frozenset(c): t for t, c in self._corner.items()}
+        self._half = {edge: t for t, c in self._corner.items() for edge in _rim(c)}
+        self._on_edge: dict[tuple[int, int], list[tuple[float, int]]] = {}
+        self._drawn: set[tuple[int, int]] = set()
+        self._next_id = len(triangles)
+
+    def draw(self, places: Sequence[Place], *, closed: bool) -> list[int]:
+        """Divide triangles until the places are vertices and each is joined to the next by edges.
+
+        Returns:
+            The vertices along the way; a closed way repeats its first.
+
+        Raises:
+            InputError: if the way crosses itself.
+        """
+        chain = [self._vertex_at(places[0])]
+        for place in places[1:]:
+            self._extend(chain, self._vertex_at(place))
+        if closed:
+            self._extend(chain, chain[0])
+        body = chain[:-1] if closed else chain
+        again = next((v for i, v in enumerate(body) if v in body[:i]), None) if len(set(body)) < len(body) else None
+        if again is not None:
+            raise _crosses(self.place(again))
+        return chain
+
+    def improve(self) -> None:
+        """Turn diagonals inside base triangles where that widens the smallest angle; what was drawn stays."""
+        for base, children in self._children.items():
+            for _ in range(3 * len(children)):
+                turned = [self._turn(edge, base) for t in list(children) for edge in _rim(self._corner[t])]
+                if not any(turned):
+                    break
+
+    def parts(self) -> dict[int, list[_Triangle]]:
+        """For each base triangle that was open to it, the triangles it now consists of."""
+        return {base: [self._corner[t] for t in children] for base, children in self._children.items()}
+
+    def place(self, vertex: int) -> Place:
+        """The place of an old or new vertex on the undivided mesh."""
+        old = len(self._vertices)
+        return {vertex: 1.0} if vertex < old else self.new_places[vertex - old]
+
+    def between(self, a: int, b: int) -> list[int]:
+        """The new vertices on an edge of the undivided mesh, in order from a to b."""
+        inside = [vertex for _, vertex in self._on_edge.get((min(a, b), max(a, b)), [])]
+        return inside if a < b else inside[::-1]
+
+    def beside(self, a: int, b: int) -> list[int]:
+        """The base triangles on both sides of an edge; one on the border."""
+        found = (self._half.get((a, b)), self._half.get((b, a)))
+        return [self._base[t] for t in found if t is not None]
+
+    def _new_vertex(self, place: Place) -> int:
+        self.new_places.append(place)
+        corners = [(weight, self._vertices[v].tolist()) for v, weight in place.items()]
+        self.positions.append([sum(weight * x[axis] for weight, x in corners) for axis in range(3)])
+        return len(self._vertices) + len(self.new_places) - 1
+
+    def _position(self, vertex: int) -> list[float]:
+        old = len(self._vertices)
+        return self._vertices[vertex].tolist() if vertex < old else self.positions[vertex - old]
+
+    def _vertex_at(self, place: Place) -> int:
+        if len(place) == 1:
+            return next(iter(place))
+        if len(place) == 3:
+            return self._vertex_inside(place)
+        low, high = sorted(place)
+        stations = self._on_edge.setdefault((low, high), [])
+        share = place[high]
+        for station, vertex in stations:
+            if abs(station - share) < self._snap:
+                return vertex
+        rank = sum(station < share for station, _ in stations)
+        u = stations[rank - 1][1] if rank else low
+        v = stations[rank][1] if rank < len(stations) else high
+        vertex = self._new_vertex({low: 1.0 - share, high: share})
+        self._split_edge(u, v, vertex)
+        stations.insert(rank, (share, vertex))
+        return vertex
+
+    def _vertex_inside(self, place: Place) -> int:
+        """A vertex in the interior of a base triangle, snapped to the lines already inside it."""
+        base = self._base_of[frozenset(place)]
+        point = self._flat(place, base)
+        best: tuple[float, int, list[float]] = (-math.inf, -1, [])
+        for t in self._children[base]:
+            a, b, c = (self._flat(self.place(v), base) for v in self._corner[t])
+            whole = _turn_of(a, b, c)
+            if whole > 0:
+                shares = [_turn_of(point, b, c) / whole, _turn_of(a, point, c) / whole, _turn_of(a, b, point) / whole]
+                best = max(best, (min(shares), t, shares))
+        _, t, shares = best
+        corner = self._corner[t]
+        if max(shares) > 1.0 - self._snap:
+            return corner[shares.index(max(shares))]
+        for slot in range(3):
+            u, v = corner[(slot + 1) % 3], corner[(slot + 2) % 3]
+            on_rim = len(self.place(u).keys() | self.place(v).keys()) <= 2
+            if shares[slot] < self._snap and not on_rim:
+                share = shares[(slot + 2) % 3] / (1.0 - shares[slot])
+                return self._split_at(u, v, share)
+        x = self._new_vertex(place)
+        self._replace(t, [(u, v, x) for u, v in _rim(corner)])
+        return x
+
+    def _split_at(self, u: int, v: int, share: float) -> int:
+        mixed: Place = {}
+        for vertex, part in ((u, 1.0 - share), (v, share)):
+            for old, weight in self.place(vertex).items():
+                mixed[old] = mixed.get(old, 0.0) + part * weight
+        x = self._new_vertex(mixed)
+        self._split_edge(u, v, x)
+        return x
+
+    def _split_edge(self, u: int, v: int, x: int) -> None:
+        if (u, v) in self._drawn:
+            raise _crosses(self.place(x))
+        for tail, head in ((u, v), (v, u)):
+            t = self._half.get((tail, head))
+            if t is not None:
+                apex = next(c for c in self._corner[t] if c not in (tail, head))
+                self._replace(t, [(tail, x, apex), (x, head, apex)])
+
+    def _replace(self, triangle: int, parts: Sequence[_Triangle]) -> None:
+        """Put parts in the place of a triangle; the first takes over its number."""
+        base = self._base[triangle]
+        for edge in _rim(self._corner[triangle]):
+            self._half.pop(edge, None)
+        for index, part in enumerate(parts):
+            t = triangle if index == 0 else self._next_id
+            if index:
+                self._next_id += 1
+                self._base[t] = base
+                self._children[base].append(t)
+            self._corner[t] = part
+            self._half.update(dict.fromkeys(_rim(part), t))
+
+    def _extend(self, chain: list[int], goal: int) -> None:
+        """Lead the chain along edges to a vertex of the same base triangle, dividing what lies in between."""
+        seen = len(chain)
+        while chain[-1] != goal:
+            here = chain[-1]
+            if (here, goal) in self._half or (goal, here) in self._half:
+                step = [goal]
+            else:
+                ends = self.place(here).keys() | self.place(goal).keys()
+                if len(ends) <= 2:
+                    step = self._along_edge(here, goal, *sorted(ends))
+                else:
+                    step = [self._towards(here, goal, ends)]
+            for vertex in step:
+                self._drawn |= {(chain[-1], vertex), (vertex, chain[-1])}
+                chain.append(vertex)
+            if len(chain) - seen > len(self._corner):
+                raise _crosses(self.place(here))
+
+    def _along_edge(self, here: int, goal: int, low: int, high: int) -> list[int]:
+        row = [low, *self.between(low, high), high]
+        i, j = row.index(here), row.index(goal)
+        return row[i + 1 : j + 1] if i < j else row[j:i][::-1]
+
+    def _towards(self, here: int, goal: int, ends: Iterable[int]) -> int:
+        """The next vertex on the straight way inside one base triangle; the edge that is in the way is split."""
+        inside = set(ends)
+        for base in {self._base[t] for v in [here] for t in self._around(v)}:
+            if not inside <= set(self.triangles[base].tolist()):
+                continue
+            p, q = self._flat(self.place(here), base), self._flat(self.place(goal), base)
+            for t in self._children[base]:
+                if here not in self._corner[t]:
+                    continue
+                slot = self._corner[t].index(here)
+                u, v = self._corner[t][(slot + 1) % 3], self._corner[t][(slot + 2) % 3]
+                right = -_turn_of(p, q, self._flat(self.place(u), base))
+                left = _turn_of(p, q, self._flat(self.place(v), base))
+                if right < 0 or left < 0 or right + left <= 0:
+                    continue
+                share = right / (right + left)
+                if share < self._snap:
+                    return u
+                return v if share > 1.0 - self._snap else self._split_at(u, v, share)
+        raise _crosses(self.place(here))
+
+    def _around(self, vertex: int) -> list[int]:
+        return [t for t, corner in self._corner.items() if vertex in corner]
+
+    def _flat(self, place: Place, base: int) -> tuple[float, float]:
+        """Coordinates in the plane of a base triangle: its corners are (0, 0), (1, 0) and (0, 1)."""
+        _, b, c = self.triangles[base].tolist()
+        return place.get(b, 0.0), place.get(c, 0.0)
+
+    def _turn(self, edge: tuple[int, int], base: int) -> bool:
+        """Replace a diagonal by the other one of its two triangles if that widens their smallest angle."""
+        u, v = edge
+        one, two = self._half.get((u, v)), self._half.get((v, u))
+        if one is None or two is None or self._base[one] != base or self._base[two] != base or edge in self._drawn:
+            return False
+        left = next(c for c in self._corner[one] if c not in edge)
+        right = next(c for c in self._corner[two] if c not in edge)
+        parts = [(left, u, right), (right, v, left)]
+        for part in parts:
+            a, b, c = (self._flat(self.place(w), base) for w in part)
+            if _turn_of(a, b, c) <= 1e-9:
+                return False
+        before = min(self._smallest_angle(self._corner[one]), self._smallest_angle(self._corner[two]))
+        if min(self._smallest_angle(part) for part in parts) <= before + 1e-6:
+            return False
+        for old in (one, two):
+            for side in _rim(self._corner[old]):
+                self._half.pop(side, None)
+        for t, part in zip((one, two), parts, strict=True):
+            self._corner[t] = part
+            self._half.update(dict.fromkeys(_rim(part), t))
+        return True
+
+    def _smallest_angle(self, corner: _Triangle) -> float:
+        sides = sorted(math.dist(self._position(a), self._position(b)) for a, b in _rim(corner))
+        if sides[0] <= 0:
+            return 0.0
+        cosine = (sides[1] ** 2 + sides[2] ** 2 - sides[0] ** 2) / (2 * sides[1] * sides[2])
+        return math.acos(min(1.0, max(-1.0, cosine)))
+
+
+def _rows(index: NDArray[np.int64], triangles: IntArray) -> Iterable[tuple[int, list[int]]]:
+    return zip(index.tolist(), triangles.tolist(), strict=True)
+
+
+def _rim(corner: _Triangle) -> tuple[tuple[int, int], tuple[int, int], tuple[int, int]]:
+    a, b, c = corner
+    return (a, b), (b, c), (c, a)
+
+
+def _turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Twice the area of a triangle in the plane, positive if it turns left."""
+    return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
+
+
+def _crosses(place: Place) -> InputError:
+    named = ", ".join(str(v) for v in sorted(place))
+    return InputError(f"the path crosses itself near vertex {named}; draw it so that it does not")

@@ -1,0 +1,334 @@
+"""Surfaces from files: the format by the suffix, the unit by the file or by word, then through the one door."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from os import PathLike
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, expect, nearest
+from warpflat.core.file_names import checked_name, fitted_name, plain_label
+from warpflat.core.input_files import listening_to_reads, note_read, noting_resolver
+from warpflat.core.text import shown
+from warpflat.surface.io.read_checks import check_ply, check_stl
+from warpflat.surface.io.read_obj import read_obj
+from warpflat.surface.io.read_off import read_off
+from warpflat.surface.io.read_usd import read_usd
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.lines import line_from_curve, with_lines
+from warpflat.surface.repair.polygons import distinct_corners, filled_up, split_polygons
+from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
+from warpflat.surface.repair.validate import checked_positions, make_surface
+
+__all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
+
+METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
+
+_USD = (".usd", ".usda", ".usdc", ".usdz")
+_METRES = (".glb", ".gltf")
+SUFFIXES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl", *_USD)
+
+# A piece of a garment lies between these extents [m]; a usual one between the other two.
+_POSSIBLE = (3e-3, 20.0)
+_USUAL = (0.02, 5.0)
+
+
+@dataclass(kw_only=True)
+class _Raw:
+    """What any format comes down to. `scale` is metres per unit, None where the file does not say."""
+
+    vertices: FloatArray
+    polygons: NDArray[np.int64]
+    scale: float | None
+    split_corners: bool = False
+    name: str | None = None
+    curves: dict[str, FloatArray] = field(default_factory=dict)
+    chains: dict[str, NDArray[np.int64]] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+
+
+def read_surface(
+    path: str | PathLike[str],
+    *,
+    units: str | None = None,
+    component: int | Literal["largest"] | None = None,
+    name: str | None = None,
+    prim: str | None = None,
+    weld: bool | None = None,
+) -> Surface:
+    """Read, mend and check a surface.
+
+    OBJ, OFF and USD keep their quads; PLY, STL, GLB and glTF are read with trimesh, which cuts polygons into
+    triangles. GLB and glTF are in metres and Y up by their standard, USD says its unit and its up axis (Z up is turned
+    to Y up); all other axes are taken as they are. Line elements of OBJ and linear BasisCurves beside or below a USD
+    mesh, or in the group MESH_lines beside it, become feature lines.
+
+    Args:
+        path: the file.
+        units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
+            overrides what the file says.
+        component: which connected part to take if there are several: "largest", or its number, largest first from 0.
+        name: what to call the piece (see :func:`warpflat.surface.make_surface`); by default the file's stem, or the USD prim's or
+            GLB node's name, with "_" where no file can bear it.
+        prim: which mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
+        weld: whether vertices at the same place are one; by default judged by format and mesh (see
+            :func:`warpflat.surface.make_surface`).
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    expect(path, (str, PathLike), "path", "that of a mesh file")
+    file = Path(path)
+    note_read(file)
+    sources = [file.absolute()]
+    try:
+        if name:
+            checked_name(name)
+        if units is not None and units not in METRES_PER_UNIT:
+            raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
+        _check_file(file)
+        with listening_to_reads(sources.append):
+            raw = _read(file, units, prim)
+        if raw.scale is None:
+            raise InputError(_ask_for_units(raw))
+    except InputError as error:
+        raise InputError(f"{file}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
+    if component is None:
+        _refuse_stray_vertex(raw, file)
+    surface = make_surface(
+        raw.vertices * raw.scale,
+        raw.polygons,
+        name=name or fitted_name(raw.name or file.stem),
+        lines={plain_label(key): chain for key, chain in raw.chains.items()},
+        component=component,
+        weld=weld,
+        split_corners=raw.split_corners,
+        source=str(file),
+    )
+    _check_size(surface, file, raw.scale)
+    surface = _snap_curves(surface, {plain_label(key): curve * raw.scale for key, curve in raw.curves.items()})
+    return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
+
+
+def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
+    """Read any mesh as it stands, closed or in several parts, such as the scan of a body.
+
+    Returns:
+        #V by 3, positions in the file's own unit; #F by 4, faces, -1 in the last column of a triangle.
+
+    Raises:
+        InputError: one line that names the file.
+    """
+    try:
+        _check_file(path)
+        raw = _read(path, None, None)
+        polygons, keep, _ = distinct_corners(raw.polygons)
+        return raw.vertices, split_polygons(checked_positions(raw.vertices), polygons[keep])[0]
+    except InputError as error:
+        raise InputError(f"{path}: {error}") from error
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _check_file(file: Path) -> None:
+    if file.is_dir():
+        raise InputError("is a directory, not a mesh file")
+    if not file.exists():
+        beside = [p.name for p in file.parent.iterdir() if p.suffix in SUFFIXES] if file.parent.is_dir() else []
+        close = nearest(file.name, beside).partition("? ")[0] if beside else ""
+        raise InputError("does not exist" + (f"; {close}?" if close.startswith("did you mean") else ""))
+    if file.suffix.lower() not in SUFFIXES:
+        raise InputError(f"unknown kind of file {file.suffix!r}; {nearest(file.suffix.lower(), SUFFIXES)}")
+    if file.stat().st_size == 0:
+        raise InputError("is empty")
+
+
+def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
+    suffix = file.suffix.lower()
+    scale = METRES_PER_UNIT[units] if units else None
+    if suffix in _USD:
+        mesh = read_usd(file, prim=prim, metres_per_unit=scale)
+        return _Raw(
+            vertices=mesh.vertices,
+            polygons=filled_up(mesh.corners, mesh.sizes),
+            scale=1.0,
+            name=mesh.name,
+            curves=mesh.curves,
+            notes=mesh.notes,
+        )
+    if prim is not None and suffix not in _METRES:
+        raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
+    if suffix == ".obj":
+        return _from_obj(file, scale)
+    if suffix == ".off":
+        vertices, polygons = read_off(file)
+        return _Raw(vertices=vertices, polygons=polygons, scale=scale)
+    return _from_trimesh(file, scale, prim)
+
+
+def _from_obj(file: Path, scale: float | None) -> _Raw:
+    obj = read_obj(file)
+    raw = _Raw(vertices=obj.vertices, polygons=obj.polygons, scale=scale, split_corners=obj.split_corners)
+    if not obj.lines:
+        return raw
+    edges = _directed_edges(obj.polygons)
+    stride = len(obj.vertices)
+    for name, chains in obj.lines.items():
+        for number, chain in enumerate(chains):
+            key = name if len(chains) == 1 else f"{name}_{number + 1}"
+            line = np.array(chain, dtype=np.int64)
+            if np.isin(line[:-1] * stride + line[1:], edges).all():
+                raw.chains[key] = line
+            else:
+                raw.curves[key] = obj.vertices[line]
+    return raw
+
+
+def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The sides of all polygons, both ways, each as one number: tail times the count of vertices plus head."""
+    size = (polygons >= 0).sum(axis=1)
+    column = np.arange(polygons.shape[1])
+    follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
+    heads = np.take_along_axis(polygons, follow, axis=1)
+    real = polygons >= 0
+    a, b = polygons[real], heads[real]
+    stride = int(polygons.max()) + 1
+    return np.unique(np.concatenate([a * stride + b, b * stride + a]))
+
+
+def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
+    suffix = file.suffix.lower()
+    scene = _trimesh_scene(file)
+    meshes = list(_instances(scene))
+    if prim is not None:
+        names = [node for node, _, _ in meshes]
+        meshes = [item for item in meshes if item[0] == prim]
+        if not meshes:
+            raise InputError(f"there is no mesh node {prim!r}; {nearest(prim, names)}")
+    if not any(len(faces) for _, _, faces in meshes):
+        raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
+    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)])
+    textured = any(
+        getattr(m.visual, "kind", None) == "texture" for m in scene.geometry.values() if hasattr(m, "visual")
+    )
+    return _Raw(
+        vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
+        polygons=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
+        scale=1.0 if scale is None and suffix in _METRES else scale,
+        split_corners=suffix in (".stl", *_METRES) or (suffix == ".ply" and textured),
+    )
+
+
+def _trimesh_scene(file: Path) -> Any:
+    """The file as trimesh reads it, which says nothing meanwhile."""
+    import trimesh
+
+    suffix = file.suffix.lower()
+    if suffix == ".ply":
+        check_ply(file)
+    elif suffix == ".stl":
+        check_stl(file)
+    options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
+    # What it logs goes nowhere, but to the handlers of a program that has its own.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
+    except InputError:
+        raise
+    # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
+    except Exception as error:
+        raise InputError(
+            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
+            "vertices and faces alone"
+        ) from error
+
+
+def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:
+    """The meshes of a trimesh scene: node, world positions, triangles."""
+    import trimesh
+
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry]
+        if not isinstance(mesh, trimesh.Trimesh):
+            continue
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        matrix = np.asarray(transform, dtype=np.float64)
+        if not np.array_equal(matrix, np.eye(4)):
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
+
+
+def _refuse_stray_vertex(raw: _Raw, file: Path) -> None:
+    """A vertex far from all others is told as such: as a part of the whole it makes a piece too large, or slivers."""
+    assert raw.scale is not None
+    used = np.unique(raw.polygons[raw.polygons >= 0])
+    used = used[used < len(raw.vertices)]
+    points = raw.vertices[used]
+    # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
+    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * raw.scale > _POSSIBLE[1]:
+        stray = stray_vertex(points)
+        if stray is not None:
+            raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
+
+
+def _extent(points: FloatArray, scale: float) -> str:
+    return " x ".join(f"{side:.3g}" for side in (np.ptp(points, axis=0) * scale).tolist())
+
+
+def _ask_for_units(raw: _Raw) -> str:
+    used = np.unique(raw.polygons[raw.polygons >= 0])
+    points = raw.vertices[used[used < len(raw.vertices)]]
+    points = points[np.isfinite(points).all(axis=1)]
+    sizes = "; ".join(f'"{unit}": {_extent(points, METRES_PER_UNIT[unit])} m' for unit in ("m", "cm", "mm"))
+    return (
+        'carries no unit: say which with units = "m" in the scene or --units m on the command line '
+        f"(m, cm, mm, in, ft); the mesh would measure, as {sizes}"
+    )
+
+
+def _check_size(surface: Surface, file: Path, scale: float) -> None:
+    size = float(np.ptp(surface.vertices, axis=0).max())
+    if _POSSIBLE[0] <= size <= _POSSIBLE[1]:
+        return
+    fitting = [u for u, metres in METRES_PER_UNIT.items() if _USUAL[0] <= size / scale * metres <= _USUAL[1]]
+    what = "larger than any garment" if size > 1 else "smaller than any piece of a garment"
+    advice = " or ".join(f'units = "{unit}" ({size / scale * METRES_PER_UNIT[unit]:.3g} m)' for unit in fitting)
+    raise InputError(
+        f"{file}: the piece would be {size:.4g} m long, {what}; "
+        + (f"plausible: {advice}" if advice else "no usual unit makes it plausible: scale the mesh")
+    )
+
+
+def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:
+    """Curves as feature lines; those that do not lie on the piece are left out with a note."""
+    if not curves:
+        return surface
+    from scipy.spatial import cKDTree
+
+    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    notes = list(surface.notes)
+    lines = {}
+    for name, curve in curves.items():
+        try:
+            lines[name] = line_from_curve(surface, curve, name=name)
+        except InputError as error:
+            notes.append(f"line left out: {error}")
+            continue
+        off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
+        if off.max() > 1e-6 * size:
+            notes.append(f"line {shown(name)} was drawn along the nearest edges")
+    return replace(with_lines(surface, lines), notes=tuple(notes))

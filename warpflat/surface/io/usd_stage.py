@@ -1,0 +1,266 @@
+"""A mesh of a USD stage, in metres and Y up, with the curves that are drawn beside it.
+
+This module is all that the process loads in which a file is read: see :mod:`warpflat.surface.io.read_usd`.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import sys
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.memory_limit import require_memory_for_usd
+from warpflat.core.text import shown
+
+__all__ = ["UNREADABLE", "UsdMesh", "answer", "read_stage"]
+
+# What reading may take besides what the library itself does, and how much more per byte of the file: lists of corners pack tightly.
+_MEMORY, _MEMORY_PER_BYTE = 2**30, 200
+_SECONDS, _BYTES_PER_SECOND = 20, 10**6
+
+UNREADABLE = "not a readable USD file: damaged, cut short, or with values of another type than its schema's"
+
+
+@dataclass(kw_only=True)
+class UsdMesh:
+    """What was read of a stage.
+
+    Attributes:
+        name: the prim's name.
+        vertices: #V by 3 [m], Y up.
+        sizes: #F, how many corners each face has.
+        corners: the vertex indices of all faces' corners, one face after the other, wound as USD's right-handed faces are.
+        curves: linear BasisCurves beside or below the mesh, or in the group MESH_lines beside it (as in a film of ours), by
+            name, #P by 3 [m]; a periodic one repeats its first point.
+        notes: what could not be taken over, one sentence each.
+        layers: the files of which the stage is composed.
+    """
+
+    name: str
+    vertices: FloatArray
+    sizes: NDArray[np.int64]
+    corners: NDArray[np.int64]
+    curves: dict[str, FloatArray] = field(default_factory=dict)
+    notes: list[str] = field(default_factory=list)
+    layers: list[str] = field(default_factory=list)
+
+
+def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
+    """Read one mesh prim.
+
+    Args:
+        path: .usd, .usda, .usdc or .usdz.
+        prim: the path of the mesh prim, or its name where that is unique; needed if there are several.
+        metres_per_unit: overrides what the stage says.
+
+    Raises:
+        InputError: without the file's name: if the file is no stage, or there is no such mesh.
+    """
+    from pxr import UsdUtils
+
+    # While there is a delegate, USD prints no warnings of its own: they become a note, or a part of the error.
+    warnings = UsdUtils.CoalescingDiagnosticDelegate()
+    try:
+        mesh = _read(path, prim, metres_per_unit)
+    except InputError as error:
+        warned = _warned(warnings)
+        raise InputError(f"{error} (USD warns: {warned})" if warned else str(error)) from error
+    # Whatever USD trips over in somebody's file is that file's fault, in whatever way it shows.
+    except Exception as error:
+        raise InputError(UNREADABLE) from error
+    if warned := _warned(warnings):
+        mesh.notes.append(f"the stage was not read whole: {warned}")
+    return mesh
+
+
+def answer() -> None:
+    """Read what standard input asks for, and write the mesh, or the words of an error, to standard output."""
+    # Whatever else the library prints goes where nobody reads it.
+    out = os.fdopen(os.dup(1), "wb")
+    os.dup2(2, 1)
+    path, prim, metres_per_unit = pickle.load(sys.stdin.buffer)
+    try:
+        require_memory_for_usd()
+        from pxr import UsdGeom, UsdUtils  # noqa: F401, as the limit counts what comes after it
+
+        _limit(path.stat().st_size)
+        result: UsdMesh | str = read_stage(path, prim=prim, metres_per_unit=metres_per_unit)
+    except InputError as error:
+        result = str(error)
+    pickle.dump(result, out, protocol=pickle.HIGHEST_PROTOCOL)
+    out.close()
+
+
+def _limit(size: int) -> None:
+    """Limit this process's memory and time by the size of the file [bytes], where the system can."""
+    if sys.platform != "linux":
+        return
+    import resource
+
+    taken = int(Path("/proc/self/statm").read_text().split()[0]) * resource.getpagesize()
+    for kind, most in (
+        (resource.RLIMIT_AS, taken + _MEMORY + _MEMORY_PER_BYTE * size),
+        (resource.RLIMIT_CPU, _SECONDS + size // _BYTES_PER_SECOND),
+        (resource.RLIMIT_CORE, 0),
+    ):
+        soft, hard = resource.getrlimit(kind)
+        least = min(limit for limit in (most, soft, hard) if limit != resource.RLIM_INFINITY)
+        resource.setrlimit(kind, (least, hard))
+
+
+def _warned(warnings: Any) -> str:
+    """The first of USD's warnings in one line, and how many more there were."""
+    texts = [" ".join(str(item.commentary).split()) for item in warnings.TakeUncoalescedDiagnostics()]
+    if not texts:
+        return ""
+    # USD ends each with the task and an address in memory, which differs from run to run.
+    first = texts[0].partition(" (instantiating stage")[0].rstrip(".")
+    return first + (f", and {len(texts) - 1} more" if len(texts) > 1 else "")
+
+
+def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
+    from pxr import Usd, UsdGeom
+
+    stage = Usd.Stage.Open(str(path))
+    if not stage:
+        raise InputError(UNREADABLE)
+    chosen = _choose(stage, prim)
+    mesh = UsdGeom.Mesh(chosen)
+    notes: list[str] = []
+    if metres_per_unit is None:
+        metres_per_unit = float(UsdGeom.GetStageMetersPerUnit(stage))
+        if not 0.0 < metres_per_unit < np.inf:
+            raise InputError(
+                f"metersPerUnit is {metres_per_unit:g}; it must be a number above 0, such as 0.01 where the stage is in centimetres"
+            )
+        if not UsdGeom.StageHasAuthoredMetersPerUnit(stage):
+            notes.append(f"the stage has no metersPerUnit: USD's default {metres_per_unit:g} was taken")
+    z_up = UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.z
+    cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
+
+    def to_metres(points: Any, of: Any) -> tuple[FloatArray, bool]:
+        """World positions [m], Y up, and whether the transform mirrors."""
+        matrix = np.array(cache.GetLocalToWorldTransform(of), dtype=np.float64)
+        world = np.asarray(points, dtype=np.float64).reshape(-1, 3) @ matrix[:3, :3] + matrix[3, :3]
+        if z_up:
+            world = np.column_stack([world[:, 0], world[:, 2], -world[:, 1]])
+        return world * metres_per_unit, bool(np.linalg.det(matrix[:3, :3]) < 0)
+
+    sizes, corners = _faces(mesh)
+    vertices, mirrored = to_metres(_value(mesh.GetPointsAttr()), chosen)
+    left_handed = _value(mesh.GetOrientationAttr()) == UsdGeom.Tokens.leftHanded
+    if left_handed != mirrored:
+        corners = _turned(sizes, corners)
+    out = UsdMesh(name=chosen.GetName(), vertices=vertices, sizes=sizes, corners=corners, notes=notes)
+    out.layers = [layer.realPath for layer in stage.GetUsedLayers() if layer.realPath]
+    for curves in _curve_prims(chosen):
+        _add_curves(out, UsdGeom.BasisCurves(curves), to_metres)
+    return out
+
+
+def _value(attribute: Any) -> Any:
+    """An attribute's default, or its first time sample."""
+    from pxr import Usd
+
+    value = attribute.Get()
+    return attribute.Get(Usd.TimeCode.EarliestTime()) if value is None else value
+
+
+def _choose(stage: Any, prim: str | None) -> Any:
+    from pxr import Usd, UsdGeom
+
+    meshes = [p for p in stage.Traverse(Usd.TraverseInstanceProxies()) if p.IsA(UsdGeom.Mesh)]
+    paths = [str(p.GetPath()) for p in meshes]
+    if not meshes:
+        raise InputError("holds no mesh prim")
+    if prim is None:
+        if len(meshes) > 1:
+            some = ", ".join(paths[:8]) + (f" and {len(paths) - 8} more" if len(paths) > 8 else "")
+            raise InputError(f"holds {len(meshes)} mesh prims; choose one with prim = one of: {some}")
+        return meshes[0]
+    found = [p for p in meshes if str(p.GetPath()) == prim] or [p for p in meshes if p.GetName() == prim]
+    if len(found) != 1:
+        what = "is not a mesh prim" if not found else "names several mesh prims"
+        raise InputError(f"prim {prim!r} {what}; {nearest(prim, paths)}")
+    return found[0]
+
+
+def _faces(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """How many corners each face has, and the vertices of all corners, without the faces that are holes."""
+    counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
+    points = _value(mesh.GetPointsAttr())
+    at = mesh.GetPath()
+    if points is None or len(points) == 0 or counts is None or flat is None or len(counts) == 0:
+        raise InputError(f"mesh {at} has no faces")
+    sizes, corners = np.asarray(counts, dtype=np.int64), np.asarray(flat, dtype=np.int64)
+    if sizes.sum() != len(corners) or sizes.min() < 0:
+        raise InputError(
+            f"mesh {at} is broken: its face sizes add up to {sizes.sum()}, but it lists {len(corners)} corners"
+        )
+    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
+        raise InputError(f"mesh {at} is broken: its faces refer to vertices beyond its {len(points):,} points")
+    short = np.flatnonzero(sizes < 3)
+    if len(short):
+        raise InputError(f"mesh {at}: face {short[0]} has {sizes[short[0]]} corners; a face needs at least 3")
+    kept = np.ones(len(sizes), dtype=bool)
+    holes = np.asarray(_value(mesh.GetHoleIndicesAttr()) or [], dtype=np.int64)
+    if len(holes) and (holes.min() < 0 or holes.max() >= len(sizes)):
+        raise InputError(f"mesh {at} is broken: its holes refer to faces beyond its {len(sizes):,} faces")
+    kept[holes] = False
+    if not kept.any():
+        raise InputError(f"mesh {at} has no faces: all are holes")
+    return sizes[kept], corners[np.repeat(kept, sizes)]
+
+
+def _turned(sizes: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Faces wound the other way, from the same first corner."""
+    start = np.repeat(np.cumsum(sizes) - sizes, sizes)
+    size = np.repeat(sizes, sizes)
+    place = np.arange(len(corners)) - start
+    return corners[start + (size - place) % size]
+
+
+def _curve_prims(mesh: Any) -> list[Any]:
+    from pxr import Usd, UsdGeom
+
+    def children(prim: Any) -> list[Any]:
+        return list(prim.GetFilteredChildren(Usd.TraverseInstanceProxies())) if prim else []
+
+    beside = children(mesh.GetParent())
+    below = list(Usd.PrimRange(mesh, Usd.TraverseInstanceProxies()))
+    # The curves of other groups are drawn on other meshes: a film has those of the pattern beside those of the surface.
+    group = next((p for p in beside if p.GetName() == f"{mesh.GetName()}_lines"), None)
+    return [p for p in beside + below + children(group) if p.IsA(UsdGeom.BasisCurves)]
+
+
+def _add_curves(out: UsdMesh, curves: Any, to_metres: Any) -> None:
+    from pxr import UsdGeom
+
+    name = curves.GetPrim().GetName()
+    points, counts = _value(curves.GetPointsAttr()), _value(curves.GetCurveVertexCountsAttr())
+    if points is None or counts is None or len(points) != sum(counts):
+        out.notes.append(f"curves {shown(name)} have no points and were left out")
+        return
+    if _value(curves.GetTypeAttr()) != UsdGeom.Tokens.linear:
+        out.notes.append(f"curves {shown(name)} are not linear and were left out: convert them to polylines")
+        return
+    periodic = _value(curves.GetWrapAttr()) == UsdGeom.Tokens.periodic
+    place, _ = to_metres(points, curves.GetPrim())
+    start = 0
+    for number, count in enumerate(counts):
+        part = place[start : start + count]
+        start += count
+        if periodic:
+            part = np.concatenate([part, part[:1]])
+        key = name if len(counts) == 1 else f"{name}_{number + 1}"
+        while key in out.curves:
+            key += "_"
+        out.curves[key] = part

@@ -1,0 +1,1 @@
+"""Lines on a surface: along edges, across faces, geodesic, in a plane."""

@@ -1,0 +1,98 @@
+"""Bands: long, narrow pieces, and the line through the middle of one, however it curls.
+
+A waistband or a binding goes around the body, and a plane may cut it crosswise only.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.edge_paths import EdgeGraph, path_length
+from warpflat.surface.paths.geodesic import distance_from
+from warpflat.surface.topology import border_loops, corner_triangles, half_edges_of
+
+__all__ = ["line_along_band"]
+
+
+# A line is short against its piece below this share of the way between the places of the border that are furthest apart.
+_SHORT = 0.5
+# That way is at least so many widths long in a band. A front with a deep neckline, whose centre line is as short, is no band.
+_NARROW = 6.0
+# And its area is at least this share of that way times its greatest width: a body with two long straps is no band.
+_EVEN = 0.5
+# Where the border turns by more than this, an end of the band has a corner (cosine).
+_CORNER = np.cos(np.radians(36.0))
+# How dear the way along the border is: a step costs its length over the distance to the border and this share of the width.
+_ROOM = 0.1
+
+
+def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
+    """The line through the middle of a band, along edges, from the border at one end of it to the border at the other.
+
+    Args:
+        surface: one piece.
+        line: vertex indices along edges; it will do unless it is short against the piece.
+
+    Returns:
+        Vertex indices, in either direction; None where the given line will do, or the piece is no band: as wide as that, or a
+        ring, which has no ends.
+    """
+    # No place is further from another than half of the border is long.
+    length, graph = path_length(surface, [line]), EdgeGraph(surface)
+    on_border = half_edges_of(surface).count == 1
+    if 4 * length >= graph.length[on_border].sum():
+        return None
+    loops = border_loops(surface.faces, surface.vertices)
+    one = _furthest(surface, loops[0], int(line[0]))[0]
+    other, reach = _furthest(surface, loops[0], one)
+    room = distance_from(surface, np.unique(graph.edges[on_border]))
+    greatest, mean = 2 * float(room.max()), _area(surface) / reach
+    # Of a strip one face wide, all vertices are on the border.
+    width = max(greatest, mean)
+    ring = len(loops) > 1 and path_length(surface, [np.append(loops[1], loops[1][0])]) > reach
+    if length >= _SHORT * reach or reach < _NARROW * width or mean < _EVEN * greatest or ring:
+        return None
+    weight = graph.length / (room[graph.edges].mean(axis=1) + _ROOM * width)
+    ends = (_end_at(surface, loops[0], tip, 2 * width) for tip in (one, other))
+    return _path_between(graph, weight, *ends)
+
+
+def _furthest(surface: Surface, border: IntArray, place: int) -> tuple[int, float]:
+    """The vertex of the border furthest from a vertex, and how far that is [m]."""
+    away = distance_from(surface, [place])[border]
+    return int(border[away.argmax()]), float(away.max())
+
+
+def _area(surface: Surface) -> float:
+    triangles, _, share = corner_triangles(surface.faces)
+    p = surface.vertices[triangles]
+    return float(0.5 * share @ np.linalg.norm(np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]), axis=1))
+
+
+def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArray:
+    """The border vertices of the end of a band whose furthest place is `tip`: those from it to corners no more than `most` [m] away."""
+    end = [tip]
+    at = int(np.flatnonzero(border == tip)[0])
+    for loop in (np.roll(border, -at), np.roll(border[::-1], at + 1)):
+        p = surface.vertices[np.append(loop, loop[0])]
+        step = np.diff(p, axis=0)
+        size = np.linalg.norm(step, axis=1)
+        ahead = step / np.maximum(size, np.finfo(float).tiny)[:, None]
+        corner = np.einsum("ij,ij->i", ahead[:-1], ahead[1:]) < _CORNER
+        near = np.flatnonzero(corner & (np.cumsum(size)[:-1] <= most))
+        if len(near):
+            end += loop[1 : near[0] + 2].tolist()
+    return np.array(end, dtype=np.int32)
+
+
+def _path_between(graph: EdgeGraph, weight: FloatArray, starts: IntArray, ends: IntArray) -> IntArray:
+    """The path of least weight from any of some vertices to any of others."""
+    from scipy.sparse.csgraph import dijkstra
+
+    cost, before, _ = dijkstra(graph.matrix(weight), indices=starts, return_predecessors=True, min_only=True)
+    path = [int(ends[cost[ends].argmin()])]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    return np.array(path, dtype=np.int32)

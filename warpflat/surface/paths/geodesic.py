@@ -1,0 +1,332 @@
+"""Distance from a line on the surface, and where on the line the nearest point lies.
+
+The distance d at a vertex v is the least d(p) + |v - p| over the points p of the sides opposite to it, with d linear
+along each side (the Hopf-Lax form of the eikonal equation; Bornemann and Rasch 2006). It is exact where the front is
+straight, on whatever triangles, hence for a straight line on a surface that can be developed; the heat method is off
+by a quarter of an edge and more there. It is found from above: distances along edges are no shorter, and going
+through the vertices in the order of these, each takes the best p that it sees and, if that has brought it nearer, lets
+its neighbours look again. With every vertex's p held, the equations are linear, and triangular but for ways in circles.
+
+The station of the nearest point is constant along the way to it: the same linear system carries it. Beyond the ends of
+the line, where the nearest point is one end for all, the direction in which the way leaves that end is carried instead.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.launch import launch_each
+from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.edge_paths import chain_positions
+from warpflat.surface.paths.lines import line_from_curve
+from warpflat.surface.topology import border_of, components, half_edges_of, order_by, triangulate, unfold_quad_diagonals
+from warpflat.surface.vectors import cross, dot, norm, points_at
+
+__all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
+
+
+def distance_from(surface: Surface, line: ArrayLike) -> FloatArray:
+    """#V, the distance [m] along the surface from a line.
+
+    Args:
+        surface: where.
+        line: vertex indices along edges (or a single vertex).
+    """
+    path = np.asarray(line, dtype=np.int64).ravel()
+    if len(path) == 0 or path.min() < 0 or path.max() >= len(surface.vertices):
+        raise InputError(f"a line on {surface.name!r} needs vertices from 0 to {len(surface.vertices) - 1}")
+    return _Ways(surface, _short_triangles(surface), path).distance
+
+
+def _short_triangles(surface: Surface) -> IntArray:
+    """#T by 3, quads split along their shorter diagonal."""
+    if not surface.is_quad.any():
+        return np.ascontiguousarray(surface.faces[:, :3])
+    lengths, quads = unfold_quad_diagonals(surface.vertices, surface.faces)
+    other = np.zeros(len(surface.faces), dtype=bool)
+    other[quads] = lengths[:, 1] < lengths[:, 0] * (1 - 1e-9)
+    return triangulate(surface.faces, other_diagonal=other)[0]
+
+
+def signed_distance_and_station(
+    surface: Surface, line: ArrayLike, *, extend: bool = True
+) -> tuple[FloatArray, FloatArray]:
+    """Coordinates of a first layout: how far each vertex lies from a line, and beside which place of it.
+
+    Where the nearest point of the line is one of its ends and the way to it is not at right angles to the line,
+    distance and direction are taken as polar coordinates about that end, so that places beyond an end do not all get
+    its station.
+
+    Args:
+        surface: where.
+        line: vertex indices along edges, not closed.
+        extend: carry an end inside of the piece on to the border, straight ahead.
+
+    Returns:
+        #V, the signed distance x [m], positive to the right of the line, seen from outside (the side from which faces
+        are wound counter-clockwise) with the line running up; #V, the station y [m], the arc length along the line at
+        the nearest point of it, 0 at its start, negative before it.
+
+    Raises:
+        InputError: if the line is closed.
+    """
+    path = np.asarray(line, dtype=np.int32)
+    if len(path) < 2 or len(np.unique(path)) < len(path):
+        raise InputError(f"a datum line on {surface.name!r} must be open and have at least two vertices, each once")
+    before = 0
+    if extend:
+        path, before = extend_to_border(surface, path)
+    station = chain_positions(surface.vertices[path])
+    station -= station[before]
+    triangles = _short_triangles(surface)
+    ways = _Ways(surface, triangles, path.astype(np.int64))
+    along = ways.carry(path.astype(np.int64), station)
+    known, side, about_ends = _directions_at_line(surface, triangles, path)
+    columns = ways.carry(known, np.column_stack([side, *about_ends])).T
+    x, y = ways.distance * np.sign(columns[0]), along
+    for (right, up), end, outwards in ((columns[1:3], station[0], -1.0), (columns[3:], station[-1], 1.0)):
+        beyond = outwards * up > 0
+        scale = ways.distance / np.where(beyond, np.hypot(right, up), 1.0)
+        x, y = np.where(beyond, scale * right, x), np.where(beyond, end + scale * up, y)
+    # A way from beyond the line's reach of known places may end on the line itself, which has no side.
+    lost = columns[0] == 0
+    lost[path] = False
+    sides = _sides(surface, path) if lost.any() else None
+    return (x if sides is None else sides * np.abs(x)), y
+
+
+def extend_to_border(surface: Surface, line: IntArray) -> tuple[IntArray, int]:
+    """The line carried on straight ahead, along edges, from each end that is inside to the border.
+
+    Returns:
+        The longer line, and the position of the old line's first vertex in it. An end from which no way leads to the
+        border clear of the line stays where it is.
+    """
+    border = _on_border(surface)
+    path = list(map(int, line))
+    if path[-1] not in border:
+        path += _ahead(surface, path)
+    count = len(path)
+    if path[0] not in border:
+        path = (path[::-1] + _ahead(surface, path[::-1]))[::-1]
+    return np.array(path, dtype=np.int32), len(path) - count
+
+
+def _on_border(surface: Surface) -> set[int]:
+    return set(border_of(surface).tolist())
+
+
+def _ahead(surface: Surface, path: list[int]) -> list[int]:
+    """The vertices from the end of a path straight on to the border, or none."""
+    import potpourri3d
+
+    points = surface.vertices[path]
+    length = chain_positions(points)
+    # A path along edges wanders: its direction is that of its last fifth.
+    back = int(np.searchsorted(length, 0.8 * length[-1]))
+    direction = points[-1] - points[min(back, len(path) - 2)]
+    size = float(np.linalg.norm(direction))
+    reach = 2 * float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    if size == 0:
+        return []
+    tracer = potpourri3d.GeodesicTracer(surface.vertices, _short_triangles(surface))
+    trace = np.asarray(tracer.trace_geodesic_from_vertex(path[-1], direction / size * reach))
+    if len(trace) < 2 or not np.isfinite(trace).all():
+        return []
+    try:
+        new = line_from_curve(surface, trace, name="extension").tolist()
+    except InputError:
+        return []
+    border = _on_border(surface)
+    stop = next((i for i, vertex in enumerate(new) if vertex in border), -1)
+    new = new[: stop + 1]
+    return new[1:] if stop > 0 and not set(new[1:]) & set(path) else []
+
+
+# Rounds over all vertices; a mesh of needles may take that many, any other a few.
+_MOST_ROUNDS = 200
+# How far back in the order of vertices a shorter way is made known at once, as a share of all.
+_REACH = 0.1
+# Less of the largest distance, or of the largest value carried, is rounding.
+_ROUNDING = 1e-14
+
+
+class _Ways:
+    """The shortest ways to a line: each vertex's distance, and the place on an opposite side where its way passes.
+
+    Attributes:
+        distance: #V [m].
+    """
+
+    def __init__(self, surface: Surface, triangles: IntArray, line: NDArray[np.int64]) -> None:
+        # Ways along edges are no shorter, and nearly in the right order: in here vertices are numbered by these.
+        along_edges = _along_edges(surface, line)
+        order = np.argsort(along_edges, kind="stable").astype(np.int32)
+        self._here = np.arange(len(order), dtype=np.int32)
+        self._rank = np.empty_like(order)
+        self._rank[order] = self._here
+        distance = along_edges[order]
+        tolerance = _ROUNDING * float(distance[np.isfinite(distance)][-1])
+        self._on_line = np.zeros(len(order), dtype=np.int32)
+        self._on_line[self._rank[line]] = 1
+        corner = self._rank[triangles]
+        slot, offset = order_by(corner.ravel(), len(order))
+        ends, seen = np.empty((corner.size, 2), dtype=np.int32), np.empty((corner.size, 3))
+        launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
+        waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
+        crowd = np.add.reduceat(1 - self._on_line, self._here[::CROWD], dtype=np.int32)
+        self._ways = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
+        for _ in range(_MOST_ROUNDS):
+            shortened[0] = 0
+            wp.launch(
+                find_ways,
+                dim=1,
+                inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
+                outputs=[distance, waiting, crowd, *self._ways, shortened],
+                device="cpu",
+            )
+            if shortened[0] == 0:
+                break
+        # The most that is held at once, and not needed any more.
+        del corner, slot, offset, ends, seen
+        self._order, self._straight = self._order_of_ways()
+        self.distance = self._carry(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
+
+    def _order_of_ways(self) -> tuple[IntArray, bool]:
+        """The vertices, each after those that its way leads to, as far as ways do not go in circles; whether none does."""
+        from scipy.sparse import csr_array
+        from scipy.sparse.csgraph import connected_components
+
+        first, second, share, _ = self._ways
+        count = len(self._here)
+        ends = np.stack(
+            [np.where(share < 1, first, self._here), np.where(share > 0, second, self._here)], axis=1
+        ).ravel()
+        offset = np.arange(0, len(ends) + 1, 2, dtype=np.int32)
+        graph = csr_array((np.ones(len(ends), dtype=np.int8), ends, offset), shape=(count, count))
+        # Strongly connected components come numbered in such an order, of which nothing but the number of rounds depends.
+        parts, label = connected_components(graph, connection="strong")
+        straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
+        return order_by(label, parts)[0], straight
+
+    def _carry(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
+        """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
+        change = np.empty(value.shape[1])
+        for _ in range(_MOST_ROUNDS):
+            change[:] = 0.0
+            wp.launch(
+                carry_along,
+                dim=1,
+                inputs=[*self._ways, self._order, fixed, grows],
+                outputs=[value, change],
+                device="cpu",
+            )
+            if self._straight or not (change > _ROUNDING * np.abs(value).max(axis=0)).any():
+                break
+        return value
+
+    def carry(self, known: NDArray[np.int64], values: FloatArray) -> FloatArray:
+        """#V (by #K), the values (#N, or #N by #K) of `known` vertices, the line's among them, carried to all others."""
+        fixed, at = self._on_line.copy(), self._rank[known]
+        fixed[at] = 1
+        start = np.zeros((len(fixed), *values.shape[1:]))
+        start[at] = values
+        return self._carry(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
+
+
+def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
+    """#V, the distance [m] from the line along edges."""
+    from scipy.sparse import csr_array
+    from scipy.sparse.csgraph import dijkstra
+
+    edges, size = half_edges_of(surface).edges, len(surface.vertices)
+    ends = points_at(surface.vertices, edges.T)
+    # A length of zero would be read as "no edge".
+    length = np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny)
+    # Edges are sorted by their first vertex.
+    offset = np.searchsorted(edges[:, 0], np.arange(size + 1)).astype(np.int32)
+    graph = csr_array((length, edges[:, 1], offset), shape=(size, size))
+    return np.asarray(dijkstra(graph, directed=False, indices=line, min_only=True))
+
+
+def _directions_at_line(
+    surface: Surface, triangles: IntArray, path: IntArray
+) -> tuple[NDArray[np.int64], FloatArray, tuple[FloatArray, FloatArray]]:
+    """The vertices of the line and those joined to it, and where they lie.
+
+    Returns:
+        #N, the vertices; #N, more or less than 0 to the right or left of the line; and for either end of it, #N by 2, right
+        and up [m] of it, by the angles of the triangles around it as in the plane. A straight way that passes between two
+        of them has the mean of their places. Vertices not joined to that end lie beside their own place of a straight line.
+    """
+    sides, angle, away, offset = _around(surface.vertices, triangles, path)
+    on_path = np.zeros(len(surface.vertices), dtype=np.int8)
+    on_path[path] = 1
+    # Each triangle may be passed from both neighbours on the line, either way.
+    room, count = 4 * len(sides), np.empty(1, dtype=np.int32)
+    visited, at, lies = np.empty(room, dtype=np.int32), np.empty(room, dtype=np.int32), np.empty((room, 3))
+    given, made = [path, on_path, offset, sides, angle, away], [visited, at, lies, count]
+    wp.launch(go_around, dim=1, inputs=given, outputs=made, device="cpu")
+    visited, at, (right, passed, far) = visited[: count[0]], at[: count[0]], lies[: count[0]].T
+    beside, number = np.unique(visited, return_inverse=True)
+    known = np.concatenate([path, beside]).astype(np.int64)
+    side = np.concatenate([np.zeros(len(path)), np.bincount(number, right * far, minlength=len(beside))])
+    nearest = np.arange(len(known))
+    nearest[len(path) + number] = at
+    station = chain_positions(surface.vertices[path])[nearest]
+    about_ends = []
+    for end, up in ((0, 1.0), (len(path) - 1, -1.0)):
+        about_end = np.column_stack([side, station - station[end]])
+        here = at == end
+        around, of = np.unique(number[here], return_inverse=True)
+        places = far[here] * right[here] * np.sin(passed[here]), far[here] * up * np.cos(passed[here])
+        about_end[len(path) + around] = np.stack([np.bincount(of, place, minlength=len(around)) for place in places], 1)
+        about_ends.append(about_end)
+    return known, side, (about_ends[0], about_ends[1])
+
+
+def _around(
+    vertices: FloatArray, triangles: IntArray, path: IntArray
+) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
+    """The triangles around each vertex of a line, one after the other.
+
+    Returns:
+        #R by 2, their other two vertices, anticlockwise; #R, the angle between these [rad]; #R by 2, how far they are [m]; #P+1, where
+        those of each vertex begin.
+    """
+    place = np.full(len(vertices), -1, dtype=np.int32)
+    place[path] = np.arange(len(path), dtype=np.int32)
+    near = triangles[(place[triangles] >= 0).any(axis=1)]
+    corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
+    corner = corner[place[corner[:, 0]] >= 0]
+    order, offset = order_by(place[corner[:, 0]], len(path))
+    corner = corner[order]
+    u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
+    angle = np.arctan2(norm(cross(u, v)), dot(u, v))
+    return np.ascontiguousarray(corner[:, 1:]), angle, np.stack([norm(u), norm(v)], axis=1), offset
+
+
+def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
+    """#V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
+    he = half_edges_of(surface)
+    position = np.full(len(surface.vertices), -2, dtype=np.int64)
+    position[path] = np.arange(len(path))
+    step = position[he.head] - position[he.tail]
+    on_line = (position[he.tail] >= 0) & (position[he.head] >= 0) & (np.abs(step) == 1)
+    # Faces are wound counter-clockwise: a face lies to the left of its own sides.
+    side_of_face = np.zeros(len(surface.faces))
+    side_of_face[he.face[on_line & (step > 0)]] = -1.0
+    side_of_face[he.face[on_line & (step < 0)]] = 1.0
+    part = components(surface.faces, barrier=he.edges[np.unique(he.edge[on_line])])
+    left, right = (np.isin(part, part[side_of_face == sign]) for sign in (-1.0, 1.0))
+    if (left & right).any():
+        return None
+    face_sign = np.where(left, -1.0, 1.0)
+    sign = np.ones(len(surface.vertices))
+    sign[he.tail] = face_sign[he.face]
+    return sign

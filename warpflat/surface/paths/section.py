@@ -1,0 +1,196 @@
+"""Plane sections of a surface: a straight cut as a pattern maker rules it, level, upright or slanted."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.surface.mesh import Surface
+from warpflat.surface.paths.trace import (
+    Place,
+    SurfacePath,
+    VertexStar,
+    describe_place,
+    locate,
+    make_path,
+    path_triangles,
+    simplify_places,
+)
+
+__all__ = ["plane_path", "plane_section"]
+
+
+def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> SurfacePath:
+    """Where a plane meets the surface, from border to border or all round: of several such curves the nearest to the point.
+
+    Args:
+        surface: the surface.
+        point: of the plane [m]; it need not lie on the surface.
+        normal: of the plane, any length but zero.
+
+    Raises:
+        InputError: for a normal of zero, or a plane that does not cut the surface.
+    """
+    axis, origin = _direction(normal, "a plane's normal"), np.asarray(point, dtype=float)
+    if origin.shape != (3,) or not np.isfinite(origin).all():
+        raise InputError(f"a plane's point is three finite numbers [m], got {point!r}")
+    found = _nearest_curve(surface, origin, axis, path_triangles(surface)[0])
+    if found is None:
+        reach = surface.vertices @ axis
+        raise InputError(
+            f"the plane does not cut the piece {surface.name!r}: along its normal the piece spans {reach.min():.4g} to "
+            f"{reach.max():.4g} m and the plane lies at {origin @ axis:.4g} m"
+        )
+    _, places, closed = found
+    return make_path(surface, places, closed=closed)
+
+
+def plane_path(
+    surface: Surface, point: ArrayLike | int, normal: ArrayLike, *, towards: ArrayLike | None = None
+) -> SurfacePath:
+    """Where a plane through a point meets the surface: of all such curves the one that holds the point.
+
+    Args:
+        surface: the surface.
+        point: a vertex index or a position [m]; the plane goes through the nearest point of the surface.
+        normal: of the plane, any length but zero.
+        towards: if given, only the part from the point in this direction as far as the border.
+
+    Returns:
+        The curve from border to border, or closed. With `towards` it runs from the border inwards to the point, as a
+        dart does.
+
+    Raises:
+        InputError: for a normal of zero, a plane that only touches the surface at the point, or a `towards` that leads
+            along a closed curve and so to no border.
+    """
+    axis = _direction(normal, "a plane's normal")
+    start = locate(surface, point)
+    origin = np.sum([weight * surface.vertices[v] for v, weight in start.items()], axis=0)
+    triangles, _ = path_triangles(surface)
+    best = _nearest_curve(surface, origin, axis, triangles)
+    if best is None or best[0] > 1e-6 * np.ptp(surface.vertices, axis=0).max():
+        raise InputError(f"the plane only touches the surface at {describe_place(start)}; turn its normal")
+    _, places, closed = best
+    if towards is None:
+        return make_path(surface, places, closed=closed)
+    if closed:
+        raise InputError("the plane's curve is closed and reaches no border; leave `towards` out to cut all round")
+    return make_path(surface, _inwards(surface, places, start, origin, _direction(towards, "`towards`"), triangles))
+
+
+def _nearest_curve(
+    surface: Surface, origin: FloatArray, axis: FloatArray, triangles: IntArray
+) -> tuple[float, list[Place], bool] | None:
+    """Of the curves in which a plane meets the surface the nearest to its origin: how far [m], its places, whether it is closed."""
+    height = (surface.vertices - origin) @ axis
+    # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
+    # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
+    height[np.abs(height) < 1e-10 * np.ptp(surface.vertices, axis=0).max()] = 0.0
+    best: tuple[float, list[Place], bool] | None = None
+    for chain, closed in _chains(triangles, height >= 0):
+        places = simplify_places([_crossing(edge, height) for edge in chain])
+        if closed and len(places) > 1 and places[0] == places[-1]:
+            places.pop()
+        if len(places) < 2:
+            continue
+        gap = _distances(surface, places, closed, origin).min()
+        if best is None or gap < best[0]:
+            best = gap, places, closed
+    return best
+
+
+def _direction(value: ArrayLike, what: str) -> FloatArray:
+    vector = np.asarray(value, dtype=float)
+    if vector.shape != (3,) or not np.isfinite(vector).all() or not vector.any():
+        raise InputError(f"{what} is three finite numbers, not all zero, got {value!r}")
+    return vector / np.linalg.norm(vector)
+
+
+def _crossing(edge: tuple[int, int], height: FloatArray) -> Place:
+    """Where the plane crosses an edge whose ends lie above (or in) and below it."""
+    a, b = edge
+    share = float(height[a] / (height[a] - height[b]))
+    if share <= 0.0:
+        return {a: 1.0}
+    return {a: 1.0 - share, b: share}
+
+
+def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int, int]], bool]]:
+    """The crossed edges, each as (upper, lower) vertex, in rows from border to border or round; true where closed."""
+    crossed = triangles[above[triangles].any(axis=1) & ~above[triangles].all(axis=1)]
+    beside: dict[tuple[int, int], list[int]] = {}
+    rims: list[list[tuple[int, int]]] = []
+    for index, (a, b, c) in enumerate(crossed.tolist()):
+        rim = [(u, v) if above[u] else (v, u) for u, v in ((a, b), (b, c), (c, a)) if above[u] != above[v]]
+        rims.append(rim)
+        for edge in rim:
+            beside.setdefault(edge, []).append(index)
+    chains = []
+    left = set(beside)
+    ends = [edge for edge, found in beside.items() if len(found) == 1]
+    for seed in [*ends, *beside]:
+        if seed not in left:
+            continue
+        chain, here, came = [seed], seed, -1
+        left.discard(seed)
+        closed = len(beside[seed]) > 1
+        while True:
+            onward = [t for t in beside[here] if t != came]
+            if not onward:
+                break
+            came = onward[0]
+            here = next(edge for edge in rims[came] if edge != here)
+            if here not in left:
+                break
+            left.discard(here)
+            chain.append(here)
+        chains.append((chain, closed))
+    return chains
+
+
+def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:
+    """Distance [m] from a point to each segment of a row of places."""
+    points = make_path(surface, places).points
+    ends = np.roll(points, -1, axis=0) if closed else points[1:]
+    tail = points[: len(ends)]
+    along = ends - tail
+    squared = np.einsum("ij,ij->i", along, along)
+    share = np.clip(np.einsum("ij,ij->i", origin - tail, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
+    return np.linalg.norm(tail + share[:, None] * along - origin, axis=1)
+
+
+def _inwards(
+    surface: Surface,
+    places: list[Place],
+    start: Place,
+    origin: FloatArray,
+    towards: FloatArray,
+    triangles: IntArray,
+) -> list[Place]:
+    """The half of an open row of places that leaves `start` in a direction, turned round so that it ends at `start`."""
+    segment = int(np.argmin(_distances(surface, places, False, origin)))
+    points = make_path(surface, places).points
+    # A start on a vertex or edge is itself one of the places, up to rounding.
+    near = [i for i in (segment, segment + 1) if places[i].keys() == start.keys()]
+    before = places[: near[0] if near else segment + 1]
+    after = places[near[0] + 1 :] if near else places[segment + 1 :]
+    options = [side for side in (before, after[::-1]) if side]
+    if not options:
+        raise InputError(f"the plane's curve has no part beside {describe_place(start)}")
+
+    def lead(side: list[Place]) -> float:
+        step = np.sum([weight * surface.vertices[v] for v, weight in side[-1].items()], axis=0) - origin
+        return float(step @ towards / max(float(np.linalg.norm(step)), np.finfo(float).tiny))
+
+    chosen = max(options, key=lead)
+    if lead(chosen) <= 0 or len(points) < 2:
+        raise InputError(
+            f"from {describe_place(start)} the plane's curve does not lead towards {towards.round(3).tolist()}"
+        )
+    path = simplify_places([*chosen, start])
+    if not VertexStar(triangles).sharing([*path[-2], *path[-1]]):
+        raise InputError(f"the plane's curve passes {describe_place(start)} without meeting it; choose another point")
+    return path

@@ -1,0 +1,1 @@
+"""Meshes are checked and repaired here."""

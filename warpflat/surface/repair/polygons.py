@@ -1,0 +1,241 @@
+"""From polygons as files have them to faces of three or four distinct, convex corners."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.surface.vectors import cross, dot, points_at
+
+__all__ = [
+    "crossed_quads",
+    "distinct_corners",
+    "filled_up",
+    "list_some",
+    "padded_polygons",
+    "split_non_convex_quads",
+    "split_polygons",
+]
+
+# Entries of the table of faces, faces times the largest count of corners: a gigabyte.
+_MOST_CORNERS = 2**27
+
+
+def list_some(indices: ArrayLike, most: int = 8) -> str:
+    """`3, 4, 9 and 12 more`: enough of a list to go and look, short enough for one line."""
+    values = np.asarray(indices).ravel()
+    shown = ", ".join(str(int(i)) for i in values[:most])
+    return shown if len(values) <= most else f"{shown} and {len(values) - most:,} more"
+
+
+def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
+    """#F by the largest corner count, vertex indices, filled up with -1 on the right.
+
+    Raises:
+        InputError: if there are no polygons or one has fewer than three corners.
+    """
+    if isinstance(polygons, np.ndarray) and polygons.ndim == 2 and polygons.shape[1] >= 3:
+        if len(polygons) == 0:
+            raise InputError("there are no faces")
+        if not np.issubdtype(polygons.dtype, np.integer):
+            raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
+        return polygons.astype(np.int64)
+    try:
+        rows: list[Any] = list(polygons)  # type: ignore[arg-type]
+        count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
+        corners = [np.asarray(row).ravel() for row in rows]
+        flat = np.concatenate([np.empty(0, dtype=np.int64), *(row.astype(np.int64) for row in corners)])
+    except (TypeError, ValueError, OverflowError) as error:
+        raise InputError("faces must be lists of vertex indices, one list per face") from error
+    if not rows:
+        raise InputError("there are no faces")
+    wrong = next((n for n, row in enumerate(corners) if len(row) and not np.issubdtype(row.dtype, np.integer)), None)
+    if wrong is not None:
+        raise InputError(
+            f"face {wrong} (counted from 0) is {rows[wrong]!r}; its corners must be integers (vertex indices)"
+        )
+    short = np.flatnonzero(count < 3)
+    if len(short):
+        raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
+    return filled_up(flat, count)
+
+
+def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
+    """#F by the largest corner count, at least 4: corners one face after the other, filled up with -1 on the right.
+
+    Raises:
+        InputError: if one face has so many corners that the table of all faces would not fit into memory.
+    """
+    width = max(int(count.max()), 4)
+    if len(count) * width > _MOST_CORNERS:
+        raise InputError(
+            f"face {int(count.argmax())} (counted from 0) has {width:,} corners, too many beside {len(count):,} faces; cut it into "
+            "triangles before"
+        )
+    out = np.full((len(count), width), -1, dtype=np.int64)
+    out[np.arange(width) < count[:, None]] = flat
+    return out
+
+
+def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], BoolArray, BoolArray]:
+    """Polygons without corners that repeat the one before.
+
+    A quad with two equal neighbouring corners is a triangle; what keeps fewer than three corners, or the same vertex
+    twice apart from each other, is no face.
+
+    Returns:
+        #F by k polygons; #F, which of them are faces; #F, which of those lost a corner.
+    """
+    ordered = np.sort(polygons, axis=1)
+    suspect = np.flatnonzero(((ordered[:, 1:] == ordered[:, :-1]) & (ordered[:, 1:] >= 0)).any(axis=1))
+    out = polygons.copy()
+    keep = np.ones(len(polygons), dtype=bool)
+    lost = np.zeros(len(polygons), dtype=bool)
+    for row in suspect.tolist():
+        corners = [c for c in polygons[row].tolist() if c >= 0]
+        kept = [c for i, c in enumerate(corners) if c != corners[i - 1]]
+        keep[row] = len(kept) >= 3 and len(set(kept)) == len(kept)
+        lost[row] = keep[row]
+        out[row] = kept + [-1] * (polygons.shape[1] - len(kept))
+    return out, keep, lost
+
+
+def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
+    """#F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
+
+    Polygons of more than four corners are cut into triangles in their mean plane, as fat ones as their corners allow.
+
+    Raises:
+        InputError: naming the polygon, if its outline crosses itself.
+    """
+    if polygons.shape[1] <= 4:
+        faces = np.full((len(polygons), 4), -1, dtype=np.int32)
+        faces[:, : polygons.shape[1]] = polygons
+        return faces, np.arange(len(polygons), dtype=np.int32)
+    large = polygons[:, 4] >= 0
+    parts = [polygons[~large, :4].astype(np.int32)]
+    origin = [np.flatnonzero(~large).astype(np.int32)]
+    for row in np.flatnonzero(large).tolist():
+        corners = polygons[row][polygons[row] >= 0]
+        triangles = _triangulated(vertices[corners], row)
+        block = np.full((len(triangles), 4), -1, dtype=np.int32)
+        block[:, :3] = corners[triangles]
+        parts.append(block)
+        origin.append(np.full(len(triangles), row, dtype=np.int32))
+    index = np.concatenate(origin)
+    order = np.argsort(index, kind="stable")
+    return np.concatenate(parts)[order], index[order]
+
+
+def _newell(points: FloatArray) -> FloatArray:
+    """Twice the vector area of a closed polygon."""
+    return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
+
+
+def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
+    """Triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
+    import shapely
+
+    centred = points - points.mean(axis=0)
+    flat = centred @ _plane_axes(_newell(centred)).T
+    outline = shapely.Polygon(flat)
+    number = {corner: n for n, corner in enumerate(map(tuple, flat.tolist()))}
+    if not outline.is_valid or len(number) < len(flat):
+        raise InputError(
+            f"face {row} (counted from 0) crosses itself or touches itself: it cannot be cut into triangles"
+        )
+    rings = shapely.get_coordinates(shapely.constrained_delaunay_triangles(outline)).reshape(-1, 4, 2)[:, :3]
+    triangles = np.array([number[corner] for corner in map(tuple, rings.reshape(-1, 2).tolist())]).reshape(-1, 3)
+    a, b, c = flat[triangles].transpose(1, 0, 2)
+    clockwise = (b[:, 0] - a[:, 0]) * (c[:, 1] - a[:, 1]) < (b[:, 1] - a[:, 1]) * (c[:, 0] - a[:, 0])
+    triangles[clockwise] = triangles[clockwise, ::-1]
+    return triangles
+
+
+def _plane_axes(normal: FloatArray) -> FloatArray:
+    """2 by 3, two unit vectors at right angles to each other and to `normal`, so that all three make a right-handed frame."""
+    axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
+    first = np.cross(axis, normal)
+    second = np.cross(normal, first)
+    return np.array([v / max(float(np.linalg.norm(v)), np.finfo(float).tiny) for v in (first, second)])
+
+
+def split_non_convex_quads(
+    vertices: FloatArray, faces: IntArray, origin: IntArray, tolerance: float
+) -> tuple[IntArray, IntArray, IntArray]:
+    """Quads with a straight or inward corner, cut into two triangles from that corner.
+
+    The corner triangle there would have no area, or less: no measure by corners could tell it from a flipped one.
+
+    Args:
+        vertices: #V by 3, positions [m].
+        faces: #F by 4.
+        origin: #F, the input face of each.
+        tolerance: a corner counts as straight if its height over the diagonal before it is below this share of the
+            quad's mean edge.
+
+    Returns:
+        Faces, origins, and the input faces that were cut.
+
+    Raises:
+        InputError: naming the quad whose sides cross.
+    """
+    quads = np.flatnonzero(faces[:, 3] >= 0)
+    height, inward, thin, crossed = _quad_corners(vertices[faces[quads]], tolerance)
+    if crossed.any():
+        raise InputError(
+            f"face {origin[quads[np.argmax(crossed)]]} (counted from 0) is a quad whose sides cross, or is folded by more than "
+            "90 degrees; list its corners in order around it, or give triangles"
+        )
+    cut = inward.any(axis=1) & ~thin
+    if not cut.any():
+        return faces, origin, np.empty(0, dtype=np.int32)
+    rows, corner = quads[cut], np.argmin(height[cut], axis=1)
+    turned = faces[rows][np.arange(len(rows))[:, None], (corner[:, None] + np.arange(4)) % 4]
+    none = np.full(len(rows), -1, dtype=np.int32)
+    out = faces.copy()
+    out[rows] = np.column_stack([turned[:, :3], none])
+    second = np.column_stack([turned[:, 0], turned[:, 2], turned[:, 3], none])
+    # Each second half directly behind its first keeps the order of the input faces.
+    return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]
+
+
+def crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
+    """Which faces (#F by 4) are quads whose sides cross, or that are folded by more than 90 degrees."""
+    quads = np.flatnonzero(faces[:, 3] >= 0)
+    doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]
+    return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
+
+
+def _may_cross(vertices: FloatArray, quads: IntArray, tolerance: float) -> BoolArray:
+    """#Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
+    p = points_at(vertices, quads.T)
+    side, diagonal = np.roll(p, -1, axis=1) - p, p[:, 2:] - p[:, :2]
+    normal = cross(diagonal[:, 0], diagonal[:, 1])
+    turning = dot(cross(np.roll(side, 1, axis=1), side), normal[:, None])
+    longest = dot(side, side).max(axis=0) * dot(diagonal, diagonal).max(axis=0)
+    return np.asarray((turning.min(axis=0) < 0.0) | (dot(normal, normal) <= tolerance**2 * longest))
+
+
+def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
+    """Of quads, #Q by 4 by 3: #Q by 4, the height of each corner over the diagonal before it, and whether it is straight or inward; #Q,
+    which are slivers; #Q, whose sides cross."""
+    normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
+    unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
+    before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)
+    chord = np.linalg.norm(after - before, axis=2)
+    mean = np.linalg.norm(after - p, axis=2).mean(axis=1)
+    twice = np.einsum("fci,fi->fc", np.cross(p - before, after - p), unit)
+    height = twice / np.maximum(chord, np.finfo(float).tiny)
+    inward = height <= tolerance * mean[:, None]
+    # Where no corner spans an area there is no inside: that is a sliver, not a matter of convexity.
+    spread = np.linalg.norm(np.cross(p - before, after - p), axis=2).max(axis=1)
+    thin = spread <= tolerance * mean * np.maximum(chord, np.linalg.norm(after - p, axis=2)).max(axis=1)
+    folded = (inward.sum(axis=1) > 1) & (height.min(axis=1) < -tolerance * mean)
+    void = np.linalg.norm(normal, axis=1) <= tolerance * mean * chord.max(axis=1)
+    return height, inward, thin, (folded | void) & ~thin

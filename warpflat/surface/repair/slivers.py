@@ -1,0 +1,388 @@
+"""Degenerate faces are merged into their neighbours; everything else stays exactly as it is.
+
+A triangle is degenerate here if its smallest altitude is below a small share of the length of the edges around it.
+There are two kinds (Botsch et al., Polygon Mesh Processing, 2010, ch. 8): a needle has one very short edge, which is
+collapsed; a cap has a corner that lies almost on its longest edge, and the neighbour across that edge is fanned out
+from the corner instead. No vertex is moved. A step is taken only if the surface stays manifold with the same border, no
+feature line loses its way, and no face becomes degenerate or turns by more than 90 degrees.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterable, Sequence
+from itertools import pairwise
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.surface.topology import half_edges
+
+__all__ = ["degenerate_faces", "merge_degenerate_faces"]
+
+# An edge this many times longer than the tolerated altitude still counts as the short edge of a needle: all that lies
+# within it moves by no more than that.
+_SHORT = 3.0
+# The last resort: a degenerate face whose shortest edge is below this share of its surroundings loses that edge, if an
+# end of it is neither on the border nor on a feature line.
+_LAST_RESORT = 0.1
+# A mesh with so many degenerate faces, as a number and as a share of all, is none of cloth: merging them would take minutes.
+_TOO_MANY, _TOO_LARGE_A_SHARE = 200, 0.25
+_MOST_ROUNDS = 20
+
+
+def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
+    """#V, the mean length [m] of the edges at each vertex."""
+    edges = half_edges(faces).edges
+    length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
+    total = np.bincount(edges.ravel(), weights=np.repeat(length, 2), minlength=len(vertices))
+    count = np.bincount(edges.ravel(), minlength=len(vertices))
+    return total / np.maximum(count, 1)
+
+
+def _width(points: FloatArray) -> FloatArray:
+    """The least width [m] of faces given as (..., 3 or 4, 3): a triangle's altitude; a quad's also by its edges."""
+    sides = np.linalg.norm(np.roll(points, -1, axis=-2) - points, axis=-1)
+    if points.shape[-2] == 3:
+        area2 = np.linalg.norm(
+            np.cross(points[..., 1, :] - points[..., 0, :], points[..., 2, :] - points[..., 0, :]), axis=-1
+        )
+        longest = sides.max(axis=-1)
+        return area2 / np.where(longest > 0, longest, 1.0)
+    one = points[..., 2, :] - points[..., 0, :]
+    two = points[..., 3, :] - points[..., 1, :]
+    longest = np.maximum(np.linalg.norm(one, axis=-1), np.linalg.norm(two, axis=-1))
+    area2 = np.linalg.norm(np.cross(one, two), axis=-1)
+    return np.minimum(sides.min(axis=-1), area2 / np.where(longest > 0, longest, 1.0))
+
+
+def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IntArray:
+    """The faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
+
+    The width of a triangle is its smallest altitude; of a quad, its shortest edge or its area over its longer diagonal.
+    """
+    scale = _vertex_scale(vertices, faces)
+    width = np.empty(len(faces))
+    around = np.empty(len(faces))
+    for sides, chosen in ((3, faces[:, 3] < 0), (4, faces[:, 3] >= 0)):
+        corners = faces[chosen, :sides]
+        width[chosen] = _width(vertices[corners])
+        around[chosen] = scale[corners].mean(axis=1)
+    return np.flatnonzero(width <= tolerance * around).astype(np.int32)
+
+
+def merge_degenerate_faces(
+    vertices: FloatArray,
+    faces: IntArray,
+    lines: dict[str, list[int]],
+    tolerance: float = 1e-3,
+) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray, IntArray]:
+    """Merge away what :func:`degenerate_faces` finds.
+
+    Args:
+        vertices: #V by 3, positions [m]; none is moved, some may no longer be used afterwards.
+        faces: #F by 4, manifold, consistently wound, one component.
+        lines: feature lines, vertex indices along edges; one that ran along a merged edge follows it.
+        tolerance: share of the surrounding edge length.
+
+    Returns:
+        faces, #F' by 4; #F', the face of the argument that each comes from; the lines; the degenerate faces that were
+        merged; and those that could not be.
+    """
+    of = np.arange(len(faces), dtype=np.int32)
+    merged, left = of[:0], of[:0]
+    # Merging changes the scale around: what had only small neighbours may now be degenerate beside larger ones.
+    for _ in range(_MOST_ROUNDS):
+        found = degenerate_faces(vertices, faces, tolerance)
+        if len(found) == 0:
+            break
+        if len(found) > max(_TOO_MANY, _TOO_LARGE_A_SHARE * len(faces)):
+            left = of[found]
+            break
+        faces, origin, lines, left = _merge_once(vertices, faces, lines, found, tolerance)
+        merged, left = np.union1d(merged, np.setdiff1d(of[found], of[left])), of[left]
+        of = of[origin]
+        if len(left):
+            break
+    return faces, of, lines, merged.astype(np.int32), left
+
+
+def _merge_once(
+    vertices: FloatArray,
+    faces: IntArray,
+    lines: dict[str, list[int]],
+    found: IntArray,
+    tolerance: float,
+) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray]:
+    """One round, with the scale as it stands: faces, the face of each before, lines, and the faces that remain."""
+    patch = _Patch(vertices, faces, lines, tolerance)
+    waiting = sorted(found.tolist(), key=patch.width)
+    # Edges only get shorter and fewer, so this ends; the limit is for what rounding may do to that.
+    steps_left = 100 + 20 * len(waiting)
+    progress = True
+    while waiting and progress and steps_left > 0:
+        progress = False
+        for face in waiting:
+            if patch.is_degenerate(face) and patch.mend(face):
+                progress = True
+                steps_left -= 1
+        waiting = sorted((f for f in patch.touched | set(waiting) if patch.is_degenerate(f)), key=patch.width)
+        patch.touched.clear()
+    left = np.unique([patch.origin.get(f, f) for f in waiting]).astype(np.int32)
+    return *patch.result(), patch.lines, left
+
+
+class _Patch:
+    """A mesh that changes in few places: only faces near a change leave the arrays."""
+
+    def __init__(self, vertices: FloatArray, faces: IntArray, lines: dict[str, list[int]], tolerance: float) -> None:
+        self.vertices = vertices
+        self.faces = faces
+        self.lines = {name: list(line) for name, line in lines.items()}
+        self.tolerance = tolerance
+        self.scale = _vertex_scale(vertices, faces)
+        self.changed: dict[int, tuple[int, ...] | None] = {}
+        self.origin: dict[int, int] = {}
+        self.next_face = len(faces)
+        self.touched: set[int] = set()
+        he = half_edges(faces)
+        order = np.argsort(he.tail, kind="stable")
+        self._face_of = he.face[order]
+        self._start = np.searchsorted(he.tail[order], np.arange(len(vertices) + 1))
+        self._around: dict[int, set[int]] = {}
+
+    def corners(self, face: int) -> tuple[int, ...]:
+        """The vertices of a face that is still there, else ()."""
+        if face in self.changed:
+            return self.changed[face] or ()
+        row = self.faces[face].tolist()
+        return tuple(row if row[3] >= 0 else row[:3])
+
+    def around(self, vertex: int) -> set[int]:
+        """The faces at a vertex."""
+        if vertex not in self._around:
+            self._around[vertex] = set(self._face_of[self._start[vertex] : self._start[vertex + 1]].tolist())
+        return self._around[vertex]
+
+    def neighbours(self, vertex: int) -> dict[int, int]:
+        """The vertices joined to `vertex` by an edge, and how many faces lie at that edge."""
+        count: dict[int, int] = {}
+        for face in self.around(vertex):
+            ring = self.corners(face)
+            at = ring.index(vertex)
+            for other in (ring[at - 1], ring[(at + 1) % len(ring)]):
+                count[other] = count.get(other, 0) + 1
+        return count
+
+    def on_border(self, vertex: int) -> bool:
+        return 1 in self.neighbours(vertex).values()
+
+    def width(self, face: int) -> float:
+        ring = self.corners(face)
+        return float(_width(self.vertices[list(ring)])) if ring else np.inf
+
+    def normal(self, ring: Iterable[int]) -> FloatArray:
+        p = self.vertices[list(ring)]
+        return np.cross(p[2] - p[0], p[-1] - p[1] if len(p) == 4 else p[2] - p[1])
+
+    def is_narrow(self, ring: tuple[int, ...], factor: float = 1.0) -> bool:
+        points = list(ring)
+        return bool(_width(self.vertices[points]) <= factor * self.tolerance * self.scale[points].mean())
+
+    def is_degenerate(self, face: int) -> bool:
+        ring = self.corners(face)
+        return bool(ring) and self.is_narrow(ring)
+
+    def put(self, face: int | None, ring: tuple[int, ...] | None, origin: int = -1) -> None:
+        """Replace a face (None: a new one) by the corners `ring` (None: by nothing)."""
+        if face is None:
+            face = self.next_face
+            self.next_face += 1
+            self.origin[face] = self.origin.get(origin, origin)
+        for vertex in self.corners(face) if face in self.changed or face < len(self.faces) else ():
+            self.around(vertex).discard(face)
+        # Collected before the face changes: a vertex asked for the first time reads the arrays.
+        places = [self.around(vertex) for vertex in ring or ()]
+        self.changed[face] = ring
+        for place in places:
+            place.add(face)
+        if ring:
+            self.touched.add(face)
+
+    def mend(self, face: int) -> bool:
+        """One step that rids the mesh of a degenerate face; false if there is none."""
+        ring = self.corners(face)
+        points = self.vertices[list(ring)]
+        length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
+        around = float(self.scale[list(ring)].mean())
+        short, long = int(np.argmin(length)), int(np.argmax(length))
+        ends = ring[short], ring[(short + 1) % len(ring)]
+        if length[short] <= _SHORT * self.tolerance * around and self.collapse(*ends, anywhere=True):
+            return True
+        if len(ring) == 4:
+            at = 0 if np.linalg.norm(points[2] - points[0]) <= np.linalg.norm(points[3] - points[1]) else 1
+            turned = ring[at:] + ring[:at]
+            self.put(face, turned[:3])
+            self.put(None, (turned[0], turned[2], turned[3]), origin=face)
+            return True
+        if self.fan(face, long) or self.join_caps(face, long, around) or self.fan_beside(face, long):
+            return True
+        return bool(length[short] <= _LAST_RESORT * around) and self.collapse(*ends, anywhere=False)
+
+    def collapse(self, a: int, b: int, *, anywhere: bool) -> bool:
+        """Merge one end of the edge a-b into the other. `anywhere`: also along the border and feature lines."""
+        on_line = [any(v in line for line in self.lines.values()) for v in (a, b)]
+        border = [self.on_border(v) for v in (a, b)]
+        tries = sorted([(on_line[0], border[0], -a, a, b), (on_line[1], border[1], -b, b, a)])
+        for line, edge, _, gone, kept in tries:
+            if (line or edge) and not anywhere:
+                continue
+            if edge and self.neighbours(gone)[kept] != 1:
+                continue
+            if line and not self._consecutive(gone, kept):
+                continue
+            if self._collapse(gone, kept):
+                return True
+        return False
+
+    def _consecutive(self, gone: int, kept: int) -> bool:
+        """Whether every line through `gone` also runs through `kept` next to it."""
+        pairs = {gone, kept}
+        return all(gone not in line or any({x, y} == pairs for x, y in pairwise(line)) for line in self.lines.values())
+
+    def _collapse(self, gone: int, kept: int) -> bool:
+        of_gone, of_kept = self.neighbours(gone), self.neighbours(kept)
+        both = self.around(gone) & self.around(kept)
+        apexes = set()
+        for face in both:
+            ring = self.corners(face)
+            if (ring.index(gone) - ring.index(kept)) % len(ring) not in (1, len(ring) - 1):
+                return False
+            if len(ring) == 3:
+                apexes |= set(ring) - {gone, kept}
+        # The link condition: else the collapse would glue parts of the surface that are apart.
+        if set(of_gone) & set(of_kept) != apexes or any(of_gone[x] + of_kept[x] < 3 for x in apexes):
+            return False
+        if self.on_border(gone) and not self.on_border(kept):
+            return False
+        new: dict[int, tuple[int, ...] | None] = {}
+        for face in self.around(gone):
+            ring = self.corners(face)
+            if face in both:
+                new[face] = tuple(v for v in ring if v != gone) if len(ring) == 4 else None
+            else:
+                new[face] = tuple(kept if v == gone else v for v in ring)
+            if new[face] is not None and not self._acceptable(ring, new[face] or ()):
+                return False
+        if all(ring is None for ring in new.values()) and len(self.around(kept)) == len(both):
+            return False
+        for face, changed in new.items():
+            self.put(face, changed)
+        for name, line in self.lines.items():
+            moved = [kept if v == gone else v for v in line]
+            self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
+        return True
+
+    def _acceptable(self, old: tuple[int, ...], new: tuple[int, ...]) -> bool:
+        """Whether a face may become another: not degenerate (or less than it was) and not turned over."""
+        if self.is_narrow(old):
+            return len(new) == len(old) and bool(_width(self.vertices[list(new)]) >= _width(self.vertices[list(old)]))
+        return not self.is_narrow(new) and float(self.normal(old) @ self.normal(new)) > 0
+
+    def fan(self, face: int, side: int, *, check: bool = True) -> bool:
+        """Take away a cap: the neighbour across its longest edge (the one from corner `side`) is fanned out instead."""
+        ring = self.corners(face)
+        p, q, c = ring[side], ring[(side + 1) % 3], ring[(side + 2) % 3]
+        bent = [line for line in self.lines.values() if any({x, y} == {p, q} for x, y in pairwise(line))]
+        if any(c in line for line in bent):
+            return False
+        beside = self._across(face, p, q)
+        if beside is None:
+            if self.on_border(c):
+                return False
+            self.put(face, None)
+        else:
+            far = self.corners(beside)
+            at = far.index(p)
+            chain = far[at:] + far[:at]
+            if c in far or any(v in self.neighbours(c) for v in chain[1:-1]):
+                return False
+            new = [(c, x, y) for x, y in pairwise(chain)]
+            if check and not self._all_face_alike(new, chain, c):
+                return False
+            self.put(face, None)
+            self.put(beside, new[0])
+            for triangle in new[1:]:
+                self.put(None, triangle, origin=beside)
+        for line in bent:
+            for i in range(len(line) - 1, 0, -1):
+                if {line[i - 1], line[i]} == {p, q}:
+                    line.insert(i, c)
+        return True
+
+    def fan_beside(self, face: int, side: int) -> bool:
+        """Take away the cap across this side of a face, narrow itself or almost, whose own longest edge is another one."""
+        ring = self.corners(face)
+        beside = self._across(face, ring[side], ring[(side + 1) % 3])
+        far = self.corners(beside) if beside is not None else ()
+        if beside is None or len(far) != 3 or not self.is_narrow(far, _SHORT):
+            return False
+        points = self.vertices[list(far)]
+        long = int(np.argmax(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)))
+        return not {far[long], far[(long + 1) % 3]} <= set(ring) and self.fan(beside, long)
+
+    def join_caps(self, face: int, side: int, around: float) -> bool:
+        """Take away two caps back to back, whose corners lie at almost the same place on their common longest edge."""
+        ring = self.corners(face)
+        p, q, c = ring[side], ring[(side + 1) % 3], ring[(side + 2) % 3]
+        beside = self._across(face, p, q)
+        if beside is None or len(self.corners(beside)) != 3:
+            return False
+        (d,) = set(self.corners(beside)) - {p, q}
+        if np.linalg.norm(self.vertices[c] - self.vertices[d]) > _SHORT * self.tolerance * around:
+            return False
+        before = copy.deepcopy((self.changed, self.origin, self._around, self.lines, self.touched, self.next_face))
+        if self.fan(face, side, check=False) and self.collapse(c, d, anywhere=True):
+            return True
+        self.changed, self.origin, self._around, self.lines, self.touched, self.next_face = before
+        return False
+
+    def _all_face_alike(self, new: Sequence[tuple[int, ...]], chain: tuple[int, ...], c: int) -> bool:
+        """Whether the triangles from c that take the place of the face `chain` have an area and face to its side.
+
+        Where that face is narrow itself or almost, they may be narrow too, if the edge that is given up, from the
+        first to the last of `chain`, is longer than the new ones: so this comes to an end, at a face that is not.
+        """
+        thin = self.is_narrow(chain, _SHORT)
+        if thin:
+            p = self.vertices[[c, *chain]]
+            if (np.linalg.norm(p[2:-1] - p[0], axis=1) >= np.linalg.norm(p[-1] - p[1])).any():
+                return False
+            around = [self.normal(self.corners(f)) for v in (c, *chain) for f in self.around(v)]
+            facing = np.sum(around, axis=0)
+        else:
+            facing = self.normal(chain)
+        return all(thin if self.is_narrow(t) else float(self.normal(t) @ facing) > 0 for t in new)
+
+    def _across(self, face: int, p: int, q: int) -> int | None:
+        """The face beside `face` at its side p-q."""
+        return next((f for f in self.around(p) & self.around(q) if f != face and self._has_edge(f, q, p)), None)
+
+    def _has_edge(self, face: int, a: int, b: int) -> bool:
+        ring = self.corners(face)
+        return ring[(ring.index(a) + 1) % len(ring)] == b
+
+    def result(self) -> tuple[IntArray, IntArray]:
+        """All faces in the order of the faces they come from, and those."""
+        total = self.next_face
+        faces = np.full((total, 4), -1, dtype=np.int32)
+        faces[: len(self.faces)] = self.faces
+        origin = np.arange(total, dtype=np.int32)
+        keep = np.ones(total, dtype=bool)
+        for face, ring in self.changed.items():
+            keep[face] = ring is not None
+            faces[face] = (*(ring or ()), *[-1] * (4 - len(ring or ())))
+            origin[face] = self.origin.get(face, face)
+        faces, origin = faces[keep], origin[keep]
+        order = np.argsort(origin, kind="stable")
+        return faces[order], origin[order]

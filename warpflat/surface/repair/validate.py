@@ -1,0 +1,427 @@
+"""The door: whatever comes in leaves as a checked :class:`Surface`, or not at all.
+
+The steps are in the order in which they can be told apart: numbers and indices, corners, split corners, double faces,
+the component, edges with too many faces, winding, points where the surface only touches itself, the border, slivers.
+What can be mended without a guess is mended and noted; the rest is refused with what to do about it. Vertices that stay
+keep their order and their exact position.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import checked_label, checked_name
+from warpflat.core.text import counted, shown
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.polygons import (
+    distinct_corners,
+    list_some,
+    padded_polygons,
+    split_non_convex_quads,
+    split_polygons,
+)
+from warpflat.surface.repair.slivers import merge_degenerate_faces
+from warpflat.surface.repair.weld import t_junction, welding
+from warpflat.surface.topology import (
+    border_loops,
+    components,
+    corner_fans,
+    euler_characteristic,
+    half_edges,
+    mesh_edges,
+    orient,
+)
+
+__all__ = ["checked_positions", "make_surface"]
+
+# Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
+_SMALLEST, _LARGEST = 1e-20, 1e20
+
+
+@dataclass
+class _Mesh:
+    """What is being mended: faces over the rows as they were read, until vertices are renumbered at the end."""
+
+    vertices: FloatArray
+    faces: IntArray
+    origin: IntArray
+    index: IntArray
+    notes: list[str] = field(default_factory=list)
+
+    def keep(self, which: BoolArray) -> None:
+        self.faces, self.origin = self.faces[which], self.origin[which]
+
+
+def make_surface(
+    vertices: ArrayLike,
+    polygons: ArrayLike | Sequence[Sequence[int]],
+    *,
+    name: str = "piece",
+    lines: Mapping[str, ArrayLike] | None = None,
+    component: int | Literal["largest"] | None = None,
+    weld: bool | None = None,
+    split_corners: bool = False,
+    sliver_tolerance: float = 1e-3,
+    source: str | None = None,
+) -> Surface:
+    """A surface that can be flattened, from any polygons.
+
+    Args:
+        vertices: #I by 3, positions [m].
+        polygons: #F by k vertex indices (counted from 0) filled up with -1 on the right, or a list of lists.
+        name: what the piece is called in files and messages; something that can name a file on any system.
+        lines: feature lines by name: vertex indices (of `vertices`) along edges.
+        component: which connected part to take if there are several: "largest", or its number, largest first from 0.
+        weld: whether vertices at the same place are one. By default they are if `split_corners` says that the format
+            splits them (unless that would close a piece that is one sheet as it stands), if faces hang together in no
+            other way, or if several parts become one sheet by it. A cut in one connected part thus stays open.
+        split_corners: the vertices come from a format that has one per corner of a face, or per texture coordinate.
+        sliver_tolerance: a face whose least width is below this share of the edge length around it is degenerate and
+            merged into its neighbours (see :mod:`warpflat.surface.repair.slivers`).
+        source: what messages call the input, such as a file's name; by default `name`.
+
+    Raises:
+        InputError: with one line, if the input is no surface or no such part of one, or the name cannot name a file.
+    """
+    checked_name(name)
+    try:
+        return _make(
+            vertices,
+            polygons,
+            name=name,
+            lines=lines or {},
+            component=component,
+            weld=weld,
+            split_corners=split_corners,
+            tolerance=sliver_tolerance,
+        )
+    except InputError as error:
+        raise InputError(f"{source or name}: {error}") from error
+
+
+def _make(
+    vertices: ArrayLike,
+    polygons: ArrayLike | Sequence[Sequence[int]],
+    *,
+    name: str,
+    lines: Mapping[str, ArrayLike],
+    component: int | Literal["largest"] | None,
+    weld: bool | None,
+    split_corners: bool,
+    tolerance: float,
+) -> Surface:
+    positions = checked_positions(vertices)
+    mesh = _checked_faces(positions, polygons)
+    paths = {key: _checked_line(key, line, len(positions)) for key, line in lines.items()}
+    place = _weld(mesh, weld, split_corners, component is not None)
+    _drop_double_faces(mesh)
+    _choose_component(mesh, component)
+    _refuse_crowded_edges(mesh)
+    mesh.faces, turned = orient(mesh.faces)
+    if turned:
+        mesh.notes.append(f"the winding of {counted(turned, 'face')} was turned to agree with the others")
+    _part_touching_fans(mesh)
+    _drop_unused(mesh)
+    kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
+    _check_border(mesh.faces)
+    return _finish(mesh, kept_lines, name, positions, tolerance)
+
+
+def checked_positions(vertices: ArrayLike) -> FloatArray:
+    """Vertices as #V by 3 numbers.
+
+    Raises:
+        InputError: of another shape, not finite, or out of all bounds; names the vertex.
+    """
+    try:
+        given = np.asarray(vertices)
+        if np.iscomplexobj(given):
+            raise TypeError("a place in space is of real numbers")
+        positions = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError) as error:
+        raise InputError("vertices must be numbers, #V by 3") from error
+    if positions.size == 0:
+        raise InputError("there are no vertices")
+    if positions.ndim != 2 or positions.shape[1] != 3:
+        raise InputError(f"vertices must be #V by 3, got an array of shape {positions.shape}")
+    bad = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if len(bad):
+        x, y, z = positions[bad[0]].tolist()
+        more = f" (and {len(bad) - 1:,} more like it)" if len(bad) > 1 else ""
+        raise InputError(
+            f"vertex {bad[0]} (counted from 0) is not finite: ({x:g}, {y:g}, {z:g}){more}; coordinates must be numbers"
+        )
+    far = int(np.argmax(np.abs(positions).max(axis=1)))
+    if np.abs(positions[far]).max() > _LARGEST:
+        x, y, z = positions[far].tolist()
+        raise InputError(
+            f"vertex {far} (counted from 0) lies at ({x:.3g}, {y:.3g}, {z:.3g}) m, too far to compute with; positions are in metres"
+        )
+    return positions
+
+
+def _checked_faces(positions: FloatArray, polygons: ArrayLike | Sequence[Sequence[int]]) -> _Mesh:
+    padded = padded_polygons(polygons)
+    real = padded >= 0
+    gaps = np.flatnonzero((~real[:, :3]).any(axis=1) | (np.diff(real.astype(np.int8), axis=1) > 0).any(axis=1))
+    gaps = np.union1d(gaps, np.flatnonzero((padded < -1).any(axis=1)))
+    if len(gaps):
+        raise InputError(f"face {gaps[0]} (counted from 0) has a negative vertex index or fewer than 3 corners")
+    outside = np.flatnonzero((padded >= len(positions)).any(axis=1))
+    if len(outside):
+        row = outside[0]
+        raise InputError(
+            f"face {row} (counted from 0) refers to vertex {padded[row].max()}, but there are {len(positions):,} "
+            f"vertices (0 to {len(positions) - 1})"
+        )
+    size = float(np.ptp(positions[padded[real]], axis=0).max())
+    if size < _SMALLEST:
+        raise InputError(f"all vertices of faces lie within {size:.3g} m of each other; positions are in metres")
+    notes: list[str] = []
+    distinct, keep, lost = distinct_corners(padded)
+    _note_repeated(notes, np.flatnonzero(~keep), np.flatnonzero(lost))
+    rows = np.flatnonzero(keep)
+    if len(rows) == 0:
+        raise InputError("every face has repeated vertices: nothing remains")
+    faces, of = split_polygons(positions, distinct[rows])
+    many = len(np.unique(of[np.flatnonzero(of[1:] == of[:-1])]))
+    if many:
+        notes.append(f"{counted(many, 'face')} of more than four corners cut into triangles")
+    index = np.arange(len(positions), dtype=np.int32)
+    return _Mesh(positions, faces, rows[of].astype(np.int32), index, notes)
+
+
+def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDArray[np.integer]) -> None:
+    if len(dropped):
+        notes.append(f"{counted(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
+    if len(reduced):
+        notes.append(f"{counted(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
+
+
+def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
+    checked_label(name, "lines")
+    path = np.asarray(line)
+    if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
+        raise InputError(f"line {shown(name)} must be a list of at least two vertex indices")
+    wrong = path[(path < 0) | (path >= size)]
+    if len(wrong):
+        raise InputError(f"line {shown(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
+    return path.astype(np.int64)
+
+
+def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> IntArray:
+    """Join vertices at the same place where that is asked for or plainly meant; the map that was applied."""
+    place, note = welding(mesh.vertices, mesh.faces, weld=weld, split_corners=split_corners, part_chosen=chosen)
+    if note:
+        mesh.notes.append(note)
+    if place is None:
+        return np.arange(len(mesh.vertices), dtype=np.int32)
+    distinct, keep, lost = distinct_corners(np.where(mesh.faces >= 0, place[mesh.faces], -1))
+    mesh.faces = distinct.astype(np.int32)
+    _note_repeated(mesh.notes, mesh.origin[~keep], mesh.origin[lost])
+    mesh.keep(keep)
+    if len(mesh.faces) == 0:
+        raise InputError("every face has repeated vertices once vertices at the same place are joined: nothing remains")
+    return place
+
+
+def _drop_double_faces(mesh: _Mesh) -> None:
+    key = np.sort(mesh.faces, axis=1)
+    _, first = np.unique(key, axis=0, return_index=True)
+    if len(first) == len(mesh.faces):
+        return
+    keep = np.zeros(len(mesh.faces), dtype=bool)
+    keep[first] = True
+    doubled = mesh.origin[~keep]
+    mesh.notes.append(f"{counted(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}")
+    mesh.keep(keep)
+
+
+def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -> None:
+    label = components(mesh.faces)
+    sizes = np.bincount(label)
+    rank = np.argsort(-sizes, kind="stable")
+    valid = f'component = "largest" or a number from 0 to {len(sizes) - 1}, largest first'
+    if component is None:
+        if len(sizes) > 1:
+            if (meeting := t_junction(mesh.vertices, mesh.faces, label)) is not None:
+                vertex, a, b = meeting
+                raise InputError(
+                    f"{len(sizes):,} components that share no edge, though they meet: vertices of one lie on edges of another (a "
+                    f"T-junction: vertex {vertex} on the edge between {a} and {b}, counted from 0); give both the same vertices there, or "
+                    f"choose one with {valid}"
+                )
+            raise InputError(
+                f"{len(sizes):,} components that share no edge, of {_sizes(sizes[rank])} faces; a piece is one: choose "
+                f"it with {valid}, or give each in a file of its own"
+            )
+        return
+    if component == "largest":
+        component = 0
+    if isinstance(component, bool) or not isinstance(component, (int, np.integer)) or not 0 <= component < len(sizes):
+        raise InputError(f"component {component!r} does not exist: {_sizes(sizes[rank])} faces; valid: {valid}")
+    if len(sizes) > 1:
+        keep = label == rank[component]
+        mesh.keep(keep)
+        mesh.notes.append(
+            f"component {component} of {len(sizes)} taken, {counted(int((~keep).sum()), 'face')} left out"
+        )
+
+
+def _sizes(sizes: NDArray[np.int64]) -> str:
+    shown = [f"{size:,}" for size in sizes[:6].tolist()]
+    if len(sizes) > 6:
+        return ", ".join(shown) + f", ... (and {len(sizes) - 6:,} smaller)"
+    return " and ".join([", ".join(shown[:-1]), shown[-1]]) if len(shown) > 1 else shown[0]
+
+
+def _refuse_crowded_edges(mesh: _Mesh) -> None:
+    he = half_edges(mesh.faces)
+    crowded = np.flatnonzero(he.count > 2)
+    if len(crowded) == 0:
+        return
+    a, b = he.edges[crowded[0]].tolist()
+    at = mesh.origin[he.face[he.edge == crowded[0]]]
+    more = f" ({counted(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
+    raise InputError(
+        f"the edge between vertices {a} and {b} is not manifold: {len(at)} faces meet there ({list_some(at)}; counted "
+        f"from 0){more}; cloth has at most two at an edge: delete the surplus faces or part the surface there"
+    )
+
+
+def _part_touching_fans(mesh: _Mesh) -> None:
+    """Give each fan of faces its own vertex where several touch in one point only."""
+    he = half_edges(mesh.faces)
+    fan = corner_fans(mesh.faces)
+    _, first = np.unique(fan, return_index=True)
+    vertex = he.tail[first]
+    order = np.lexsort((first, vertex))
+    again = np.zeros(len(first), dtype=bool)
+    again[order[1:]] = vertex[order[1:]] == vertex[order[:-1]]
+    if not again.any():
+        return
+    extra = np.flatnonzero(again)
+    new = np.full(len(first), -1, dtype=np.int64)
+    new[extra] = len(mesh.vertices) + np.arange(len(extra))
+    mesh.vertices = np.vstack([mesh.vertices, mesh.vertices[vertex[extra]]])
+    mesh.index = np.concatenate([mesh.index, mesh.index[vertex[extra]]])
+    of_corner = new[fan]
+    moved = of_corner >= 0
+    faces = mesh.faces.copy()
+    faces[he.face[moved], he.slot[moved]] = of_corner[moved]
+    mesh.faces = faces
+    names = list_some(np.unique(vertex[extra]))
+    mesh.notes.append(f"parts that touched only in a point were separated at vertices {names}")
+
+
+def _drop_unused(mesh: _Mesh) -> None:
+    used = np.unique(mesh.faces[mesh.faces >= 0])
+    unused = len(mesh.vertices) - len(used)
+    if unused == 0:
+        return
+    new = np.full(len(mesh.vertices) + 1, -1, dtype=np.int32)
+    new[used] = np.arange(len(used), dtype=np.int32)
+    mesh.faces = new[mesh.faces]
+    mesh.vertices, mesh.index = mesh.vertices[used], mesh.index[used]
+
+
+def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, list[int]]:
+    """Lines given in input rows, in the mesh's own vertices; one off the component is left out with a note."""
+    if not paths:
+        return {}
+    places: dict[int, list[int]] = {}
+    wanted = np.isin(mesh.index, np.concatenate(list(paths.values())))
+    for vertex in np.flatnonzero(wanted).tolist():
+        places.setdefault(int(mesh.index[vertex]), []).append(vertex)
+    edges = {tuple(edge) for edge in mesh_edges(mesh.faces).tolist()}
+    lines = {}
+    for name, path in paths.items():
+        rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
+        if not any(row in places for row in rows):
+            mesh.notes.append(f"line {shown(name)} does not lie on the piece and was left out")
+            continue
+        lines[name] = _trace_line(name, rows, places, edges)
+    return lines
+
+
+def _trace_line(
+    name: str, rows: list[int], places: dict[int, list[int]], edges: Iterable[tuple[int, ...]]
+) -> list[int]:
+    missing = [row for row in rows if row not in places]
+    if missing:
+        raise InputError(f"line {shown(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
+    line: list[int] = []
+    for i, row in enumerate(rows):
+        choice = places[row]
+        if i > 0:
+            choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in edges]
+            if not choice:
+                raise InputError(
+                    f"line {shown(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
+                )
+        elif len(choice) > 1 and len(rows) > 1:
+            follow = places[rows[1]]
+            choice = [v for v in choice if any((min(v, w), max(v, w)) in edges for w in follow)] or choice
+        line.append(choice[0])
+    return line
+
+
+def _check_border(faces: IntArray) -> None:
+    loops = border_loops(faces)
+    if not loops:
+        raise InputError(
+            "the surface is closed (it has no border): cut the mesh open along a line, its vertices doubled there, or give the part that "
+            "becomes one piece of cloth; [[cuts]] cut what is flat already"
+        )
+    handles = (2 - len(loops) - euler_characteristic(faces)) // 2
+    if handles:
+        raise InputError(
+            f"the surface has {counted(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+            "through there, or give a part without"
+        )
+
+
+def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: FloatArray, tolerance: float) -> Surface:
+    """Merge slivers, drop the vertices that this leaves over, and put the surface together."""
+    mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
+    if len(cut):
+        mesh.notes.append(
+            f"{counted(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
+        )
+    before = len(mesh.vertices)
+    faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.faces, lines, tolerance)
+    if len(left):
+        raise InputError(
+            f"{counted(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
+            f"merged without changing the piece: {list_some(np.unique(mesh.origin[left]))} (counted from 0); delete or "
+            "redraw them"
+        )
+    if len(merged):
+        names = list_some(np.unique(mesh.origin[merged]))
+        used = len(np.unique(faces[faces >= 0]))
+        mesh.notes.append(
+            f"{counted(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
+            f"neighbours, {before - used} of their vertices fell away: {names}"
+        )
+        mesh.faces, mesh.origin = faces, mesh.origin[of]
+        keep = np.unique(faces[faces >= 0])
+        new = np.full(before + 1, -1, dtype=np.int32)
+        new[keep] = np.arange(len(keep), dtype=np.int32)
+        lines = {key: new[line].tolist() for key, line in lines.items()}
+        mesh.faces, mesh.vertices, mesh.index = new[faces], mesh.vertices[keep], mesh.index[keep]
+    return Surface(
+        vertices=np.ascontiguousarray(mesh.vertices),
+        faces=np.ascontiguousarray(mesh.faces, dtype=np.int32),
+        lines={key: np.array(line, dtype=np.int32) for key, line in lines.items() if len(line) > 1},
+        name=name,
+        input_vertices=positions,
+        input_index=mesh.index.astype(np.int32),
+        notes=tuple(mesh.notes),
+    )
