@@ -1,0 +1,178 @@
+"""The rooms of the package: imports between them run one way, and none runs in a circle.
+
+Every import counts: at the top of a module, inside a function, for types alone, and by a dotted name in a table of lazy names.
+"""
+
+from __future__ import annotations
+
+import ast
+import os
+import subprocess
+import sys
+from graphlib import CycleError, TopologicalSorter
+from pathlib import Path
+
+import pytest
+
+import warpflat
+
+PACKAGE = Path(warpflat.__file__).parent
+ROOT = PACKAGE.parent
+KERNELS = ROOT / "kernels" if (ROOT / "kernels").is_dir() else PACKAGE / "kernels"
+
+#: Each room, and the rooms from which it may import. Kernels of the warpflat.kernels package import each other alone.
+ROOMS = {
+    "core": "kernels",
+    "surface": "core kernels",
+    "fabric": "core",
+    "model": "core surface fabric kernels",
+    "solver": "core surface fabric model kernels",
+    "pattern": "core surface",
+    "export": "core surface pattern kernels",
+    "flattening": "core surface fabric model solver export kernels",
+    "cutting": "core surface model solver export flattening",
+    "mannequin": "core surface export",
+    "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
+    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment scene",
+    "kernels": "",
+}
+
+
+def _modules() -> dict[str, Path]:
+    found = {}
+    for folder, name in ((PACKAGE, "warpflat"), (KERNELS, "warpflat.kernels")):
+        for path in folder.rglob("*.py"):
+            parts = path.relative_to(folder).with_suffix("").parts
+            found[".".join((name, *(part for part in parts if part != "__init__")))] = path
+    return found
+
+
+MODULES = _modules()
+
+
+def _imports(module: str) -> set[str]:
+    """The modules of the package that a module imports, wherever in its text."""
+    tree = ast.parse(MODULES[module].read_text(encoding="utf-8"))
+    found = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            found |= {alias.name for alias in node.names}
+        elif isinstance(node, ast.ImportFrom):
+            # Kernels import each other relatively, as they stand in a folder of their own.
+            source = "warpflat.kernels" + (f".{node.module}" if node.module else "") if node.level else str(node.module)
+            for alias in node.names:
+                below = f"{source}.{alias.name}"
+                found.add(below if below in MODULES else source)
+    return {name for name in found if name.split(".")[0] == "warpflat"}
+
+
+def _room(module: str) -> str:
+    parts = module.split(".")
+    return parts[1] if len(parts) > 1 else ""
+
+
+IMPORTS = {module: _imports(module) for module in MODULES}
+
+
+def test_every_module_lies_in_a_room() -> None:
+    loose = {module for module in MODULES if len(module.split(".")) == 2 and MODULES[module].stem != "__init__"}
+    assert loose == {"warpflat.__main__", "warpflat._version"}
+    assert {_room(module) for module in MODULES} == {*ROOMS, "", "__main__", "_version"}
+
+
+@pytest.mark.parametrize("room", list(ROOMS))
+def test_a_room_imports_from_rooms_below_it(room: str) -> None:
+    allowed = {room, "_version", *ROOMS[room].split()}
+    wrong = {
+        f"{module} imports {name}"
+        for module, names in IMPORTS.items()
+        if _room(module) == room
+        for name in names
+        if _room(name) not in allowed
+    }
+    assert wrong == set()
+
+
+def test_no_import_runs_in_a_circle() -> None:
+    inner = {
+        module: {name for name in names if name in MODULES} for module, names in IMPORTS.items() if module != "warpflat"
+    }
+    try:
+        TopologicalSorter(inner).prepare()
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_rooms_hold_no_second_path_to_a_name() -> None:
+    """The `__init__` of a room is its description, so that each name has one path."""
+    rooms = [path for path in PACKAGE.rglob("__init__.py") if path.parent not in (PACKAGE, KERNELS)]
+    filled = [str(path) for path in rooms if len(ast.parse(path.read_text(encoding="utf-8")).body) != 1]
+    assert filled == []
+    again = {
+        f"{module}: {name}"
+        for module, path in MODULES.items()
+        if module != "warpflat"
+        for name in _exported(path) - _defined(path)
+    }
+    assert again == set()
+
+
+def test_no_module_imports_a_private_name_of_another() -> None:
+    private = {
+        f"{module} imports {node.module}.{alias.name}"
+        for module, path in MODULES.items()
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+        if isinstance(node, ast.ImportFrom) and str(node.module).startswith("warpflat")
+        for alias in node.names
+        if alias.name.startswith("_") and not alias.name.startswith("__") and alias.name != "_version"
+    }
+    assert private == set()
+
+
+def test_tests_lie_in_the_room_of_what_they_test() -> None:
+    here = Path(__file__).parent
+    folders = {path.parent.relative_to(here).parts[0] for path in here.rglob("test_*.py") if path.parent != here}
+    assert folders <= {*ROOMS, "fuzz"}
+    assert {path.name for path in here.glob("test_*.py")} == {Path(__file__).name}
+
+
+def test_a_checkout_holds_one_package() -> None:
+    """A second copy of the package below itself would have classes of its own."""
+    with pytest.raises(ModuleNotFoundError):
+        __import__("warpflat.warpflat")
+    with pytest.raises(ModuleNotFoundError):
+        __import__("warpflat.tests")
+
+
+def test_the_package_shows_what_users_need() -> None:
+    assert dir(warpflat) == sorted(warpflat.__all__)
+    for name in warpflat.__all__:
+        assert getattr(warpflat, name).__doc__, name
+    with pytest.raises(AttributeError, match="no_such_name"):
+        _ = warpflat.no_such_name  # type: ignore[attr-defined]
+
+
+def test_importing_the_package_loads_none_of_its_rooms() -> None:
+    code = "import sys, warpflat; print(*(m for m in sys.modules if m.startswith('warpflat.')))"
+    found = {**os.environ, "PYTHONPATH": str(ROOT)}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=found)
+    assert set(done.stdout.split()) <= {"warpflat._version", "warpflat.kernels"}
+
+
+def _exported(path: Path) -> set[str]:
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.Assign) and isinstance(node.targets[0], ast.Name) and node.targets[0].id == "__all__":
+            return set(ast.literal_eval(node.value))
+    return set()
+
+
+def _defined(path: Path) -> set[str]:
+    found = set()
+    for node in ast.parse(path.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef):
+            found.add(node.name)
+        elif isinstance(node, ast.Assign | ast.AnnAssign):
+            targets = node.targets if isinstance(node, ast.Assign) else [node.target]
+            found |= {name.id for target in targets for name in ast.walk(target) if isinstance(name, ast.Name)}
+    return found
