@@ -19,7 +19,7 @@ def test_what_is_freed_goes_back() -> None:
     keep = [*pages[:: len(pages) // 20], pages[-1]]
     before = int(STATUS.read_text().split()[1])
     del pages
-    heap.give_back()
+    heap.return_freed_memory()
     after = int(STATUS.read_text().split()[1])
     assert all(page.all() for page in keep)
     assert (before - after) * 4096 > 80e6
@@ -30,6 +30,6 @@ def test_elsewhere_nothing_is_done(monkeypatch: pytest.MonkeyPatch) -> None:
     heap._trim.cache_clear()
     try:
         assert heap._trim() is None
-        heap.give_back()
+        heap.return_freed_memory()
     finally:
         heap._trim.cache_clear()

@@ -10,7 +10,7 @@ import pytest
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.core.manifest import settle
+from warpflat.core.manifest import remove_stale
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.pattern_files import export_pattern
 from warpflat.scene.load import make_scene
@@ -152,7 +152,7 @@ def test_a_record_that_names_other_places_is_not_followed(tmp_path: Path, name: 
     (out / "folder").mkdir(parents=True)
     (out / "folder" / "user.txt").write_text("")
     (out / "metrics.json").write_text(json.dumps({"warpflat": "0.1.0", "files": {"cap": {name: empty}}}))
-    _, notes = settle(out, {}, name="cap", files=())
+    _, notes = remove_stale(out, {}, name="cap", files=())
     assert notes == ()
     assert all(path.exists() for path in (user, out / "folder" / "user.txt", out / "metrics.json"))
 

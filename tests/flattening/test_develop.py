@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
-from warpflat.flattening.datum import choose_datum, chosen_datum
+from warpflat.flattening.datum import choose_and_name_datum, choose_datum
 from warpflat.flattening.develop import _winds_twice, develop, flat_layout, geodesic_layout, profile_layout
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.surface.cells import cells_of
@@ -436,7 +436,7 @@ def test_a_piece_about_as_wide_as_long_that_lies_askew_keeps_to_its_nearer_axis(
     i = np.arange(x.size).reshape(x.shape)
     quads = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
     surface = make_surface(points, quads)
-    line, said = chosen_datum(surface)
+    line, said = choose_and_name_datum(surface)
     assert said == told
     assert leaning(surface, line, along) == pytest.approx(leans, abs=2.5)
 

@@ -23,7 +23,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.model.wear import Wear
 from warpflat.solver.multigrid.cycle import Levels
-from warpflat.solver.multigrid.solve import _Cycles, _Pace, levels_pay, relax_multilevel
+from warpflat.solver.multigrid.solve import _Cycles, _Pace, multigrid_pays, relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
 from warpflat.surface.cells import cells_of
 from warpflat.surface.mesh import Surface
@@ -108,7 +108,7 @@ def test_pieces_of_unlike_sizes_and_meshes():
 def test_pieces_for_which_levels_do_not_pay():
     pieces = [shape("dome", 17, triangles=True), shape("bodice", 15, triangles=True), shape("bodice", 17)]
     batch = check(pieces, fabric="woven")
-    assert [levels_pay(piece.network) for piece in batch] == [False, False, True]
+    assert [multigrid_pays(piece.network) for piece in batch] == [False, False, True]
 
 
 def test_plain_steps():

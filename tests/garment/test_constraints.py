@@ -15,7 +15,7 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.sewing import Sewn, sew
-from warpflat.model.constraint_equations import smooth_ties
+from warpflat.model.constraint_equations import smooth_equations
 from warpflat.solver.relax import Relaxation, RelaxOptions
 from warpflat.surface.shapes import make_shape
 
@@ -158,7 +158,7 @@ def test_another_solver_finds_the_same_least_energy(along: Literal["free", "warp
     stated = FixedLength(piece="bodice", line="top", length=float(wanted.sum()))
     made = sewn(piece, stated, Straight(piece="bodice", line="left", along=along), options=FINE)
 
-    network, smooth = replace(piece.network), smooth_ties(top, piece.positions)
+    network, smooth = replace(piece.network), smooth_equations(top, piece.positions)
     hold = smooth.soft * max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
     network.sew(smooth.ends, smooth.ratio, hold, kind=smooth.kind, target=smooth.target)
 
@@ -169,7 +169,7 @@ def test_another_solver_finds_the_same_least_energy(along: Literal["free", "warp
 
     def energy(x: NDArray[np.float64]) -> tuple[float, NDArray[np.float64]]:
         state = Relaxation(network, FINE, start=x.reshape(-1, 2))
-        stored = 0.5 * hold @ (smooth_ties(top, x.reshape(-1, 2)).target - smooth.target) ** 2
+        stored = 0.5 * hold @ (smooth_equations(top, x.reshape(-1, 2)).target - smooth.target) ** 2
         return 1e3 * (state.energies().potential + stored), -1e3 * state.forces().ravel()
 
     def amiss(x: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -8,7 +8,7 @@ import warp as wp
 from devices import DEVICE
 from warpflat.kernels.sums import add_share, dot_blocks, least_of_blocks, subtract, sum_blocks
 
-from warpflat.core.device_sums import FarSums
+from warpflat.core.device_sums import DeviceSums
 from warpflat.core.launch import launch_each
 
 BEGIN = np.array([0, 3, 4, 10], dtype=np.int32)
@@ -50,7 +50,7 @@ def test_sums_of_ranges_of_any_length(counts: list[int]):
     rng = np.random.default_rng(3)
     begin = np.concatenate([[0], np.cumsum(counts)[:-1]])
     values, a, b = rng.normal(size=sum(counts)), *rng.normal(size=(2, sum(counts), 2))
-    sums, far, one, other = FarSums(counts, wp.get_device(DEVICE)), double(values), vec2(a), vec2(b)
+    sums, far, one, other = DeviceSums(counts, wp.get_device(DEVICE)), double(values), vec2(a), vec2(b)
     dots = np.add.reduceat((a * b).sum(axis=1), begin)
     for _ in range(4):  # recorded, and later a graph
         np.testing.assert_allclose(sums.sums(far), np.add.reduceat(values, begin), rtol=1e-11)

@@ -20,7 +20,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
 from warpflat.scene.load import load_scene
 from warpflat.scene.surface import scene_surface
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -84,7 +84,9 @@ def test_the_pattern_does_not_depend_on_the_start():
     start = first.development.positions @ np.array([[1.2, 0.0], [0.15, 0.85]])
     network = SpringNetwork.build(surface, fabric, start, model="membrane", device=DEVICE)
     datum = surface.lines["centre"]
-    state = Relaxation(network, options, start=start, upright=[Upright(lower=int(datum[0]), upper=int(datum[-1]))])
+    state = Relaxation(
+        network, options, start=start, upright=[GrainAlignment(lower=int(datum[0]), upper=int(datum[-1]))]
+    )
     assert relax(state).converged
     assert apart(first.positions, state.positions()).max() < 1.5e-3
 

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from warpflat.solver.convergence import Mark
-from warpflat.solver.multigrid.acceleration import CycleMemory
+from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
 
 FloatArray = NDArray[np.float64]
 
@@ -33,7 +33,7 @@ class Bowl:
 def test_the_energy_is_least_where_the_parts_of_a_cycle_say(seed: int) -> None:
     bowl, rng = Bowl(seed), np.random.default_rng(10 + seed)
     ways, place = rng.normal(size=(3, 12)), np.zeros(12)
-    memory = CycleMemory()
+    memory = SubspaceAcceleration()
     memory.begin(bowl.mark(place))
     for way in ways:
         place = place + way
@@ -46,7 +46,7 @@ def test_the_energy_is_least_where_the_parts_of_a_cycle_say(seed: int) -> None:
 @pytest.mark.parametrize("depth", [1, 2])
 def test_cycles_before_count_as_one_way_each_and_older_ones_are_forgotten(depth: int) -> None:
     bowl, rng = Bowl(7), np.random.default_rng(8)
-    memory, place, cycles = CycleMemory(depth), np.zeros(12), []
+    memory, place, cycles = SubspaceAcceleration(depth), np.zeros(12), []
     for _ in range(4):
         begin = place
         memory.begin(bowl.mark(place))
@@ -65,7 +65,7 @@ def test_cycles_before_count_as_one_way_each_and_older_ones_are_forgotten(depth:
 
 def test_marks_are_copied_and_a_way_that_leads_nowhere_tells_nothing() -> None:
     bowl = Bowl(3)
-    memory, mark = CycleMemory(), bowl.mark(np.zeros(12))
+    memory, mark = SubspaceAcceleration(), bowl.mark(np.zeros(12))
     memory.begin(mark)
     memory.come_to(mark)
     assert not memory.lowest(np.empty((6, 2)))

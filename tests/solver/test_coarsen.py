@@ -21,12 +21,12 @@ from warpflat.solver.multigrid.coarsen import (
     coarser,
     coarser_surfaces,
     has_coarser,
+    hierarchy_in_background,
     inherit_levels,
     is_coarsest,
-    levels_meanwhile,
-    spread_surface,
+    resampled_surface,
 )
-from warpflat.solver.multigrid.grid_coarsening import SpreadKind
+from warpflat.solver.multigrid.grid_coarsening import ResamplingKind
 from warpflat.surface.cells import cells_of
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import rows_and_columns
@@ -45,7 +45,7 @@ from warpflat.surface.untangle import signed_cell_areas
 
 FloatArray = NDArray[np.float64]
 
-KINDS: tuple[SpreadKind, ...] = ("fine", "halves", "thirds")
+KINDS: tuple[ResamplingKind, ...] = ("fine", "halves", "thirds")
 
 
 def sheet(columns: int, rows: int, *, triangles: bool = False) -> Surface:
@@ -238,7 +238,7 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     """Its rows and columns are as many for its size as those of the large one, each face lies where one of the large grid's does, and
     all can be halved."""
     surface = sheet(columns, rows)
-    found = spread_surface(surface, "fine")
+    found = resampled_surface(surface, "fine")
     assert found is not None
     small, carry, face_of = found
     grid = rows_and_columns(small)
@@ -249,7 +249,7 @@ def test_a_small_grid_is_spread_over_a_large_one(columns: int, rows: int, expect
     assert (there.min(axis=1) - 1e-9 <= middle).all()
     assert (middle <= there.max(axis=1) + 1e-9).all()
     np.testing.assert_allclose(carry(flat(small)), flat(surface), atol=1e-9)
-    assert spread_surface(surface, "fine") is found
+    assert resampled_surface(surface, "fine") is found
 
 
 @pytest.mark.parametrize(
@@ -268,7 +268,7 @@ def test_stiff_cloth_has_a_coarser_one():
     surface = sheet(101, 101)
     sizes = []
     for kind in KINDS:
-        found = spread_surface(surface, kind)
+        found = resampled_surface(surface, kind)
         assert found is not None
         sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarser_surfaces(found[0]))])
     assert sizes == [[57**2, 29**2, 15**2, 8**2], [49**2, 25**2, 13**2, 7**2], [49**2, 17**2, 9**2]]
@@ -278,7 +278,7 @@ def test_stiff_cloth_has_a_coarser_one():
 def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape: tuple[int, int]):
     """All of them where a small grid has as many as it likes; every second one where a large grid has too few rows, or long quads."""
     surface = sheet(*shape)
-    found = spread_surface(surface, "thirds")
+    found = resampled_surface(surface, "thirds")
     assert found is not None
     step = coarser_surfaces(found[0])[0]
     fine, coarse = (rows_and_columns(of) for of in (found[0], step.surface))
@@ -325,8 +325,8 @@ def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
 
 def test_no_small_grid_is_spread_over_what_has_few_rows_or_none():
     for kind in KINDS:
-        assert spread_surface(sheet(2_000, 4), kind) is None
-        assert spread_surface(sheet(21, 21, triangles=True), kind) is None
+        assert resampled_surface(sheet(2_000, 4), kind) is None
+        assert resampled_surface(sheet(21, 21, triangles=True), kind) is None
 
 
 @pytest.mark.parametrize("triangles", [False, True], ids=["quads", "triangles"])
@@ -455,24 +455,24 @@ def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
         _prepare_levels(surface)
 
     monkeypatch.setattr("warpflat.solver.multigrid.coarsen._prepare_levels", prepare)
-    with levels_meanwhile(pieces[0]):
+    with hierarchy_in_background(pieces[0]):
         pass
     # A grid's are not needed so soon.
-    with levels_meanwhile(sheet(80, 70)):
+    with hierarchy_in_background(sheet(80, 70)):
         pass
     assert len(threads) == 1
     assert threads[0] is not threading.current_thread()
     for apart, here in zip(coarser_surfaces(pieces[0]), coarser_surfaces(pieces[1]), strict=True):
         np.testing.assert_array_equal(apart.kept, here.kept)
         np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
-    with pytest.raises(ZeroDivisionError), levels_meanwhile(sheet(80, 70, triangles=True)):
+    with pytest.raises(ZeroDivisionError), hierarchy_in_background(sheet(80, 70, triangles=True)):
         _ = 1 / 0
 
 
 def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkeypatch: pytest.MonkeyPatch):
     piece = sheet(80, 70, triangles=True)
     monkeypatch.setenv("WARPFLAT_THREADS", "2")
-    with levels_meanwhile(piece):
+    with hierarchy_in_background(piece):
         pass
     for made_once in ("cells.lay_cells", "springs.measure_edges"):
         monkeypatch.setattr(f"warpflat.{made_once}", None)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.solver.multigrid.cubic_interpolation import GridCarry, cubics_between, places_of_rows
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, cubic_interpolation_between, places_of_rows
 
 
 def every_second(count: int) -> np.ndarray:
@@ -18,8 +18,8 @@ def in_space(across: np.ndarray, up: np.ndarray) -> np.ndarray:
     return np.stack([u, v, np.zeros_like(u)], axis=-1)
 
 
-def grid_carry(vertices: np.ndarray, grid: np.ndarray, lines: tuple[np.ndarray, np.ndarray]) -> GridCarry:
-    return GridCarry(grid, [places_of_rows(vertices, of) for of in (grid, grid.T)], lines)
+def grid_carry(vertices: np.ndarray, grid: np.ndarray, lines: tuple[np.ndarray, np.ndarray]) -> GridProlongation:
+    return GridProlongation(grid, [places_of_rows(vertices, of) for of in (grid, grid.T)], lines)
 
 
 @pytest.mark.parametrize("even", [True, False], ids=["even", "uneven"])
@@ -30,14 +30,14 @@ def test_cubics_are_kept(count: int, even: bool) -> None:
     steps = np.ones(count - 1) if even else np.random.default_rng(count).uniform(0.5, 2.0, count - 1)
     place = np.append(0.0, np.cumsum(steps)) / count
     values = np.polynomial.polynomial.polyval(place, [0.3, -1.0, 2.0, 1.5][: degree + 1])
-    carried = cubics_between(place[keep], place)(values[keep])
+    carried = cubic_interpolation_between(place[keep], place)(values[keep])
     np.testing.assert_allclose(carried, values, atol=1e-12)
 
 
 def test_kept_values_stay_what_they_are() -> None:
     keep = every_second(12)
     values = np.random.default_rng(1).normal(size=len(keep))
-    assert np.array_equal(cubics_between(1.0 * keep, np.arange(12.0))(values)[keep], values)
+    assert np.array_equal(cubic_interpolation_between(1.0 * keep, np.arange(12.0))(values)[keep], values)
 
 
 @pytest.mark.parametrize("count", [(17, 33, 65), (16, 32, 64)])

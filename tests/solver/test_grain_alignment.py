@@ -5,29 +5,31 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.solver.grain_alignment import Upright, hold_upright, take_out_turning
+from warpflat.solver.grain_alignment import GrainAlignment, hold_grain, remove_rotation
 
 
-def two_pieces() -> tuple[list[Upright], dict[str, np.ndarray]]:
+def two_pieces() -> tuple[list[GrainAlignment], dict[str, np.ndarray]]:
     rng = np.random.default_rng(2)
     arrays = {name: rng.normal(size=(11, 2)) for name in ("position", "velocity", "force")}
     pieces = [
-        Upright(lower=1, upper=4, vertices=slice(0, 6)),
-        Upright(lower=9, upper=7, vertices=slice(6, 11)),
+        GrainAlignment(lower=1, upper=4, vertices=slice(0, 6)),
+        GrainAlignment(lower=9, upper=7, vertices=slice(6, 11)),
     ]
     return pieces, arrays | {"weight": rng.uniform(0.5, 2.0, 11)}
 
 
-def held(pieces: list[Upright], given: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def held(pieces: list[GrainAlignment], given: dict[str, np.ndarray]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Position, velocity and load, with a load before that is not part of the force of the cloth."""
     position, velocity, load = given["position"].copy(), given["velocity"].copy(), np.full((11, 2), 0.3)
-    hold_upright(pieces, position, velocity, load, given["force"] + load, given["weight"])
+    hold_grain(pieces, position, velocity, load, given["force"] + load, given["weight"])
     return position, velocity, load
 
 
-def without_turning(pieces: list[Upright], position: np.ndarray, force: np.ndarray, weight: np.ndarray) -> np.ndarray:
+def without_turning(
+    pieces: list[GrainAlignment], position: np.ndarray, force: np.ndarray, weight: np.ndarray
+) -> np.ndarray:
     left = force.copy()
-    take_out_turning(pieces, position, left, weight)
+    remove_rotation(pieces, position, left, weight)
     return left
 
 

@@ -20,8 +20,8 @@ from warpflat.model import network
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import Upright
-from warpflat.solver.multigrid.cascade import carry_up
+from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.multigrid.cascade import cascade_up
 from warpflat.solver.multigrid.cycle import Levels
 from warpflat.solver.multigrid.solve import relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
@@ -72,7 +72,7 @@ def both(surface: Surface, shear: float, **options: object) -> tuple[Flattening,
         relax=replace(PLAIN, residual_tolerance=1e-3),
         **options,
     )
-    ends = Upright(lower=int(plain.datum[0]), upper=int(plain.datum[-1]))
+    ends = GrainAlignment(lower=int(plain.datum[0]), upper=int(plain.datum[-1]))
     state = Relaxation(plain.network, LEVELS, start=plain.development.positions, upright=[ends])
     return plain, state, relax_multilevel(state)
 
@@ -221,7 +221,7 @@ def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousa
 
 def start_of(piece: Flattening) -> Relaxation:
     """Its relaxation, before the first step."""
-    ends = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    ends = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
     state = Relaxation(piece.network, LEVELS, start=piece.development.positions, upright=[ends])
     state.begin()
     return state
@@ -233,7 +233,7 @@ def test_a_large_grid_is_relaxed_as_soon_as_a_small_one_is(shape: str, most: flo
     """What cubics leave is a few hundredths of a per cent of the energy at most, whether rows and columns can be halved or not."""
     done = flatten(make_shape(shape, resolution=side), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
-    assert carry_up(state) is not None
+    assert cascade_up(state) is not None
     assert state.last.potential[0] < (1.0 + most) * minimum(done)
     assert state.work_units < 24.0 * (72 / side) ** 2
 
@@ -242,9 +242,9 @@ def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
     """Beside a crack a coarser level is one that cycles use; of that in between no network is made."""
     done = flatten(cracked(101, column=34), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
-    below = carry_up(state)
+    below = cascade_up(state)
     assert below is not None
-    sizes = [rung.network.vertex_count for rung in below.rungs.values()]
+    sizes = [rung.network.vertex_count for rung in below.coarse_levels.values()]
     assert 2_500 < max(sizes) < 5_000
     levels = Levels(state, below=below)
     assert levels.sizes == [done.network.vertex_count, *below.sizes]
@@ -254,17 +254,17 @@ def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
 def test_small_grids_and_triangles_rise_level_by_level():
     for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
         state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE))
-        assert carry_up(state) is None
+        assert cascade_up(state) is None
 
 
 def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
     """Where it is relaxed already, all that could be carried up lies higher."""
     done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device=DEVICE)
-    ends = Upright(lower=int(done.datum[0]), upper=int(done.datum[-1]))
+    ends = GrainAlignment(lower=int(done.datum[0]), upper=int(done.datum[-1]))
     state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
     before, load = state.begin(), np.random.default_rng(0).normal(size=done.positions.shape)
     state.load.assign(load)
-    assert carry_up(state) is None
+    assert cascade_up(state) is None
     np.testing.assert_array_equal(state.positions(), done.positions)
     np.testing.assert_array_equal(state.load.numpy(), load)
     np.testing.assert_array_equal(state.velocity.numpy(), 0.0)

@@ -12,20 +12,20 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.grain_alignment import Upright
-from warpflat.solver.multigrid.acceleration import CycleMemory
-from warpflat.solver.piece_sums_cpu import NearPieces
-from warpflat.solver.piece_sums_cuda import FarPieces
+from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
+from warpflat.solver.piece_sums_cpu import HostPieceSums
+from warpflat.solver.piece_sums_cuda import DevicePieceSums
 from warpflat.solver.relax import Relaxation, RelaxOptions
-from warpflat.solver.steps_cuda import FarSteps
+from warpflat.solver.steps_cuda import DeviceSteps
 from warpflat.surface.shapes import make_shape
 
 CLOTH = Fabric(name="cloth", stiffness_warp=900.0, stiffness_weft=700.0, shear_stiffness=90.0, areal_density=0.15)
 
 
-def far_pieces_of(state: Relaxation) -> tuple[FarPieces, FarSteps]:
-    pieces = FarPieces(state.network, state._buffers)
-    return pieces, FarSteps(state._buffers, pieces, damped=state.options.kinetic_damping)
+def far_pieces_of(state: Relaxation) -> tuple[DevicePieceSums, DeviceSteps]:
+    pieces = DevicePieceSums(state.network, state._buffers)
+    return pieces, DeviceSteps(state._buffers, pieces, damped=state.options.kinetic_damping)
 
 
 @pytest.fixture
@@ -42,7 +42,9 @@ def state_of(sizes: list[int], held: list[int], device: str = DEVICE) -> Relaxat
         starts.append(1.05 * flat + rng.normal(scale=1e-5, size=flat.shape))
         parts.append(SpringNetwork.build(surface, CLOTH, starts[-1], device=device))
         column = surface.lines["centre"] + first
-        upright.append(Upright(lower=int(column[0]), upper=int(column[-1]), vertices=slice(first, first + len(flat))))
+        upright.append(
+            GrainAlignment(lower=int(column[0]), upper=int(column[-1]), vertices=slice(first, first + len(flat)))
+        )
         first += len(flat)
     start = np.concatenate(starts)
     turn = np.exp(0.3j)
@@ -57,7 +59,7 @@ def state_of(sizes: list[int], held: list[int], device: str = DEVICE) -> Relaxat
 @pytest.mark.parametrize(("sizes", "held"), [([9], [0]), ([9, 17, 11], [0, 2]), ([9, 11], [])])
 def test_what_is_looked_at(sizes: list[int], held: list[int]):
     one, other = state_of(sizes, held, "cpu"), state_of(sizes, held)
-    near, far = NearPieces(one.network, one._buffers), FarPieces(other.network, other._buffers)
+    near, far = HostPieceSums(one.network, one._buffers), DevicePieceSums(other.network, other._buffers)
     assert near.vertices == far.vertices
     for pieces, state in ((near, one), (far, other)):
         state._buffers.measure.launch()
@@ -65,7 +67,7 @@ def test_what_is_looked_at(sizes: list[int], held: list[int]):
         state.looks += [pieces.strongest(state.upright), pieces.cloth_force()]
         state._buffers.measure_motion.launch()
         state.looks.append(pieces.of_vertices())
-        pieces.hold_upright(state.upright)
+        pieces.hold_grain(state.upright)
         state.looks += [state.position.numpy(), state.velocity.numpy(), state.load.numpy()]
         state.looks.append(pieces.damp() + pieces.stopped())
         state.looks += [state.velocity.numpy(), state._buffers.driving_force.numpy(), pieces.stopped()]
@@ -78,11 +80,11 @@ def test_pieces_of_one_network_are_held_each():
     one, other = state_of([9, 17, 11], [0, 2], "cpu"), state_of([9, 17, 11], [0, 2])
     for state in (one, other):
         state.network.parts = ()
-    near, far = NearPieces(one.network, one._buffers), FarPieces(other.network, other._buffers)
+    near, far = HostPieceSums(one.network, one._buffers), DevicePieceSums(other.network, other._buffers)
     assert near.vertices == far.vertices == [slice(0, one.network.vertex_count)]
     np.testing.assert_allclose(far.strongest(other.upright), near.strongest(one.upright), rtol=1e-10)
-    near.hold_upright(one.upright)
-    far.hold_upright(other.upright)
+    near.hold_grain(one.upright)
+    far.hold_grain(other.upright)
     for name in ("position", "velocity", "load"):
         wished, got = (getattr(state, name).numpy() for state in (one, other))
         np.testing.assert_allclose(got, wished, rtol=1e-10, atol=1e-13)
@@ -94,7 +96,7 @@ def test_a_mirrored_cell_is_seen():
     layout[100], layout[150] = layout[150], layout[100]
     state.position.assign(layout)
     state._buffers.evaluate.launch()
-    assert FarPieces(state.network, state._buffers).mirrored().tolist() == [False, True]
+    assert DevicePieceSums(state.network, state._buffers).mirrored().tolist() == [False, True]
 
 
 @pytest.mark.parametrize("steps", [1, 3, 70])
@@ -120,7 +122,7 @@ def test_cycles_are_remembered_alike():
     stiffness = np.diag(rng.uniform(1.0, 5.0, 80))
     places = [rng.normal(size=(40, 2)) for _ in range(6)]
     forces = [-(stiffness @ place.ravel()).reshape(40, 2) for place in places]
-    near, far = CycleMemory(), CycleMemory()
+    near, far = SubspaceAcceleration(), SubspaceAcceleration()
     told = np.zeros((40, 2)), wp.zeros(40, dtype=wp.vec2d, device=DEVICE)
     for memory, give, room in (
         (near, np.array, told[0]),
@@ -147,7 +149,7 @@ def test_pieces_come_to_the_same_rest(shape: str, triangles: bool, fabric: str, 
     given = {"fabric": find_fabric(fabric), "datum": "centre", "relax": RelaxOptions(solver=solver)}
     piece = flatten(surface, device=DEVICE, **given)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(Relaxation, "_pieces_of", lambda state: (NearPieces(state.network, state._buffers), None))
+        patch.setattr(Relaxation, "_pieces_of", lambda state: (HostPieceSums(state.network, state._buffers), None))
         wished = flatten(surface, device="cpu", **given)
     assert piece.converged
     assert piece.flipped_faces == 0

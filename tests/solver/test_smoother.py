@@ -9,7 +9,7 @@ from devices import DEVICE
 from warpflat.fabric.library import as_fabric
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
-from warpflat.solver.smoother import pace_of
+from warpflat.solver.smoother import smoother_coefficients
 from warpflat.surface.shapes import make_shape
 
 
@@ -18,7 +18,7 @@ def test_what_is_left_is_the_chebyshev_polynomial_of_the_fourth_kind(steps: int)
     eigenvalue = np.linspace(1e-3, 1.0, 500)
     way, left = np.zeros_like(eigenvalue), np.ones_like(eigenvalue)
     for number in range(steps):
-        viscosity, carried, push = pace_of(number)
+        viscosity, carried, push = smoother_coefficients(number)
         assert viscosity == 0.0
         way = carried * way - push * eigenvalue * left
         left = left + way

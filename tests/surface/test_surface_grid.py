@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
 from warpflat.solver.multigrid.coarsen import coarser, coarser_surfaces
-from warpflat.solver.multigrid.cubic_interpolation import LatticeCarry
+from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface
@@ -166,7 +166,7 @@ def test_cubics_are_carried_up_whole(name: str) -> None:
     fine = PIECES[name]
     step = coarser(fine)
     assert step is not None
-    assert isinstance(step.smooth_carry, LatticeCarry)
+    assert isinstance(step.smooth_carry, LatticeProlongation)
     x, y = 10.0 * fine.vertices[:, 0], 10.0 * fine.vertices[:, 1]
     layout = np.column_stack([x**3 - x * y + 0.5, x * x * y**2 - y**3 + x])
     lattice = lattice_of(fine)

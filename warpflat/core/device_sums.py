@@ -13,14 +13,14 @@ from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import begins
 from warpflat.kernels.sums import dot_blocks, least_of_blocks, sum_blocks
 
-__all__ = ["FarSums"]
+__all__ = ["DeviceSums"]
 
 
 # So many values one thread goes through.
 _BLOCK = 64
 
 
-class FarSums:
+class DeviceSums:
     """Sums, least values and scalar products of each of several ranges, one after the other, of arrays on a device.
 
     Attributes:

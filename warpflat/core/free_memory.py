@@ -7,10 +7,10 @@ import sys
 from collections.abc import Callable
 from functools import cache
 
-__all__ = ["give_back"]
+__all__ = ["return_freed_memory"]
 
 
-def give_back() -> None:
+def return_freed_memory() -> None:
     """Let the C library return what was freed; where it is not glibc's, nothing is done.
 
     Each thread has a heap of its own, whose holes no other fills: after a development beside its coarser levels a tenth to a fifth of

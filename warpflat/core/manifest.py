@@ -16,7 +16,7 @@ from warpflat.core.atomic_files import current, is_input, remove_file
 from warpflat.core.errors import InputError
 from warpflat.core.json_file import write_json
 
-__all__ = ["note_file", "require_own_metrics", "settle", "write_metrics"]
+__all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics"]
 
 Record = dict[str, dict[str, str]]
 
@@ -34,7 +34,7 @@ def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
     write_json(folder / "metrics.json", {**metrics, **({"files": record} if record else {})})
 
 
-def settle(
+def remove_stale(
     folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
     """Write `metrics.json` at the end of a run, and remove what earlier ones have left and would be taken for its own.
@@ -79,7 +79,7 @@ def settle(
     return told, tuple(notes)
 
 
-def note_file(folder: Path, name: str, file: str) -> None:
+def record_file(folder: Path, name: str, file: str) -> None:
     """Add a file, written again or later, to those of a run that `metrics.json` knows; without such a run do nothing.
 
     Raises:

@@ -20,7 +20,7 @@ from warpflat.surface.topology import (
 if TYPE_CHECKING:
     pass
 
-__all__ = ["choose_datum", "chosen_datum", "datum_extent"]
+__all__ = ["choose_and_name_datum", "choose_datum", "datum_extent"]
 
 # A datum that climbs by less than this share of its length is as level as its plane.
 _LEVEL = 1e-6
@@ -50,10 +50,10 @@ def choose_datum(surface: Surface) -> IntArray:
     the mean normal, or a parallel one beside it whose line has its ends far more level. Of a band that this cuts crosswise,
     since it curls, the line runs through the middle from end to end instead.
     """
-    return chosen_datum(surface)[0]
+    return choose_and_name_datum(surface)[0]
 
 
-def chosen_datum(surface: Surface) -> tuple[IntArray, str]:
+def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
     """`choose_datum`, and in words along what the line was laid."""
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
@@ -148,7 +148,7 @@ def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntA
 def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:
     """The datum as vertex indices, its name, and a note where it was chosen."""
     if datum is None:
-        line, along = chosen_datum(surface)
+        line, along = choose_and_name_datum(surface)
         return line, "datum", [f"datum chosen: {along}, {datum_extent(surface, line)}"]
     if isinstance(datum, str):
         if datum not in surface.lines:

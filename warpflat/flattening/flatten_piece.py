@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
-from warpflat.core.free_memory import give_back
+from warpflat.core.free_memory import return_freed_memory
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
@@ -28,7 +28,7 @@ from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
-from warpflat.solver.multigrid.coarsen import levels_meanwhile
+from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.relax import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface, is_large
@@ -36,7 +36,7 @@ from warpflat.surface.mesh import Surface, is_large
 if TYPE_CHECKING:
     pass
 
-__all__ = ["flatten", "give_back_of"]
+__all__ = ["flatten", "return_memory_of"]
 
 
 def flatten(
@@ -184,12 +184,12 @@ def start(
         model=settings.model,
         wear=settings.wear,
     )
-    give_back_of(surface)
-    with levels_meanwhile(surface) if settings.options.solver == "multilevel" else nullcontext():
+    return_memory_of(surface)
+    with hierarchy_in_background(surface) if settings.options.solver == "multilevel" else nullcontext():
         development = run.let_go(develop(surface, line))
-        give_back_of(surface)
+        return_memory_of(surface)
         network = run.network_at(development.positions)
-    give_back_of(surface)
+    return_memory_of(surface)
     return Started(
         run=run,
         datum_name=line_name,
@@ -207,7 +207,7 @@ def finish(pieces: Sequence[Started]) -> list[Flattening]:
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
         again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
-        astray=[piece.run.astray(piece.development) for piece in pieces],
+        needs_isotropic_start=[piece.run.needs_isotropic_start(piece.development) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
@@ -253,7 +253,7 @@ def _device(name: str | None) -> wp.Device:
         raise InputError(f"device {name!r} is not available; {nearest(str(name), devices)}") from error
 
 
-def give_back_of(surface: Surface) -> None:
+def return_memory_of(surface: Surface) -> None:
     """Give back what a part of the way to its relaxation has freed, where that is much: of many triangles."""
     if is_large(surface) and not surface.is_quad.all():
-        give_back()
+        return_freed_memory()

@@ -22,10 +22,10 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, meant_stretch
 from warpflat.solver.convergence import Energies, Outcome
-from warpflat.solver.gauss_newton import relax_whole, whole_steps_pay
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.multigrid.coarsen import coarser_surfaces, has_coarser
-from warpflat.solver.multigrid.solve import levels_pay, relax_multilevel
+from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
 from warpflat.surface.mesh import Surface
 
@@ -103,7 +103,7 @@ class Run:
             self.surface, reference, positions, grain_angle=self.grain_angle, device=self.device, model=self.model
         )
 
-    def astray(self, development: Development) -> bool:
+    def needs_isotropic_start(self, development: Development) -> bool:
         """Whether the piece is relaxed as an isotropic sheet first: a harmonic map is so far off, by kilojoules, that cloth soft in shear
         would come to rest in folds of its threads."""
         return development.method == "harmonic" and not self.fabric.is_isotropic
@@ -180,7 +180,7 @@ def relax_runs(
     starts: Sequence[FloatArray],
     *,
     again: Sequence[int],
-    astray: Sequence[bool] | None = None,
+    needs_isotropic_start: Sequence[bool] | None = None,
 ) -> list[Relaxed]:
     """Relax the pieces of several runs, those of a kind side by side.
 
@@ -193,14 +193,19 @@ def relax_runs(
     """
     kinds: dict[tuple[bool, int, bool], list[int]] = {}
     for number, (run, network) in enumerate(zip(runs, networks, strict=True)):
-        kinds.setdefault((_has_levels(run, network), again[number], astray is not None and astray[number]), []).append(
-            number
-        )
+        kinds.setdefault(
+            (
+                _has_levels(run, network),
+                again[number],
+                needs_isotropic_start is not None and needs_isotropic_start[number],
+            ),
+            [],
+        ).append(number)
     relaxed: dict[int, Relaxed] = {}
     for (levels, times, led), numbers in kinds.items():
         own = [runs[number] for number in numbers]
         batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
-        relaxed |= zip(numbers, batch.relax(levels=levels, again=times, astray=led), strict=True)
+        relaxed |= zip(numbers, batch.relax(levels=levels, again=times, needs_isotropic_start=led), strict=True)
     for number, run in enumerate(runs):
         # Of the springs that the pattern has: those of a start that turned out otherwise are gone.
         run.notes += _off_grain(relaxed[number].network)
@@ -208,7 +213,7 @@ def relax_runs(
 
 
 def _has_levels(run: Run, network: SpringNetwork) -> bool:
-    return run.options.solver == "multilevel" and levels_pay(network) and has_coarser(network.surface)
+    return run.options.solver == "multilevel" and multigrid_pays(network) and has_coarser(network.surface)
 
 
 class _Batch:
@@ -222,19 +227,21 @@ class _Batch:
 
     def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
         upright = [
-            Upright(lower=first + int(run.datum[0]), upper=first + int(run.datum[-1]), vertices=slice(first, end))
+            GrainAlignment(
+                lower=first + int(run.datum[0]), upper=first + int(run.datum[-1]), vertices=slice(first, end)
+            )
             for run, (first, end) in zip(self._runs, pairwise(self._first), strict=True)
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
 
-    def relax(self, *, levels: bool, again: int, astray: bool) -> list[Relaxed]:
+    def relax(self, *, levels: bool, again: int, needs_isotropic_start: bool) -> list[Relaxed]:
         """Relax them, in rounds between which directions are measured again, so many times at most; as isotropic sheets first where
         they are astray."""
         begun = time.perf_counter()
         begin = self._state.begin().energies
         stage = self._runs[0].stage_name
         self._tell(self._state, "develop" if stage == "relax" else stage)
-        if astray:
+        if needs_isotropic_start:
             own, start = self._state.vertices, self._state.positions()
             self._put([run.reference_at(start[at]) for run, at in zip(self._runs, own, strict=True)], start)
             self._measure_again(levels)
@@ -281,8 +288,8 @@ class _Batch:
     def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
         told = any(run.callback is not None for run in self._runs)
         each_step = self._each_step if told else None
-        if not levels and self._options.solver == "multilevel" and whole_steps_pay(self._state.network):
-            return relax_whole(self._state, enough=enough, watch=self._watch, each_step=each_step)
+        if not levels and self._options.solver == "multilevel" and gauss_newton_pays(self._state.network):
+            return relax_gauss_newton(self._state, enough=enough, watch=self._watch, each_step=each_step)
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
         # After an edit the layout is near the minimum already; a grid is nearer once it has been carried up from its coarser levels.

@@ -19,7 +19,7 @@ from warpflat.flattening.applied_cut import AppliedCut, measure_cut
 from warpflat.flattening.develop import Development
 from warpflat.flattening.fit_report import Remedy, wear_measures
 from warpflat.flattening.progress import Stage
-from warpflat.flattening.stretched_faces import Opened, opened_faces
+from warpflat.flattening.stretched_faces import StretchedFaces, find_stretched_faces
 from warpflat.model.fit import WornFit, assess_fit
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import LayoutErrors, WornStrain, layout_errors, worn_strain
@@ -117,11 +117,11 @@ class Flattening:
         return self.worn.energy_density
 
     @cached_property
-    def opened(self) -> Opened | None:
+    def opened(self) -> StretchedFaces | None:
         """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
         if any(stage.name == "fullness" for stage in self.stages):
             return None
-        return opened_faces(self.network, self.positions)
+        return find_stretched_faces(self.network, self.positions)
 
     @property
     def told(self) -> tuple[str, ...]:

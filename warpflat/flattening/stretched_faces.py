@@ -12,7 +12,7 @@ from warpflat.core.text import counted
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import face_areas
 
-__all__ = ["Opened", "opened_faces"]
+__all__ = ["StretchedFaces", "find_stretched_faces"]
 
 # Faces so many times as large as on the body are told of, if they take up this share of the body's area too much.
 _OPENED = 2.0
@@ -20,7 +20,7 @@ _MATTERS = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
-class Opened:
+class StretchedFaces:
     """Faces that are more than twice as large in the pattern as on the body.
 
     Attributes:
@@ -56,7 +56,7 @@ class Opened:
         return {**vars(self), "at": list(self.at), "in_pattern": list(self.in_pattern)}
 
 
-def opened_faces(network: SpringNetwork, positions: FloatArray) -> Opened | None:
+def find_stretched_faces(network: SpringNetwork, positions: FloatArray) -> StretchedFaces | None:
     """Find the faces of a pattern that are more than twice as large as on the body; None where they make up next to nothing.
 
     Args:
@@ -72,7 +72,7 @@ def opened_faces(network: SpringNetwork, positions: FloatArray) -> Opened | None
     corners = surface.faces[worst][surface.faces[worst] >= 0]
     x, y, z = surface.vertices[corners].mean(axis=0).tolist()
     u, v = positions[corners].mean(axis=0).tolist()
-    return Opened(
+    return StretchedFaces(
         faces=len(chosen),
         area_m2=float(body[chosen].sum()),
         flat_area_m2=float(flat[chosen].sum()),

@@ -12,20 +12,20 @@ from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.constraint_equations import (
-    Ties,
-    length_ties,
-    level_ties,
-    mirror_ties,
+    ConstraintEquations,
+    length_equations,
+    level_equations,
+    mirror_equations,
     one_group,
-    smooth_ties,
-    straight_ties,
+    smooth_equations,
+    straight_equations,
 )
 from warpflat.surface.mirror import mirror_partners
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "constraint_ties", "piece_of"]
+__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "equations_of_constraint", "piece_of"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -93,7 +93,9 @@ class Symmetric:
 Constraint = Straight | FixedLength | Symmetric
 
 
-def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | None = None) -> tuple[Ties, bool]:
+def equations_of_constraint(
+    constraint: Constraint, piece: Flattening, fold: IntArray | None = None
+) -> tuple[ConstraintEquations, bool]:
     """The constraint's ties in the piece's own numbering, and whether they say how the piece lies on the cloth.
 
     Args:
@@ -110,15 +112,15 @@ def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | 
         if constraint.length is not None:
             there = lengths.sum() * (2.0 if _goes_on_beyond(fold, line) else 1.0)
             lengths = lengths * (constraint.length / there)
-        return one_group(length_ties(line, lengths), smooth_ties(line, piece.positions, fold)), False
+        return one_group(length_equations(line, lengths), smooth_equations(line, piece.positions, fold)), False
     if line[0] == line[-1]:
         raise InputError(f"{constraint.name}: the line is closed; it must run from one end to another")
     if isinstance(constraint, Straight):
         if constraint.along == "free":
-            return straight_ties(line), False
+            return straight_equations(line), False
         warp, weft = grain_axes(piece.grain_angle)
-        across = level_ties(line, weft if constraint.along == "warp" else warp)
-        return one_group(straight_ties(line), across), True
+        across = level_equations(line, weft if constraint.along == "warp" else warp)
+        return one_group(straight_equations(line), across), True
     try:
         partner = mirror_partners(surface.faces, line, vertex_count=len(surface.vertices))
     except InputError as error:
@@ -129,7 +131,7 @@ def constraint_ties(constraint: Constraint, piece: Flattening, fold: IntArray | 
     across = np.array([chord[1], -chord[0]]) / np.linalg.norm(chord)
     axis = vertices[partner == vertices]
     pairs = np.column_stack([vertices, partner])[one_of_two]
-    return mirror_ties(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
+    return mirror_equations(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
 
 
 def _goes_on_beyond(fold: IntArray | None, line: IntArray) -> bool:

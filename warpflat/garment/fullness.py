@@ -22,10 +22,10 @@ from warpflat.model.membrane import step_matrix
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.model.strain import strain_energy
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
 from warpflat.surface.cells import CellArrays, first_of_faces
-from warpflat.surface.falloff import faded
+from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import border_loops, half_edges_of
 
@@ -70,7 +70,7 @@ def give_fullness(
     warp, weft = grain_axes(piece.grain_angle)
     mean = full.mean(axis=0)
     spread = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
-    upright = Upright(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    upright = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
     state = Relaxation(network, options, start=piece.positions @ spread, upright=[upright])
     outcome = relax(state)
     positions = state.positions()
@@ -130,12 +130,12 @@ def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[In
         if along:
             stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
             logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
-            log_full[:, axis] += faded(faces, logs, stops, len(positions))
+            log_full[:, axis] += falloff_weights(faces, logs, stops, len(positions))
     # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap, and all of what is eased in; and
     # what a slanting side has got too much.
     wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
     lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
-    log_full += faded(faces, lacks, border_loops(faces), len(positions))[:, None]
+    log_full += falloff_weights(faces, lacks, border_loops(faces), len(positions))[:, None]
     return np.asarray(np.exp(log_full))
 
 

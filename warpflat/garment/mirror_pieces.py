@@ -14,14 +14,14 @@ from warpflat.pattern.pieces import Piece, Seam, SeamSide
 if TYPE_CHECKING:
     from warpflat.garment.garment import Garment as FlatGarment
 
-__all__ = ["Twin", "find_twins", "sew_twins"]
+__all__ = ["MirrorPair", "find_mirror_pairs", "sew_mirror_pairs"]
 
 #: Edges of a pair that is cut by one pattern agree in length, up to each of their points, within this [m].
 SAME_LENGTH = 5e-5
 
 
 @dataclass(frozen=True, kw_only=True)
-class Twin:
+class MirrorPair:
     """A piece that is cut by another one's pattern, turned over.
 
     Attributes:
@@ -35,9 +35,9 @@ class Twin:
     edges: Mapping[str, str]
 
 
-def find_twins(
+def find_mirror_pairs(
     garments: Mapping[str, FlatGarment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
-) -> tuple[Twin, ...]:
+) -> tuple[MirrorPair, ...]:
     """Pairs that are so in every size, with like edges, each of whose seams is the other's mirror image too.
 
     Args:
@@ -46,20 +46,20 @@ def find_twins(
         seams: between these.
     """
     every = [set(garment.pairs) for garment in garments.values()]
-    found: list[Twin] = []
+    found: list[MirrorPair] = []
     for first, second in next(iter(garments.values())).pairs:
         if not all((first, second) in pairs for pairs in every):
             continue
         matched = [_matched(garments[size], pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):
-            found.append(Twin(name=second, of=first, edges=matched[0]))
+            found.append(MirrorPair(name=second, of=first, edges=matched[0]))
     # One that is sewn otherwise than its partner needs notches of its own; without it others may be so too.
     while odd := _sewn_otherwise(found, seams):
         found = [twin for twin in found if twin.name not in odd]
     return tuple(found)
 
 
-def sew_twins(seams: Sequence[Seam], twins: Sequence[Twin]) -> tuple[Seam, ...]:
+def sew_mirror_pairs(seams: Sequence[Seam], twins: Sequence[MirrorPair]) -> tuple[Seam, ...]:
     """The seams with every twin's edges replaced by those of the piece that is drawn.
 
     Such a seam runs as its mirror image does, so that the notches of the one are those of the other.
@@ -73,7 +73,7 @@ def sew_twins(seams: Sequence[Seam], twins: Sequence[Twin]) -> tuple[Seam, ...]:
             sewn.append(seam)
             continue
         image = _mirror_seam(own[0], seams, by_name)
-        assert image is not None  # find_twins sees to it
+        assert image is not None  # find_mirror_pairs sees to it
         other, place = image
         ease = seam.ease
         if next(number for number in (0, 1) if own[0] in sides[number]) != place:
@@ -103,7 +103,7 @@ def _matched(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: 
     return edges if len(edges) == len(two.edges) else None
 
 
-def _sewn_otherwise(twins: Sequence[Twin], seams: Sequence[Seam]) -> set[str]:
+def _sewn_otherwise(twins: Sequence[MirrorPair], seams: Sequence[Seam]) -> set[str]:
     """Twins with an edge that is sewn where their partner's is not."""
     by_name = {twin.name: twin for twin in twins}
     return {
@@ -115,7 +115,7 @@ def _sewn_otherwise(twins: Sequence[Twin], seams: Sequence[Seam]) -> set[str]:
     }
 
 
-def _mirror_seam(side: SeamSide, seams: Sequence[Seam], twins: Mapping[str, Twin]) -> tuple[Seam, int] | None:
+def _mirror_seam(side: SeamSide, seams: Sequence[Seam], twins: Mapping[str, MirrorPair]) -> tuple[Seam, int] | None:
     """The seam at which the edge that is drawn is sewn itself, and on which side of it."""
     for seam in seams:
         for number in (0, 1):
@@ -124,7 +124,7 @@ def _mirror_seam(side: SeamSide, seams: Sequence[Seam], twins: Mapping[str, Twin
     return None
 
 
-def _replaced(side: Sequence[SeamSide], twins: Mapping[str, Twin]) -> tuple[SeamSide, ...]:
+def _replaced(side: Sequence[SeamSide], twins: Mapping[str, MirrorPair]) -> tuple[SeamSide, ...]:
     return tuple(
         SeamSide(
             piece=twins[part.piece].of,

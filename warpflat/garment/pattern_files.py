@@ -146,7 +146,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be written.
     """
     from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import note_file
+    from warpflat.core.manifest import record_file
     from warpflat.export.read_pattern_json import read_pattern_json
 
     for format in formats:
@@ -165,7 +165,7 @@ def export_patterns(
             for format in formats
         ]
         for file in files:
-            note_file(folder, drafted.name, file)
+            record_file(folder, drafted.name, file)
     return files
 
 

@@ -24,13 +24,20 @@ from warpflat.core.activity import doing
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.result import Flattening
-from warpflat.garment.constraints import Constraint, constraint_ties, piece_of
-from warpflat.garment.sewing_network import Together
-from warpflat.model.constraint_equations import Ties, join_ties, one_group, seam_ties, smooth_ties, stretch_ties
+from warpflat.garment.constraints import Constraint, equations_of_constraint, piece_of
+from warpflat.garment.sewing_network import SewingNetwork
+from warpflat.model.constraint_equations import (
+    ConstraintEquations,
+    join_equations,
+    one_group,
+    seam_equations,
+    smooth_equations,
+    stretch_equations,
+)
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
-from warpflat.surface.falloff import faded
+from warpflat.surface.falloff import falloff_weights
 
 __all__ = ["Held", "SeamPair", "Sewn", "sew"]
 
@@ -159,7 +166,7 @@ def sew(
     """
     begun = time.perf_counter()
     options = given_options(options)
-    whole = Together(pieces)
+    whole = SewingNetwork(pieces)
     folds = folds or {}
     alone = np.concatenate([piece.positions for piece in pieces.values()])
     ties, kinds, laid = _ties(whole, alone, seams, constraints, folds)
@@ -192,35 +199,37 @@ def sew(
 
 
 def _ties(
-    whole: Together,
+    whole: SewingNetwork,
     alone: FloatArray,
     seams: Sequence[SeamPair],
     constraints: Sequence[Constraint],
     folds: Mapping[str, IntArray],
-) -> tuple[Ties, list[tuple[str, str]], set[str]]:
+) -> tuple[ConstraintEquations, list[tuple[str, str]], set[str]]:
     """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth."""
     ties, kinds, laid = [], [], set()
     on_fold = {name: whole.numbers(name, ids) for name, ids in folds.items()}
     for seam in seams:
         first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
         sides = zip((first, second), seam.pieces, strict=True)
-        smooth = [smooth_ties(side, alone, on_fold.get(name)) for side, name in sides]
+        smooth = [smooth_equations(side, alone, on_fold.get(name)) for side, name in sides]
         if seam.joints is None:
-            held = seam_ties(first, second, seam.ratio)
+            held = seam_equations(first, second, seam.ratio)
         else:
-            held = stretch_ties(first, second, seam.joints, whole.surface.vertices, alone, seam.ratio)
+            held = stretch_equations(first, second, seam.joints, whole.surface.vertices, alone, seam.ratio)
         ties.append(one_group(held, *smooth))
         kinds.append((seam.name, "seam"))
     for constraint in constraints:
-        own, lays = constraint_ties(constraint, piece_of(constraint, whole.pieces), folds.get(constraint.piece))
+        own, lays = equations_of_constraint(constraint, piece_of(constraint, whole.pieces), folds.get(constraint.piece))
         ties.append(replace(own, ends=whole.numbers(constraint.piece, own.ends)))
         kinds.append((constraint.name, constraint.kind))
         if lays:
             laid.add(constraint.piece)
-    return join_ties(ties), kinds, laid
+    return join_equations(ties), kinds, laid
 
 
-def _relax_in_rounds(state: Relaxation, ties: Ties, options: RelaxOptions) -> tuple[Outcome, FloatArray, bool, bool]:
+def _relax_in_rounds(
+    state: Relaxation, ties: ConstraintEquations, options: RelaxOptions
+) -> tuple[Outcome, FloatArray, bool, bool]:
     """Relax, let the offsets grow, and again until all is at rest and the ties agree, twice in a row, since within the tolerances the
     energy still changes; the outcome of the last round, the misses (#P [m]), whether they agree, and whether they contradict each other."""
     seams = state.network.seams
@@ -249,7 +258,11 @@ def _contradict(amiss: Sequence[float]) -> bool:
 
 
 def _held(
-    state: Relaxation, ties: Ties, kinds: Sequence[tuple[str, str]], misses: FloatArray, alone: FloatArray
+    state: Relaxation,
+    ties: ConstraintEquations,
+    kinds: Sequence[tuple[str, str]],
+    misses: FloatArray,
+    alone: FloatArray,
 ) -> list[Held]:
     """Seams and constraints with their prices: half the work of each one's forces since the pieces lay alone."""
     seams = state.network.seams
@@ -267,7 +280,9 @@ def _held(
     ]
 
 
-def _held_folds(state: Relaxation, whole: Together, folds: Mapping[str, IntArray], alone: FloatArray) -> list[Held]:
+def _held_folds(
+    state: Relaxation, whole: SewingNetwork, folds: Mapping[str, IntArray], alone: FloatArray
+) -> list[Held]:
     """Folds with their prices, by the forces with which the lines that hold them push."""
     if not folds:
         return []
@@ -299,7 +314,7 @@ def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     cells = piece.network.cell_arrays
     for layout in (piece.positions, piece.development.positions):
         x, start = layout[vertices, 0], layout.copy()
-        start[:, 0] += faded(piece.faces, [(vertices, x.mean() - x)], [], len(start))
+        start[:, 0] += falloff_weights(piece.faces, [(vertices, x.mean() - x)], [], len(start))
         start[vertices, 0] = x.mean()
         if (cells.least_shares(start) > 0.01).all():
             return start

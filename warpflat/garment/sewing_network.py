@@ -14,14 +14,14 @@ from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation
 from warpflat.surface.topology import components
 
-__all__ = ["Together"]
+__all__ = ["SewingNetwork"]
 
 
-class Together:
+class SewingNetwork:
     """Several pieces as one mesh, each with its own range of vertices.
 
     Attributes:
@@ -38,7 +38,7 @@ class Together:
         self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
         self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
         self.upright = {
-            name: Upright(
+            name: GrainAlignment(
                 lower=int(piece.datum[0]) + self.first[name],
                 upper=_upper_end(piece) + self.first[name],
                 vertices=slice(self.first[name], self.first[name] + len(piece.positions)),

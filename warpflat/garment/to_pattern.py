@@ -21,7 +21,7 @@ from warpflat.garment.form_plan import (
     folds_of,
     plan_form,
 )
-from warpflat.garment.mirror_pieces import find_twins, sew_twins
+from warpflat.garment.mirror_pieces import find_mirror_pairs, sew_mirror_pairs
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
 
@@ -81,8 +81,8 @@ def pattern_of_garment(
     for piece, edge in opened.items():
         side = (SeamSide(piece=piece, edge=edge),)
         seams = (*seams, Seam(name=unused(edge, {seam.name for seam in seams}), sides=(side, side)))
-    twins = find_twins(garments, pieces, seams)
-    seams = sew_twins(seams, twins)
+    twins = find_mirror_pairs(garments, pieces, seams)
+    seams = sew_mirror_pairs(seams, twins)
     drawn = {twin.of for twin in twins}
     pieces = {
         size: tuple(

@@ -12,16 +12,16 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
-    "Ties",
-    "join_ties",
-    "length_ties",
-    "level_ties",
-    "mirror_ties",
+    "ConstraintEquations",
+    "join_equations",
+    "length_equations",
+    "level_equations",
+    "mirror_equations",
     "one_group",
-    "seam_ties",
-    "smooth_ties",
-    "straight_ties",
-    "stretch_ties",
+    "seam_equations",
+    "smooth_equations",
+    "straight_equations",
+    "stretch_equations",
 ]
 
 
@@ -36,7 +36,7 @@ WAVE, SMOOTH = 0.04, 0.3
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Ties:
+class ConstraintEquations:
     """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.seams` for the first five).
 
     Attributes:
@@ -73,17 +73,17 @@ class Ties:
         return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
 
 
-def one_group(*ties: Ties) -> Ties:
+def one_group(*ties: ConstraintEquations) -> ConstraintEquations:
     """Ties of one seam or constraint."""
-    joined = join_ties(ties)
+    joined = join_equations(ties)
     return replace(joined, group=np.zeros_like(joined.group), sum_tolerance=ties[0].sum_tolerance)
 
 
-def join_ties(ties: Sequence[Ties]) -> Ties:
+def join_equations(ties: Sequence[ConstraintEquations]) -> ConstraintEquations:
     """The ties of several seams and constraints, a group each."""
     if not ties:
         return _ties(np.zeros((0, 4)), LENGTHS, tolerance=_EDGE_TOLERANCE, sum_tolerance=None)
-    return Ties(
+    return ConstraintEquations(
         ends=np.concatenate([t.ends for t in ties]),
         kind=np.concatenate([t.kind for t in ties]),
         ratio=np.concatenate([t.ratio for t in ties]),
@@ -96,15 +96,15 @@ def join_ties(ties: Sequence[Ties]) -> Ties:
     )
 
 
-def seam_ties(first: IntArray, second: IntArray, ratio: float = 1.0) -> Ties:
+def seam_equations(first: IntArray, second: IntArray, ratio: float = 1.0) -> ConstraintEquations:
     """Every edge of the first row of vertices `ratio` times as long as its partner of the second."""
     ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
     return _ties(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
-def stretch_ties(
+def stretch_equations(
     first: IntArray, second: IntArray, joints: IntArray, body: FloatArray, positions: FloatArray, ratio: float = 1.0
-) -> Ties:
+) -> ConstraintEquations:
     """Two rows of other vertices sewn by their length on the body, the first `ratio` times as long as the second.
 
     Between two joints both rows stretch evenly from where they lie. The two vertices of a joint need not lie at the same share
@@ -139,20 +139,20 @@ def _arc(points: FloatArray) -> FloatArray:
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
-def length_ties(line: IntArray, lengths: FloatArray) -> Ties:
+def length_equations(line: IntArray, lengths: FloatArray) -> ConstraintEquations:
     """Every edge of a row of vertices so long [m]."""
     ends = np.column_stack([line[:-1], line[1:], line[:-1], line[1:]])
     return _ties(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
-def straight_ties(line: IntArray) -> Ties:
+def straight_equations(line: IntArray) -> ConstraintEquations:
     """Every inner vertex of a row on the straight line between its ends."""
     inner = line[1:-1]
     ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
     return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
 
 
-def smooth_ties(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> Ties:
+def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> ConstraintEquations:
     """Every inner vertex of a row held, softly, at its present distance from chords of the row around it.
 
     Where ties ask for more length than the cloth gives, a row of vertices would find it in waves, at the price of a little
@@ -178,7 +178,7 @@ def smooth_ties(line: IntArray, positions: FloatArray, fold: IntArray | None = N
     return one_group(*ties)
 
 
-def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> Ties:
+def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> ConstraintEquations:
     """Each vertex held at its distance from the chord of those so many edges before and after it."""
     here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
     chord, away = positions[after] - positions[before], positions[here] - positions[before]
@@ -188,7 +188,9 @@ def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float)
     return replace(ties, soft=np.full(len(here), soft))
 
 
-def _from_mirror_image(line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float) -> Ties:
+def _from_mirror_image(
+    line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float
+) -> ConstraintEquations:
     """The ends on an upright fold held at their distance from the chord of the vertex so many edges before and its mirror image."""
     rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
     ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
@@ -199,7 +201,7 @@ def _from_mirror_image(line: IntArray, positions: FloatArray, fold: IntArray, re
     return replace(ties, soft=np.full(len(rows), soft / 2))
 
 
-def level_ties(line: IntArray, across: FloatArray) -> Ties:
+def level_equations(line: IntArray, across: FloatArray) -> ConstraintEquations:
     """The ends of a row of vertices at the same place across a direction: `across` is the unit vector at right angles."""
     ends = np.array([[line[0], line[-1], line[0], line[0]]])
     lever = np.zeros((1, 4, 2))
@@ -207,7 +209,7 @@ def level_ties(line: IntArray, across: FloatArray) -> Ties:
     return _ties(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
 
 
-def mirror_ties(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> Ties:
+def mirror_equations(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> ConstraintEquations:
     """The first vertex of each pair (#Q by 2) the mirror image of the second, and those of the axis (#A) on it.
 
     Args:
@@ -237,10 +239,10 @@ def _ties(
     lever: FloatArray | None = None,
     tolerance: float,
     sum_tolerance: float | None = np.inf,
-) -> Ties:
+) -> ConstraintEquations:
     rows = np.asarray(ends, dtype=np.int32).reshape(-1, 4)
     count = len(rows)
-    return Ties(
+    return ConstraintEquations(
         ends=rows,
         kind=np.full(count, int(kind), dtype=np.int32),
         ratio=np.broadcast_to(np.asarray(ratio, dtype=np.float64), (count,)).copy(),

@@ -54,7 +54,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
     from warpflat.cutting.cut_piece import CutPlan, draw_line, line_part
-    from warpflat.scene.load import told_by
+    from warpflat.scene.load import errors_named
 
     names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
     drawn: dict[int, str] = {}
@@ -63,13 +63,13 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
             line, copy = name, 2
             while line in surface.lines:
                 line, copy = f"{name} {copy}", copy + 1
-            with told_by(f"cuts[{number}]"):
+            with errors_named(f"cuts[{number}]"):
                 surface = draw_line(surface, line, _path(surface, table))
             drawn[number] = line
     paths: dict[str, list[IntArray]] = {}
     tip_back: dict[str, float] = {}
     for number, (name, table) in enumerate(zip(names, tables, strict=True)):
-        with told_by(f"cuts[{number}]"):
+        with errors_named(f"cuts[{number}]"):
             part = (0.0, 1.0) if table.part is None else (table.part[0], table.part[1])
             row = line_part(surface, table.line or drawn[number], part)
             _check_tip_back(surface, row, table.tip_back)

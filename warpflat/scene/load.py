@@ -24,13 +24,13 @@ from warpflat.scene.schema import SceneTable
 
 __all__ = [
     "Scene",
+    "errors_named",
     "expand_variables",
     "load_scene",
     "make_scene",
     "scene_fabric",
     "scene_relax_options",
     "scene_wear",
-    "told_by",
 ]
 
 _VARIABLE = re.compile(r"\$\{([A-Za-z_][A-Za-z0-9_]*)\}|\$([A-Za-z_][A-Za-z0-9_]*)")
@@ -86,7 +86,7 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
     """
     settings = check_table(SceneTable, data, where)
     if settings.name is not None:
-        with told_by(f"{where}: name"):
+        with errors_named(f"{where}: name"):
             checked_name(settings.name)
     return Scene(name=settings.name or fitted_name(name), settings=settings, folder=folder, where=where)
 
@@ -98,12 +98,12 @@ def scene_fabric(scene: Scene) -> Fabric:
         InputError: an unknown name (names the nearest), or impossible values.
     """
     settings = scene.settings
-    with told_by(f"{scene.where}: fabric_files"):
+    with errors_named(f"{scene.where}: fabric_files"):
         files = [scene.folder / expand_variables(file) for file in settings.fabric_files]
     library = load_library(files)
     if isinstance(settings.fabric, FabricTable):
         return fabric_from_table(scene.name, settings.fabric, where=scene.where, library=library)
-    with told_by(f"{scene.where}: fabric"):
+    with errors_named(f"{scene.where}: fabric"):
         return find_fabric(settings.fabric, library)
 
 
@@ -117,7 +117,7 @@ def scene_wear(scene: Scene) -> Wear | None:
 
     if scene.settings.wear is None:
         return None
-    with told_by(scene.where):
+    with errors_named(scene.where):
         return Wear(**scene.settings.wear.model_dump())
 
 
@@ -129,7 +129,7 @@ def scene_relax_options(scene: Scene) -> RelaxOptions:
     """
     given = {key: value for key, value in scene.settings.relax.model_dump().items() if value is not None}
     options = RelaxOptions(**given)
-    with told_by(scene.where):
+    with errors_named(scene.where):
         options.validate()
     return options
 
@@ -152,7 +152,7 @@ def expand_variables(text: str) -> str:
 
 
 @contextmanager
-def told_by(where: str) -> Iterator[None]:
+def errors_named(where: str) -> Iterator[None]:
     """Begin the messages of mistakes inside with `where`, once: what is called there may have said so itself."""
     try:
         yield

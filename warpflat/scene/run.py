@@ -14,10 +14,10 @@ from warpflat.scene.cuts import CutStory
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import (
     Scene,
+    errors_named,
     scene_fabric,
     scene_relax_options,
     scene_wear,
-    told_by,
 )
 from warpflat.scene.surface import scene_surface
 from warpflat.scene.write import SceneResult, write_surface
@@ -91,7 +91,7 @@ def _run_surface(
 
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is told before anything is made
-    with told_by(scene.where):
+    with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
     story = cuts or scene_cuts(scene, device=device)
@@ -168,7 +168,7 @@ def flatten_scene(
 
     settings, relax = scene.settings, scene_relax_options(scene)
     film = film or Film(None, story.surface, lambda: FrameSchedule(settings.output))
-    with told_by(scene.where):
+    with errors_named(scene.where):
         seams = scene_surface_seams(settings.seams, scene.name)
         result = _flatten(scene, story.surface, relax, callback=callback, device=device)
         film.last(result)
@@ -196,9 +196,9 @@ def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
 
     if not (rules.kinds or rules.allowances):
         return
-    with told_by(scene.where):
+    with errors_named(scene.where):
         surfaces = [piece for count in story.counts for piece in cut_surfaces(story.surface, list(story.plans[:count]))]
-    with told_by(f"{scene.where}: pattern"):
+    with errors_named(f"{scene.where}: pattern"):
         check_edge_names(surfaces, rules, cuts=[plan.name for plan in story.plans])
 
 
@@ -236,7 +236,7 @@ def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
 
     settings = scene.settings
     surface = scene_surface(scene)
-    with told_by(scene.where):
+    with errors_named(scene.where):
         story = plan_cuts(surface, settings.cuts)
         if settings.auto_cut is not None:
             story, _ = plan_automatic_cuts(
@@ -261,7 +261,7 @@ def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", 
         raise InputError(f"{scene.where}: cuts are compared on a [surface], not on the pieces of a form")
     relax = scene_relax_options(scene)
     story = scene_cuts(scene, device=device)
-    with told_by(scene.where):
+    with errors_named(scene.where):
         result = flatten_and_cut(
             story, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
         )

@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import doing
-from warpflat.core.manifest import settle
+from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
 from warpflat.garment.constraints import Constraint
@@ -21,7 +21,7 @@ from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.frames import FrameSchedule
-from warpflat.scene.load import Scene, expand_variables, scene_fabric, scene_relax_options, scene_wear, told_by
+from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult
@@ -38,11 +38,11 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
     settings = scene.settings
     assert settings.mannequin is not None  # the schema sees to it
     if mannequin is None:
-        with told_by(f"{scene.where}: mannequin"):
+        with errors_named(f"{scene.where}: mannequin"):
             mannequin = mannequin_from_table(
                 settings.mannequin, path_of=lambda file: scene.folder / expand_variables(file)
             )
-    with told_by(f"{scene.where}: form"):
+    with errors_named(f"{scene.where}: form"):
         if isinstance(settings.form, str):
             form = shipped_form(settings.form)
         else:
@@ -77,7 +77,7 @@ class GarmentPlan:
         Raises:
             InputError: as :func:`warpflat.garment.garment.flatten_form`.
         """
-        with told_by(self.scene.where):
+        with errors_named(self.scene.where):
             return flatten_form(
                 self.mannequin,
                 self.form,
@@ -102,15 +102,15 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     relax, fabric = scene_relax_options(scene), scene_fabric(scene)
     doing("building the mannequin")
     mannequin, form = scene_form(scene)
-    with told_by(f"{scene.where}: pattern"):
+    with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
         plan = plan_form(form, drawing.rules)
-    with told_by(f"{scene.where}: grain_angle"):
+    with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(folds_of(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
-    with told_by(f"{scene.where}: seams"):
+    with errors_named(f"{scene.where}: seams"):
         drawing = replace(drawing, rules=replace(drawing.rules, ease=wished_seams(form, wishes).ease))
-    with told_by(scene.where):
+    with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
             {name: piece.surface.lines for name, piece in form.pieces.items()},
@@ -200,7 +200,7 @@ def run_garment(
         options=drawing,
         sample_size=own,
     )
-    metrics, settled = settle(
+    metrics, settled = remove_stale(
         out,
         {**garment.metrics(), **_of_sizes(graded), **pattern.metrics},
         name=scene.name,
@@ -229,7 +229,7 @@ def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
     found = {}
     for size in scene.settings.pattern.sizes:
         if table is not None and size != table.size:
-            with told_by(f"{scene.where}: pattern.sizes"):
+            with errors_named(f"{scene.where}: pattern.sizes"):
                 found[size] = scene_form(
                     scene, mannequin_from_table(table.model_copy(update={"size": size}), path_of=Path)
                 )

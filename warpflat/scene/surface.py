@@ -19,7 +19,7 @@ from warpflat.surface.paths.lines import line_between, line_from_curve, line_fro
 
 if TYPE_CHECKING:
     pass
-from warpflat.scene.load import Scene, expand_variables, told_by
+from warpflat.scene.load import Scene, errors_named, expand_variables
 
 __all__ = ["scene_surface"]
 
@@ -39,15 +39,15 @@ def scene_surface(scene: Scene) -> Surface:
     if isinstance(table, ShapeSurface):
         from warpflat.surface.shapes import make_shape
 
-        with told_by(f"{scene.where}: surface"):
+        with errors_named(f"{scene.where}: surface"):
             surface = make_shape(table.shape, **(table.model_extra or {}))
     else:
-        with told_by(f"{scene.where}: surface.file"):
+        with errors_named(f"{scene.where}: surface.file"):
             path = scene.folder / expand_variables(table.file)
         surface = read_surface(path, units=table.units, component=table.component, prim=table.prim, name=scene.name)
     surface = replace(surface, name=scene.name)
     for name, line in scene.settings.lines.items():
-        with told_by(f"{scene.where}: lines.{name}"):
+        with errors_named(f"{scene.where}: lines.{name}"):
             surface = with_lines(surface, {name: _line(surface, line)})
     wanted = {} if scene.settings.datum is None else {"datum": scene.settings.datum}
     wanted |= {f"constraints[{i}]": constraint.line for i, constraint in enumerate(scene.settings.constraints)}
@@ -55,11 +55,11 @@ def scene_surface(scene: Scene) -> Surface:
     wanted |= {f"seams[{i}].sides[{k}]": seam.sides[k] for i, seam in enumerate(named) for k in (0, 1)}
     for key, name in wanted.items():
         if name not in surface.lines:
-            with told_by(f"{scene.where}: {key}"):
+            with errors_named(f"{scene.where}: {key}"):
                 if name not in SIDES:
                     raise InputError(f"unknown line {name!r}; {nearest(name, {*surface.lines, *SIDES})}")
                 surface = with_lines(surface, {name: line_on_border(surface, name)})
-    with told_by(f"{scene.where}: seams"):
+    with errors_named(f"{scene.where}: seams"):
         surface_seams(surface, named)
     return surface
 

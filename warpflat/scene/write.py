@@ -58,7 +58,7 @@ def write_surface(
         InputError: the folder cannot be written.
     """
     from warpflat.core.atomic_files import file_in
-    from warpflat.core.manifest import settle
+    from warpflat.core.manifest import remove_stale
     from warpflat.export.letters import note_on_names
     from warpflat.flattening.result import metrics_of, write_results
     from warpflat.garment.pattern_files import surface_files
@@ -75,7 +75,7 @@ def write_surface(
     if frames:
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
-    metrics, settled = settle(
+    metrics, settled = remove_stale(
         folder,
         {**metrics_of(pieces, more), **pattern.metrics},
         name=scene.name,

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
 
-__all__ = ["Energies", "Look", "Mark", "Outcome", "Vectors"]
+__all__ = ["ConvergenceStatus", "Energies", "Mark", "Outcome", "Vectors"]
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class Energies:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Look:
+class ConvergenceStatus:
     """What a look at a running relaxation says of each of its pieces.
 
     Attributes:
@@ -64,9 +64,9 @@ class Look:
         """Of all pieces."""
         return Energies(*self.energies.sum(axis=0).tolist())
 
-    def of(self, pieces: Sequence[int]) -> Look:
+    def of(self, pieces: Sequence[int]) -> ConvergenceStatus:
         """What it says of some of them."""
-        return Look(**{name: values[list(pieces)] for name, values in vars(self).items()})
+        return ConvergenceStatus(**{name: values[list(pieces)] for name, values in vars(self).items()})
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,10 +24,10 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation, Watch
 
-__all__ = ["WholeSteps", "relax_whole", "whole_steps_pay"]
+__all__ = ["GaussNewtonSteps", "gauss_newton_pays", "relax_gauss_newton"]
 
 
 # K/G from which they pay, on triangles, and the most vertices: a factor's entries grow faster than the mesh.
@@ -46,7 +46,7 @@ _LITTLE_LEFT = 1e-5
 _FLOOR = 1e-9
 
 
-def whole_steps_pay(network: SpringNetwork) -> bool:
+def gauss_newton_pays(network: SpringNetwork) -> bool:
     """Whether whole steps may take less time than others: with springs of a soft cloth between triangles, nothing sewn."""
     return (
         network.model == "springs"
@@ -57,10 +57,10 @@ def whole_steps_pay(network: SpringNetwork) -> bool:
     )
 
 
-class WholeSteps:
+class GaussNewtonSteps:
     """The stiffness of a network of springs between triangles, with its guard, and where forces lead by it."""
 
-    def __init__(self, network: SpringNetwork, upright: Sequence[Upright]) -> None:
+    def __init__(self, network: SpringNetwork, upright: Sequence[GrainAlignment]) -> None:
         """Of a network and those of its pieces that are held upright."""
         springs, cells, fabric = network.spring_arrays, network.cell_arrays, network.fabric
         self._count = network.vertex_count
@@ -138,7 +138,7 @@ class WholeSteps:
         return self._rows(self._chords, np.repeat(sideways, len(self._chords), axis=0))
 
 
-def relax_whole(
+def relax_gauss_newton(
     state: Relaxation,
     *,
     most: float | None = None,
@@ -160,14 +160,14 @@ def relax_whole(
     if not state.looked:
         state.begin()
     most = state.options.max_steps if most is None else most
-    whole, near = WholeSteps(state.network, state.upright), np.zeros(len(state.vertices), dtype=bool)
+    whole, near = GaussNewtonSteps(state.network, state.upright), np.zeros(len(state.vertices), dtype=bool)
 
     def tell(call: Watch | None) -> None:
         if call is not None:
             call(state, state.last.total, float(state.last.residual.max()))
 
     if not state.last.at_rest.all():
-        state.hold_upright()
+        state.hold_grain()
         state.evaluate_at_rest()
     work, steps, left = _WORK * math.sqrt(state.network.vertex_count), _STEPS, np.full(len(near), np.inf)
     while not (done := state.last.at_rest | near).all() and (room := most - (state.work_units - start)) > 0.0:
@@ -176,7 +176,7 @@ def relax_whole(
             state.work_units += work
             steps = _STEPS if share > _LITTLE_WAY else min(2 * steps, _MOST_STEPS)
         _smooth(state, min(steps, math.ceil(room)), None if each_step is None else lambda: tell(each_step))
-        state.hold_upright()
+        state.hold_grain()
         state.evaluate_at_rest()
         look = state.look(1.0)
         at_rest = look.at_rest | (left <= _LITTLE_LEFT * look.potential)
@@ -193,7 +193,7 @@ def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None] | None)
     state.work_units += steps
 
 
-def _go(state: Relaxation, whole: WholeSteps, which: BoolArray) -> tuple[FloatArray, float]:
+def _go(state: Relaxation, whole: GaussNewtonSteps, which: BoolArray) -> tuple[FloatArray, float]:
     """Let these pieces (#P) go where the forces lead, or a half of the way, a quarter ..., so that their energy is not higher.
 
     Returns:

@@ -13,11 +13,11 @@ import numpy as np
 from warpflat.core.arrays import ComplexArray, FloatArray
 from warpflat.core.sums import dot
 
-__all__ = ["Upright", "hold_upright", "take_out_turning", "turn_upright"]
+__all__ = ["GrainAlignment", "align_grain", "hold_grain", "remove_rotation"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Upright:
+class GrainAlignment:
     """A piece and the two of its vertices that lie one above the other.
 
     Attributes:
@@ -30,13 +30,13 @@ class Upright:
     vertices: slice = field(default_factory=lambda: slice(None))
 
 
-def turn_upright(pieces: Sequence[Upright], position: FloatArray) -> None:
+def align_grain(pieces: Sequence[GrainAlignment], position: FloatArray) -> None:
     """Turn each piece about its centre so that its chord points up; the positions (#V by 2 [m]) are changed in place."""
     for piece in pieces:
         _turn(piece, position)
 
 
-def _turn(piece: Upright, position: FloatArray) -> tuple[ComplexArray, complex]:
+def _turn(piece: GrainAlignment, position: FloatArray) -> tuple[ComplexArray, complex]:
     """Turn a piece; where its vertices then are, and by what they were turned."""
     place = _complex(position[piece.vertices])
     chord = complex(*(position[piece.upper] - position[piece.lower]))
@@ -48,8 +48,8 @@ def _turn(piece: Upright, position: FloatArray) -> tuple[ComplexArray, complex]:
     return place, turn
 
 
-def hold_upright(
-    pieces: Sequence[Upright],
+def hold_grain(
+    pieces: Sequence[GrainAlignment],
     position: FloatArray,
     velocity: FloatArray,
     load: FloatArray,
@@ -81,8 +81,10 @@ def hold_upright(
         held *= -torque
 
 
-def take_out_turning(pieces: Sequence[Upright], position: FloatArray, force: FloatArray, weight: FloatArray) -> None:
-    """Rid forces (#V by 2 [N]) in place of those parts that only turn pieces as a whole. Arguments as of `hold_upright`."""
+def remove_rotation(
+    pieces: Sequence[GrainAlignment], position: FloatArray, force: FloatArray, weight: FloatArray
+) -> None:
+    """Rid forces (#V by 2 [N]) in place of those parts that only turn pieces as a whole. Arguments as of `hold_grain`."""
     for piece in pieces:
         here = piece.vertices
         arm, inertia = _arm(_complex(position[here]), weight[here])

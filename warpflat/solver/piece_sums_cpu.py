@@ -11,13 +11,13 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.sums import begins
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark
-from warpflat.solver.grain_alignment import Upright, hold_upright, take_out_turning
+from warpflat.solver.grain_alignment import GrainAlignment, hold_grain, remove_rotation
 from warpflat.solver.step_buffers import StepBuffers
 
-__all__ = ["NearPieces"]
+__all__ = ["HostPieceSums"]
 
 
-class NearPieces:
+class HostPieceSums:
     """Sums over pieces, and pieces as wholes, by NumPy; `warpflat.solver.piece_sums_cuda` has the same for a CUDA device.
 
     Attributes:
@@ -77,20 +77,20 @@ class NearPieces:
         force = self._buffers.force.numpy()
         return np.array([np.linalg.norm(force[here]) for here in self.vertices])
 
-    def strongest(self, upright: Sequence[Upright]) -> FloatArray:
+    def strongest(self, upright: Sequence[GrainAlignment]) -> FloatArray:
         """#P, the largest force of the cloth on a vertex [N], but for what only turns a piece that is held upright."""
         force = self.cloth_force()
         weight = self._network.spring_stiffness.numpy()
-        take_out_turning(upright, self._buffers.position.numpy(), force, weight)
+        remove_rotation(upright, self._buffers.position.numpy(), force, weight)
         return np.sqrt(np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1]))
 
-    def hold_upright(self, upright: Sequence[Upright]) -> None:
+    def hold_grain(self, upright: Sequence[GrainAlignment]) -> None:
         """See `warpflat.solver.grain_alignment`."""
         buffers = self._buffers
         position, velocity, load, force = (
             array.numpy() for array in (buffers.position, buffers.velocity, buffers.load, buffers.force)
         )
-        hold_upright(upright, position, velocity, load, force, self._network.spring_stiffness.numpy())
+        hold_grain(upright, position, velocity, load, force, self._network.spring_stiffness.numpy())
 
     def cloth_force(self) -> FloatArray:
         """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""

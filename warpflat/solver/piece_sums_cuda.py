@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray
-from warpflat.core.device_sums import FarSums
+from warpflat.core.device_sums import DeviceSums
 from warpflat.core.launch import Launch, launch_each, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import begins
@@ -23,14 +23,14 @@ from warpflat.kernels.transfer import inject
 from warpflat.kernels.turning import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.step_buffers import StepBuffers
 
-__all__ = ["FarPieces"]
+__all__ = ["DevicePieceSums"]
 
 
-class FarPieces:
-    """As `NearPieces`."""
+class DevicePieceSums:
+    """As `HostPieceSums`."""
 
     def __init__(self, network: SpringNetwork, buffers: StepBuffers) -> None:
         """Of a network and what its steps leave behind."""
@@ -38,8 +38,8 @@ class FarPieces:
         counts = [net.vertex_count for net in network.pieces]
         begin = begins(counts)
         self.vertices = [slice(*ends) for ends in pairwise(begin.tolist())]
-        self._of_vertices = FarSums(counts, self._device)
-        self._of_faces = FarSums([net.face_count for net in network.pieces], self._device)
+        self._of_vertices = DeviceSums(counts, self._device)
+        self._of_faces = DeviceSums([net.face_count for net in network.pieces], self._device)
         self._stopped = wp.zeros(len(counts), dtype=wp.int32, device=self._device)
         piece = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         self._piece_of = wp.array(piece, dtype=wp.int32, device=self._device)
@@ -95,7 +95,7 @@ class FarPieces:
     def force_sizes(self) -> FloatArray:
         return np.sqrt(self._of_vertices.dots(self._buffers.force, self._buffers.force))
 
-    def strongest(self, upright: Sequence[Upright]) -> FloatArray:
+    def strongest(self, upright: Sequence[GrainAlignment]) -> FloatArray:
         held = self._hold(upright)
         held.measure()
         if held.strongest is None:
@@ -107,7 +107,7 @@ class FarPieces:
         given = [buffers.position, buffers.force, buffers.load, weight, held.piece, held.turn, self._of_vertices.blocks]
         return record(strongest_of_blocks, dim=len(least), inputs=given, outputs=[least], device=self._device)
 
-    def hold_upright(self, upright: Sequence[Upright]) -> None:
+    def hold_grain(self, upright: Sequence[GrainAlignment]) -> None:
         held = self._hold(upright)
         held.measure(ends=True)
         held.go.launch()
@@ -130,7 +130,7 @@ class FarPieces:
     def room(self) -> wp.array:
         return self._buffers.first_guess
 
-    def _hold(self, upright: Sequence[Upright]) -> _Held:
+    def _hold(self, upright: Sequence[GrainAlignment]) -> _Held:
         if self._held is None or self._held.upright is not upright:
             self._held = _Held(self._network, self._buffers, upright)
         return self._held
@@ -146,7 +146,7 @@ class _Held:
 
     strongest: LaunchSequence | None = None
 
-    def __init__(self, network: SpringNetwork, buffers: StepBuffers, upright: Sequence[Upright]) -> None:
+    def __init__(self, network: SpringNetwork, buffers: StepBuffers, upright: Sequence[GrainAlignment]) -> None:
         device, every = network.device, np.arange(network.vertex_count, dtype=np.int32)
         self.upright, self._network, self._buffers = upright, network, buffers
         own = [every[each.vertices] for each in upright]
@@ -157,7 +157,7 @@ class _Held:
         # Blocks of each, and of what lies between.
         first = np.flatnonzero(np.diff(piece, prepend=-2))
         self._part = np.searchsorted(first, [vertices[0] for vertices in own])
-        self._sums = FarSums(np.diff(first, append=len(every)).tolist(), device)
+        self._sums = DeviceSums(np.diff(first, append=len(every)).tolist(), device)
         self.piece = wp.array(piece, dtype=wp.int32, device=device)
         self.turn = Turn()
         for name in ("centre", "by", "middle"):

@@ -27,14 +27,14 @@ from warpflat.core.sums import dot
 from warpflat.kernels.transfer import correct
 from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Energies, Look, Outcome
-from warpflat.solver.grain_alignment import Upright
+from warpflat.solver.convergence import ConvergenceStatus, Energies, Outcome
+from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.membrane_stiffness import TangentMatrix
-from warpflat.solver.piece_sums_cpu import NearPieces
-from warpflat.solver.piece_sums_cuda import FarPieces
-from warpflat.solver.smoother import STEADY, STILL, pace_of
+from warpflat.solver.piece_sums_cpu import HostPieceSums
+from warpflat.solver.piece_sums_cuda import DevicePieceSums
+from warpflat.solver.smoother import STEADY, STILL, smoother_coefficients
 from warpflat.solver.step_buffers import StepBuffers
-from warpflat.solver.steps_cuda import FarSteps
+from warpflat.solver.steps_cuda import DeviceSteps
 
 __all__ = ["SOLVERS", "RelaxOptions", "Relaxation", "Solver", "Watch", "given_options", "relax"]
 
@@ -132,7 +132,7 @@ class Relaxation:
     network: SpringNetwork
     options: RelaxOptions
     start: InitVar[FloatArray]
-    upright: Sequence[Upright] = ()
+    upright: Sequence[GrainAlignment] = ()
     least_strain: float = 1e-9
 
     def __post_init__(self, start: FloatArray) -> None:
@@ -152,17 +152,17 @@ class Relaxation:
         self.steps = 0
         self.work_units = 0.0
         self._restarts = 0
-        self.last: Look
+        self.last: ConvergenceStatus
         self.looked = False
         # Whether the guard acted anywhere when all cells were last looked at before a step.
         self._acts = False
 
-    def _pieces_of(self) -> tuple[NearPieces | FarPieces, FarSteps | None]:
+    def _pieces_of(self) -> tuple[HostPieceSums | DevicePieceSums, DeviceSteps | None]:
         """What looks at the pieces where the arrays are, and the steps where these are not the host's."""
         if self.network.device.is_cpu:
-            return NearPieces(self.network, self._buffers), None
-        pieces = FarPieces(self.network, self._buffers)
-        return pieces, FarSteps(self._buffers, pieces, damped=self.options.kinetic_damping)
+            return HostPieceSums(self.network, self._buffers), None
+        pieces = DevicePieceSums(self.network, self._buffers)
+        return pieces, DeviceSteps(self._buffers, pieces, damped=self.options.kinetic_damping)
 
     @property
     def restarts(self) -> int:
@@ -244,7 +244,7 @@ class Relaxation:
             self.steps += steps
             return
         for number in range(steps):
-            self._buffers.go_at(pace_of(number))
+            self._buffers.go_at(smoother_coefficients(number))
             self._evaluate(number, watch_every, evaluated=evaluated)
             self._advance(each_step)
 
@@ -317,14 +317,14 @@ class Relaxation:
             return np.stack([spring, cells, kinetic], axis=1)
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
 
-    def begin(self) -> Look:
+    def begin(self) -> ConvergenceStatus:
         """The look before the first step, by which only what is free of strain is at rest."""
         residual, gain, change = np.full((3, len(self.vertices)), np.inf)
         energies = self.piece_energies()
         at_rest = self._without_strain(energies[:, 0] + energies[:, 1])
         return self._say(energies, residual=residual, gain=gain, change=change, at_rest=at_rest)
 
-    def look(self, work: float) -> Look:
+    def look(self, work: float) -> ConvergenceStatus:
         """How energy and residual are now, so many steps' work after the last look."""
         before, energies, residual = self.last.potential, self.piece_energies(), self.residuals()
         now = energies[:, 0] + energies[:, 1]
@@ -345,9 +345,9 @@ class Relaxation:
 
     def _say(
         self, energies: FloatArray, *, residual: FloatArray, gain: FloatArray, change: FloatArray, at_rest: BoolArray
-    ) -> Look:
+    ) -> ConvergenceStatus:
         self.looked = True
-        self.last = Look(
+        self.last = ConvergenceStatus(
             energies=energies,
             residual=residual,
             gain=gain,
@@ -369,7 +369,7 @@ class Relaxation:
         number = np.full(self.network.vertex_count, -1)
         number[rows] = np.arange(len(rows))
         upright = [
-            Upright(
+            GrainAlignment(
                 lower=int(number[piece.lower]),
                 upper=int(number[piece.upper]),
                 vertices=slice(int(number[piece.vertices.start]), int(number[piece.vertices.stop - 1]) + 1),
@@ -402,7 +402,7 @@ class Relaxation:
         for name, values in vars(self.last).items():
             vars(whole.last)[name][list(self.numbers)] = values
 
-    def hold_upright(self) -> None:
+    def hold_grain(self) -> None:
         """Turn each piece so that the chord of its datum points up, and hold it there.
 
         A load that is spread over the piece balances the torque with which the cloth would turn; what turning there is
@@ -410,7 +410,7 @@ class Relaxation:
         """
         if not self.upright:
             return
-        self.pieces.hold_upright(self.upright)
+        self.pieces.hold_grain(self.upright)
 
     def forces(self) -> FloatArray:
         """#V by 2, forces of the cloth and of what it is tied by, in the present layout at rest [N]."""
@@ -493,7 +493,7 @@ def relax(state: Relaxation, *, watch: Watch | None = None, each_step: Watch | N
             state.work_units += chunk
         else:
             state.sweep(chunk, stepped)
-        state.hold_upright()
+        state.hold_grain()
         look = state.look(chunk)
         if state.matrix is not None and state.steps % _FOLLOW_EVERY < chunk:
             state.matrix.follow(state.position)

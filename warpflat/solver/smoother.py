@@ -9,18 +9,18 @@ of the fourth kind leave 1 / (2 k + 1) of any way after k steps, weighed so: as 
 
 from __future__ import annotations
 
-__all__ = ["STEADY", "STILL", "pace_of"]
+__all__ = ["STEADY", "STILL", "smoother_coefficients"]
 
-Pace = tuple[float, float, float]
+SmootherCoefficients = tuple[float, float, float]
 
-STEADY: Pace = (1.0, 1.0, 1.0)
+STEADY: SmootherCoefficients = (1.0, 1.0, 1.0)
 """The paper's: with viscosity, and with all of the velocity and of the push (`kernels.implicit`)."""
 
-STILL: Pace = (0.0, 1.0, 1.0)
+STILL: SmootherCoefficients = (0.0, 1.0, 1.0)
 """The same at rest, where there is no viscosity to be had."""
 
 
-def pace_of(number: int) -> Pace:
+def smoother_coefficients(number: int) -> SmootherCoefficients:
     """Of the smoothing step after so many from rest: without viscosity, the share of the velocity that is carried on, that of the push."""
     carried = max(2 * number - 1, 0) / (2 * number + 3)
     return 0.0, carried, (8 * number + 4) / (2 * number + 3)

@@ -7,24 +7,24 @@ import warp as wp
 
 from warpflat.core.launch import Launch, record_copy, record_zero
 from warpflat.core.launch import Sequence as LaunchSequence
-from warpflat.solver.piece_sums_cuda import FarPieces
-from warpflat.solver.smoother import STEADY, STILL, pace_of
+from warpflat.solver.piece_sums_cuda import DevicePieceSums
+from warpflat.solver.smoother import STEADY, STILL, smoother_coefficients
 from warpflat.solver.step_buffers import StepBuffers
 
-__all__ = ["FarSteps"]
+__all__ = ["DeviceSteps"]
 
 # Steps of one graph: multiples of all intervals between two looks at all cells. Of smoothing steps there are fewer.
 _LONGEST = 32
 _SMOOTHING = 8
 
 
-class FarSteps:
+class DeviceSteps:
     """The same steps as those of `warpflat.solver.relax.Relaxation`, run after run."""
 
-    def __init__(self, buffers: StepBuffers, pieces: FarPieces, *, damped: bool) -> None:
+    def __init__(self, buffers: StepBuffers, pieces: DevicePieceSums, *, damped: bool) -> None:
         """Of a state; damped: whether velocities of pieces that are braked become zero."""
         self._buffers, self._pieces, self._damped = buffers, pieces, damped
-        paces = [STEADY, STILL, *map(pace_of, range(_SMOOTHING))]
+        paces = [STEADY, STILL, *map(smoother_coefficients, range(_SMOOTHING))]
         self._paces = wp.array(np.array(paces), dtype=wp.vec3d, device=buffers.network.device)
         self._known: dict[tuple[str, int, int, bool], LaunchSequence] = {}
         self._at_rest = LaunchSequence([record_zero(buffers.velocity), self._pace(1), *buffers.evaluate.launches])

@@ -9,10 +9,10 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.surface.topology import mesh_edges
 
-__all__ = ["faded"]
+__all__ = ["falloff_weights"]
 
 
-def faded(
+def falloff_weights(
     faces: IntArray, given: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
 ) -> FloatArray:
     """Values given at some vertices, spread evenly over a mesh.

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.solver.convergence import Mark, Vectors
-from warpflat.solver.multigrid.direction_space import Ways, ways_of
+from warpflat.solver.multigrid.direction_space import DirectionSpace, make_direction_space
 
-__all__ = ["CycleMemory"]
+__all__ = ["SubspaceAcceleration"]
 
 
 # Of so many cycles it is remembered where they have led, leaps and all.
@@ -19,7 +19,7 @@ _SOUND = 1e-3
 """#V by 2, a layout [m], and the forces there [N], where they are."""
 
 
-class CycleMemory:
+class SubspaceAcceleration:
     """The last few cycles: where they led, and how much the forces fell along each way on each other. In the plane of these ways the energy
     is known, to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
 
@@ -36,7 +36,7 @@ class CycleMemory:
         """Of so many cycles, besides the present one."""
         self._depth = depth
         self._last: Mark | None = None
-        self._algebra: Ways
+        self._algebra: DirectionSpace
         # Ways of cycles before, each as one, and then those of the present cycle's parts; of all of them the curvature, the fall of the
         # forces on one of them along another [N m].
         self._ways: list[Vectors] = []
@@ -83,7 +83,7 @@ class CycleMemory:
     def _keep(self, mark: Mark) -> None:
         """In the room of the last one."""
         if self._last is None:
-            self._algebra = ways_of(mark[0])
+            self._algebra = make_direction_space(mark[0])
         layout, forces = self._last or (None, None)
         self._last = self._algebra.keep(mark[0], layout), self._algebra.keep(mark[1], forces)
 

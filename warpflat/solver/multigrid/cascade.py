@@ -6,12 +6,12 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.model.join import join_networks
-from warpflat.solver.grain_alignment import turn_upright
+from warpflat.solver.grain_alignment import align_grain
 from warpflat.solver.multigrid.cycle import ENERGY_WORK, Levels
-from warpflat.solver.multigrid.hierarchy import far_below
+from warpflat.solver.multigrid.hierarchy import device_levels
 from warpflat.solver.relax import Relaxation
 
-__all__ = ["carry_up"]
+__all__ = ["cascade_up"]
 
 
 # Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
@@ -19,7 +19,7 @@ __all__ = ["carry_up"]
 _CYCLED = 5_000
 
 
-def carry_up(state: Relaxation) -> Levels | None:
+def cascade_up(state: Relaxation) -> Levels | None:
     """Start pieces that are large lattices where a small one of theirs has come to rest; the others where their own levels lead.
 
     Nothing is made or evaluated of the levels in between. The state is looked at in the end.
@@ -30,7 +30,7 @@ def carry_up(state: Relaxation) -> Levels | None:
     """
     pieces, layout = state.network.pieces, state.positions()
     below = [
-        far_below(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
+        device_levels(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
         for net, own in zip(pieces, state.vertices, strict=True)
     ]
     if not any(below):
@@ -52,7 +52,7 @@ def carry_up(state: Relaxation) -> Levels | None:
                 up = carry(up)
         carried.append(up)
     there = carried[0] if len(carried) == 1 else np.concatenate(carried)
-    turn_upright(state.upright, there)
+    align_grain(state.upright, there)
     state.position.assign(there)
     state.work_units += ENERGY_WORK
     if (state.begin().potential < before.potential).all():

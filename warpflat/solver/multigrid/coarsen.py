@@ -30,14 +30,14 @@ from warpflat.core.sums import begins
 from warpflat.core.threads import thread_count
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
 from warpflat.model.springs import unweighed_springs
-from warpflat.solver.multigrid.cubic_interpolation import GridCarry, LatticeCarry
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation
 from warpflat.solver.multigrid.grid_coarsening import (
-    SpreadKind,
-    Thinned,
+    CoarsenedGrid,
+    ResamplingKind,
     Transfer,
-    can_be_thinned,
-    spread_of,
-    thinned_of,
+    can_be_coarsened,
+    coarsened_grid,
+    resampled_grid,
     thirds_of,
 )
 from warpflat.surface.cells import cells_of, creases_of
@@ -51,10 +51,10 @@ __all__ = [
     "coarser",
     "coarser_surfaces",
     "has_coarser",
+    "hierarchy_in_background",
     "inherit_levels",
     "is_coarsest",
-    "levels_meanwhile",
-    "spread_surface",
+    "resampled_surface",
     "steps_down",
 ]
 
@@ -97,7 +97,7 @@ class Coarser:
     kept: IntArray
     transfer: Transfer
     face_of: IntArray
-    smooth_carry: GridCarry | LatticeCarry | None = None
+    smooth_carry: GridProlongation | LatticeProlongation | None = None
     is_lowest: bool = False
 
     @property
@@ -119,13 +119,13 @@ def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | Non
         layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either. Without,
             they are good on the body only.
     """
-    thinned = thinned_of(surface)
+    thinned = coarsened_grid(surface)
     if thinned is not None:
         return _step_to(surface, thinned)
     return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
 
 
-def _step_to(surface: Surface, thinned: Thinned) -> Coarser:
+def _step_to(surface: Surface, thinned: CoarsenedGrid) -> Coarser:
     return Coarser(
         surface=_part_of_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
         kept=thinned.kept,
@@ -161,7 +161,7 @@ def has_coarser(surface: Surface) -> bool:
     if is_coarsest(surface):
         return False
     grid = rows_and_columns(surface)
-    return _next(surface) is not None if grid is None else can_be_thinned(grid)
+    return _next(surface) is not None if grid is None else can_be_coarsened(grid)
 
 
 @once_per_surface
@@ -180,11 +180,11 @@ def steps_down(surface: Surface) -> Iterator[Coarser]:
         surface = step.surface
 
 
-def spread_surface(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, IntArray] | None:
+def resampled_surface(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
     """Return a small grid that is spread over a large one, made once for each surface; None of a surface that is no grid.
 
     Returns:
-        the grid (see `warpflat.solver.multigrid.grid_coarsening.spread_of`), the interpolation of its layouts on the large one,
+        the grid (see `warpflat.solver.multigrid.grid_coarsening.resampled_grid`), the interpolation of its layouts on the large one,
         and #G, for each of its faces one of the large grid's that lies in it.
     """
     known = _spreads(surface)
@@ -194,12 +194,12 @@ def spread_surface(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCar
 
 
 @once_per_surface
-def _spreads(surface: Surface) -> dict[SpreadKind, tuple[Surface, GridCarry, IntArray] | None]:
+def _spreads(surface: Surface) -> dict[ResamplingKind, tuple[Surface, GridProlongation, IntArray] | None]:
     return {}
 
 
-def _spread(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, IntArray] | None:
-    spread = spread_of(surface, kind)
+def _spread(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
+    spread = resampled_grid(surface, kind)
     if spread is None:
         return None
     carry = spread.carry(surface)
@@ -211,7 +211,7 @@ def _spread(surface: Surface, kind: SpreadKind) -> tuple[Surface, GridCarry, Int
 
 
 @contextmanager
-def levels_meanwhile(surface: Surface) -> Iterator[None]:
+def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
     be done with all at its end. Those of a grid, which starts from one spread over it, are not needed so soon, nor take long."""
     if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_by_row(surface) is not None:

@@ -20,7 +20,7 @@ from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, 
 from warpflat.surface.grid import Lattice
 from warpflat.surface.vectors import norm, points_at
 
-__all__ = ["GridCarry", "LatticeCarry", "cubics_between", "places_of_rows"]
+__all__ = ["GridProlongation", "LatticeProlongation", "cubic_interpolation_between", "places_of_rows"]
 
 Number = TypeVar("Number", np.float64, np.complex128)
 
@@ -31,7 +31,7 @@ _PLACES = 512
 
 
 @dataclass(frozen=True, kw_only=True)
-class Cubics:
+class CubicInterpolation:
     """Values at places from those at the kept ones: `column` #N by 4 or fewer, which of the kept, and their `weight`."""
 
     column: IntArray
@@ -46,7 +46,7 @@ class Cubics:
         return result
 
 
-def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
+def cubic_interpolation_between(nodes: FloatArray, place: FloatArray) -> CubicInterpolation:
     """Values at places from those at nodes, by the cubic through the four nearest.
 
     Args:
@@ -62,7 +62,7 @@ def cubics_between(nodes: FloatArray, place: FloatArray) -> Cubics:
     apart[:, itself, itself] = 1.0
     share = (place[:, None] - node)[:, None, :] / apart
     share[:, itself, itself] = 1.0
-    return Cubics(column=column.astype(np.int32), weight=share.prod(axis=2))
+    return CubicInterpolation(column=column.astype(np.int32), weight=share.prod(axis=2))
 
 
 def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
@@ -73,7 +73,7 @@ def places_of_rows(vertices: FloatArray, grid: IntArray) -> FloatArray:
     return np.append(0.0, np.cumsum(steps if steps.min() > 0.0 else np.ones_like(steps)))
 
 
-class GridCarry:
+class GridProlongation:
     """From the layout of a coarser grid to that of the finer one, and the other way."""
 
     def __init__(self, grid: IntArray, places: Sequence[FloatArray], lines: tuple[IntArray | FloatArray, ...]) -> None:
@@ -92,12 +92,12 @@ class GridCarry:
         ]
 
     @cached_property
-    def _cubics(self) -> list[Cubics]:
-        return [cubics_between(coarse, fine) for coarse, fine in self._places]
+    def _cubics(self) -> list[CubicInterpolation]:
+        return [cubic_interpolation_between(coarse, fine) for coarse, fine in self._places]
 
     def sample(self, values: FloatArray) -> FloatArray:
         """#C by #K, values of the coarser grid from those of the finer one (#V by #K, three or fewer)."""
-        by_rows, by_columns = (cubics_between(fine, coarse) for coarse, fine in self._places)
+        by_rows, by_columns = (cubic_interpolation_between(fine, coarse) for coarse, fine in self._places)
         sampled = np.empty((len(by_rows.column), len(by_columns.column), values.shape[1]))
         of_rows, of_columns = ((cubics.column, cubics.weight) for cubics in (by_rows, by_columns))
         given = [np.ascontiguousarray(values), self._grid, *of_rows, *of_columns]
@@ -119,7 +119,7 @@ class GridCarry:
         return result
 
 
-class LatticeCarry:
+class LatticeProlongation:
     """The same of quads on any lattice: along each row and column as far as it runs without a break, so not across a crack."""
 
     def __init__(self, vertices: FloatArray, lattice: Lattice, keep: tuple[IntArray, IntArray]) -> None:

@@ -21,10 +21,10 @@ from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coa
 from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark
-from warpflat.solver.multigrid.acceleration import CycleMemory
+from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
 from warpflat.solver.multigrid.coarsen import Coarser
-from warpflat.solver.multigrid.cubic_interpolation import GridCarry
-from warpflat.solver.multigrid.hierarchy import Rung, let_go, rungs_of, stay
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation
+from warpflat.solver.multigrid.hierarchy import CoarseLevel, let_go, make_coarse_levels, stay
 from warpflat.solver.relax import Relaxation
 from warpflat.surface.mesh import Surface
 from warpflat.surface.untangle import untangle
@@ -160,46 +160,53 @@ class Levels:
             below: levels that are there already; what they hold may be used as part of these.
         """
         layout, pieces = finest.positions(), finest.network.pieces
-        known = {} if below is None else below.rungs
+        known = {} if below is None else below.coarse_levels
         ladders = [
-            rungs_of(net, layout[own], mend=mend, known=known) for net, own in zip(pieces, finest.vertices, strict=True)
+            make_coarse_levels(net, layout[own], mend=mend, known=known)
+            for net, own in zip(pieces, finest.vertices, strict=True)
         ]
-        for rungs, net in zip(ladders, pieces, strict=True):
-            let_go(net, rungs)
-        depth = max(len(rungs) for rungs in ladders)
-        for rungs, net, own in zip(ladders, pieces, finest.vertices, strict=True):
-            lowest, where = (rungs[-1].network, rungs[-1].layout) if rungs else (net, layout[own])
-            while len(rungs) < depth:
-                rungs.append(Rung(step=stay(lowest.surface), network=lowest, layout=where))
+        for coarse_levels, net in zip(ladders, pieces, strict=True):
+            let_go(net, coarse_levels)
+        depth = max(len(coarse_levels) for coarse_levels in ladders)
+        for coarse_levels, net, own in zip(ladders, pieces, finest.vertices, strict=True):
+            lowest, where = (
+                (coarse_levels[-1].network, coarse_levels[-1].layout) if coarse_levels else (net, layout[own])
+            )
+            while len(coarse_levels) < depth:
+                coarse_levels.append(CoarseLevel(step=stay(lowest.surface), network=lowest, layout=where))
         self._join(finest, ladders, [] if below is None else below._levels, mend=mend)
 
     def _join(
-        self, finest: Relaxation, ladders: Sequence[Sequence[Rung]], there: Sequence[_Level] = (), *, mend: bool
+        self, finest: Relaxation, ladders: Sequence[Sequence[CoarseLevel]], there: Sequence[_Level] = (), *, mend: bool
     ) -> None:
         self._ladders, self._mend = ladders, mend
-        carries = [rungs[0].step.smooth_carry for rungs in ladders if rungs]
+        carries = [coarse_levels[0].step.smooth_carry for coarse_levels in ladders if coarse_levels]
         self._lattice = None not in carries
-        self._grids = all(isinstance(carry, GridCarry) for carry in carries)
+        self._grids = all(isinstance(carry, GridProlongation) for carry in carries)
         self._soft = finest.network.fabric.softness >= _SOFT
         few = _STEPS_SOFT if self._soft else _STEPS
         self._levels = [_Level(finest, steps=_STEPS_SMOOTH if self._lattice or not mend else few)]
-        self.leading: dict[Surface, Rung] = {}
+        self.leading: dict[Surface, CoarseLevel] = {}
         self._watch_every = _watch_every(finest.network)
-        self._memories: Sequence[CycleMemory] = ()
+        self._memories: Sequence[SubspaceAcceleration] = ()
         self._is_rough = False
         self.stale = False
         ready = {tuple(map(id, level.state.network.pieces)): level for level in there}
-        for rungs in zip(*ladders, strict=True):
-            networks = [rung.network for rung in rungs]
+        for coarse_levels in zip(*ladders, strict=True):
+            networks = [rung.network for rung in coarse_levels]
             coarse = ready.get(tuple(map(id, networks)))
             if coarse is not None:
                 coarse.steps = few
             else:
-                start = rungs[0].layout if len(rungs) == 1 else np.concatenate([rung.layout for rung in rungs])
+                start = (
+                    coarse_levels[0].layout
+                    if len(coarse_levels) == 1
+                    else np.concatenate([rung.layout for rung in coarse_levels])
+                )
                 coarse = _Level(Relaxation(join_networks(networks), finest.options, start=start), steps=few)
             fine = self._levels[-1]
             if fine.way is None:
-                fine.way = self._way(fine.state, [rung.step for rung in rungs], coarse.state)
+                fine.way = self._way(fine.state, [rung.step for rung in coarse_levels], coarse.state)
             self._levels.append(coarse)
         if finest.network.goes_along_lines:
             for level in self._levels:
@@ -214,9 +221,9 @@ class Levels:
         return kept
 
     @property
-    def rungs(self) -> dict[Surface, Rung]:
+    def coarse_levels(self) -> dict[Surface, CoarseLevel]:
         """The levels of all pieces but the finest, by their surfaces, and those that lead to them."""
-        return self.leading | {rung.step.surface: rung for rungs in self._ladders for rung in rungs}
+        return self.leading | {rung.step.surface: rung for coarse_levels in self._ladders for rung in coarse_levels}
 
     @property
     def sizes(self) -> list[int]:
@@ -299,7 +306,7 @@ class Levels:
         """Relax the coarsest level until the forces of each piece have come down to a share of what they were, or steps take no more
         than a little share of what all have taken of its energy."""
         last = len(self._levels) - 1
-        state, memories = self._levels[last].state, [CycleMemory() for _ in self._ladders]
+        state, memories = self._levels[last].state, [SubspaceAcceleration() for _ in self._ladders]
         state.evaluate_at_rest()
 
         aim, most = share * state.pieces.force_sizes(), max(net.vertex_count for net in state.network.pieces)
@@ -421,7 +428,7 @@ class Levels:
             share = 0.5 * share if share > least else 0.0
         return energy
 
-    def remember(self, memories: Sequence[CycleMemory]) -> None:
+    def remember(self, memories: Sequence[SubspaceAcceleration]) -> None:
         """A cycle on the finest level begins here, to be remembered; `memories` are of each piece."""
         self._memories = memories
         _begin(self._levels[0].state, memories, self._levels[0].state.pieces.mark())
@@ -437,7 +444,7 @@ class Levels:
         _come_to(state, self._memories, state.pieces.mark())
         self._leap(0, self._memories, energy)
 
-    def _leap(self, level: int, memories: Sequence[CycleMemory], energy: FloatArray) -> FloatArray:
+    def _leap(self, level: int, memories: Sequence[SubspaceAcceleration], energy: FloatArray) -> FloatArray:
         """The same on any level; returns #P, the energy where that leads to [J]."""
         state, between = self._levels[level].state, self._levels[level].way
         leapt = _put_lowest(state, memories)
@@ -477,7 +484,7 @@ class Levels:
         left, and cycles take more of it away."""
         self.rise()
         finest = self._levels[0]
-        memories = [CycleMemory() for _ in self._ladders]
+        memories = [SubspaceAcceleration() for _ in self._ladders]
         for _ in range(_CYCLES_ALONG_LINES if finest.lines else 1):
             finest.state.evaluate_at_rest()
             self._count(0, FORCE_WORK)
@@ -529,18 +536,18 @@ def _smooth_along_lines(level: _Level) -> None:
         level.steps = _STEPS_SMOOTH
 
 
-def _begin(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> None:
+def _begin(state: Relaxation, memories: Sequence[SubspaceAcceleration], mark: Mark) -> None:
     """Of all pieces."""
     for memory, own in zip(memories, state.vertices, strict=True):
         memory.begin((mark[0][own], mark[1][own]))
 
 
-def _come_to(state: Relaxation, memories: Sequence[CycleMemory], mark: Mark) -> None:
+def _come_to(state: Relaxation, memories: Sequence[SubspaceAcceleration], mark: Mark) -> None:
     for memory, own in zip(memories, state.vertices, strict=True):
         memory.come_to((mark[0][own], mark[1][own]))
 
 
-def _put_lowest(state: Relaxation, memories: Sequence[CycleMemory]) -> BoolArray:
+def _put_lowest(state: Relaxation, memories: Sequence[SubspaceAcceleration]) -> BoolArray:
     """Put the ways to where the energy is least where there is room; #P, whether that could be told."""
     room = state.pieces.room()
     return np.array([memory.lowest(room[own]) for memory, own in zip(memories, state.vertices, strict=True)])

@@ -14,12 +14,12 @@ from warpflat.core.sums import products, weighted_rows
 from warpflat.kernels.sums import add_share, subtract
 from warpflat.solver.convergence import Vectors
 
-__all__ = ["FarWays", "NearWays", "Ways", "ways_of"]
+__all__ = ["DeviceDirectionSpace", "DirectionSpace", "HostDirectionSpace", "make_direction_space"]
 
 """#V by 2, of NumPy or on a device."""
 
 
-class Ways(Protocol):
+class DirectionSpace(Protocol):
     """What is done with vectors that are all of one kind."""
 
     def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
@@ -41,7 +41,7 @@ class Ways(Protocol):
         """Make the room their sum, each times its share (#W)."""
 
 
-class NearWays:
+class HostDirectionSpace:
     """On the host: ways in single precision, since only their direction counts."""
 
     def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
@@ -67,7 +67,7 @@ class NearWays:
         weighted_rows(share, [way.ravel() for way in ways], room.reshape(-1))
 
 
-class FarWays:
+class DeviceDirectionSpace:
     """On a device."""
 
     def __init__(self, count: int, device: wp.Device) -> None:
@@ -99,6 +99,6 @@ class FarWays:
             launch_each(add_share, self._count, [part, way], [room], device=self._device)
 
 
-def ways_of(values: Vectors) -> Ways:
+def make_direction_space(values: Vectors) -> DirectionSpace:
     """For vectors of this kind, and as many."""
-    return FarWays(len(values), values.device) if isinstance(values, wp.array) else NearWays()
+    return DeviceDirectionSpace(len(values), values.device) if isinstance(values, wp.array) else HostDirectionSpace()

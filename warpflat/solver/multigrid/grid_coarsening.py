@@ -22,17 +22,26 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.solver.multigrid.cubic_interpolation import GridCarry, LatticeCarry, places_of_rows
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
-__all__ = ["Spread", "SpreadKind", "Thinned", "Transfer", "can_be_thinned", "spread_of", "thinned_of", "thirds_of"]
+__all__ = [
+    "CoarsenedGrid",
+    "ResampledGrid",
+    "ResamplingKind",
+    "Transfer",
+    "can_be_coarsened",
+    "coarsened_grid",
+    "resampled_grid",
+    "thirds_of",
+]
 
 
 # Which small grid is spread over a large one: for stiff cloth, whose next level has every third row and column; for others, whose levels
 # have every second one; and for cloth so soft that steps go along lines.
-SpreadKind = Literal["thirds", "halves", "fine"]
+ResamplingKind = Literal["thirds", "halves", "fine"]
 
 # A grid of fewer rows or columns has no coarser one, or none of every third of them.
 _LEAST_LINES = 5
@@ -46,8 +55,8 @@ _MOST_LEFT = 0.7
 # A small grid spread over a large one has so many quads along its sides, more along the longer one. What cubics leave of a layout is then
 # .002 % of the energy on the dome, .03 % on the bodice, from grids of any size; of soft cloth, .09 % with the finer one. Multiples of eight
 # can be halved thrice, of six have a third that can be halved.
-_SIDES: dict[SpreadKind, int] = {"thirds": 48, "halves": 48, "fine": 56}
-_MULTIPLES: dict[SpreadKind, int] = {"thirds": 6, "halves": 8, "fine": 8}
+_SIDES: dict[ResamplingKind, int] = {"thirds": 48, "halves": 48, "fine": 56}
+_MULTIPLES: dict[ResamplingKind, int] = {"thirds": 6, "halves": 8, "fine": 8}
 
 
 class Transfer:
@@ -78,7 +87,7 @@ class Transfer:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Thinned:
+class CoarsenedGrid:
     """The next coarser level of a lattice.
 
     Attributes:
@@ -94,12 +103,12 @@ class Thinned:
     faces: IntArray
     face_of: IntArray
     transfer: Transfer
-    carry: Callable[[Surface], GridCarry | LatticeCarry]
+    carry: Callable[[Surface], GridProlongation | LatticeProlongation]
     of_faces: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
-class Spread:
+class ResampledGrid:
     """A small grid spread over a large one.
 
     Attributes:
@@ -110,7 +119,7 @@ class Spread:
 
     of_faces: dict[str, Any]
     face_of: IntArray
-    carry: Callable[[Surface], GridCarry]
+    carry: Callable[[Surface], GridProlongation]
 
     @property
     def faces(self) -> IntArray:
@@ -119,7 +128,7 @@ class Spread:
         return faces
 
 
-def spread_of(surface: Surface, kind: SpreadKind) -> Spread | None:
+def resampled_grid(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
     """The small grid that is spread over a large one; None of any other surface, and where there are too few rows or columns."""
     known = _spreads(surface)
     if kind not in known:
@@ -128,21 +137,21 @@ def spread_of(surface: Surface, kind: SpreadKind) -> Spread | None:
 
 
 @once_per_faces
-def _spreads(surface: Surface) -> dict[SpreadKind, Spread | None]:
+def _spreads(surface: Surface) -> dict[ResamplingKind, ResampledGrid | None]:
     return {}
 
 
-def _spread(surface: Surface, kind: SpreadKind) -> Spread | None:
+def _spread(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
     grid = rows_and_columns(surface)
-    if grid is None or not can_be_thinned(grid):
+    if grid is None or not can_be_coarsened(grid):
         return None
     quads = _quads(grid.shape, _SIDES[kind], _MULTIPLES[kind])
     lines = tuple(np.linspace(0.0, count - 1.0, of + 1) for count, of in zip(grid.shape, quads, strict=True))
     middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
-    return Spread(
+    return ResampledGrid(
         of_faces=_known_of_grid(*map(len, lines)),
         face_of=_some_face(surface, grid[np.ix_(*middle)].ravel()),
-        carry=lambda surface: GridCarry(grid, _places_of_lines(surface), lines),
+        carry=lambda surface: GridProlongation(grid, _places_of_lines(surface), lines),
     )
 
 
@@ -170,12 +179,12 @@ def _faces_of(rows: int, columns: int) -> IntArray:
     return np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
-def can_be_thinned(grid: IntArray) -> bool:
+def can_be_coarsened(grid: IntArray) -> bool:
     """Whether a grid (#rows by #columns vertices) has a coarser one."""
     return min(grid.shape) >= _LEAST_LINES
 
 
-def thinned_of(surface: Surface) -> Thinned | None:
+def coarsened_grid(surface: Surface) -> CoarsenedGrid | None:
     """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having.
 
     Of a grid whose rows lie much farther apart than its columns all rows stay, or the other way round: quads are to become squarer, since
@@ -184,7 +193,7 @@ def thinned_of(surface: Surface) -> Thinned | None:
     grid = rows_and_columns(surface)
     if grid is None:
         return _of_lattice(surface)
-    if not can_be_thinned(grid):
+    if not can_be_coarsened(grid):
         return None
     wide = _how_wide(surface)
     if wide == "rows":
@@ -192,7 +201,7 @@ def thinned_of(surface: Surface) -> Thinned | None:
     return _across_columns(surface) if wide == "columns" else _both_ways(surface)
 
 
-def thirds_of(surface: Surface) -> Thinned | None:
+def thirds_of(surface: Surface) -> CoarsenedGrid | None:
     """Every third row and column of a grid; None where they do not come out even, or where its quads are long."""
     grid = rows_and_columns(surface)
     if grid is None or any(count < _LEAST_THIRDS or count % 3 != 1 for count in grid.shape) or _how_wide(surface):
@@ -217,44 +226,44 @@ def _places_of_lines(surface: Surface) -> tuple[FloatArray, FloatArray]:
 
 
 @once_per_faces
-def _of_lattice(surface: Surface) -> Thinned | None:
+def _of_lattice(surface: Surface) -> CoarsenedGrid | None:
     lattice = lattice_of(surface)
     return None if lattice is None else _every_other(lattice)
 
 
 @once_per_faces
-def _both_ways(surface: Surface) -> Thinned:
+def _both_ways(surface: Surface) -> CoarsenedGrid:
     return _thinner(surface, rows=_second, columns=_second)
 
 
 @once_per_faces
-def _across_rows(surface: Surface) -> Thinned:
+def _across_rows(surface: Surface) -> CoarsenedGrid:
     return _thinner(surface, rows=_every, columns=_second)
 
 
 @once_per_faces
-def _across_columns(surface: Surface) -> Thinned:
+def _across_columns(surface: Surface) -> CoarsenedGrid:
     return _thinner(surface, rows=_second, columns=_every)
 
 
 @once_per_faces
-def _thirds(surface: Surface) -> Thinned:
+def _thirds(surface: Surface) -> CoarsenedGrid:
     return _thinner(surface, rows=_third, columns=_third)
 
 
-def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]) -> Thinned:
+def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]) -> CoarsenedGrid:
     """Some rows and columns of a grid, which of so many these tell, and the last ones; between them linear by index."""
     grid = rows_and_columns(surface)
     assert grid is not None
     keep = rows(grid.shape[0]), columns(grid.shape[1])
     kept = grid[np.ix_(*keep)]
     faces = _faces_of(*kept.shape)
-    return Thinned(
+    return CoarsenedGrid(
         kept=kept.ravel(),
         faces=faces,
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
-        carry=lambda surface: GridCarry(grid, _places_of_lines(surface), keep),
+        carry=lambda surface: GridProlongation(grid, _places_of_lines(surface), keep),
         of_faces=known_of_faces(faces),
     )
 
@@ -302,7 +311,7 @@ def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
     return around.entry[around.offset[vertices + 1] - 1] // 4
 
 
-def _every_other(lattice: Lattice) -> Thinned | None:
+def _every_other(lattice: Lattice) -> CoarsenedGrid | None:
     """Every second row and column between those in which the border turns, which all stay; None where too little would go."""
     keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
     places = lattice.face_row, lattice.face_column
@@ -335,12 +344,12 @@ def _every_other(lattice: Lattice) -> Thinned | None:
         for lines, line in zip(keep, (lattice.row, lattice.column), strict=True)
     )
     coarse = Lattice(row=row, column=column, corner=faces, bends=lattice.bends[kept])
-    return Thinned(
+    return CoarsenedGrid(
         kept=kept,
         faces=faces,
         face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
-        carry=lambda surface: LatticeCarry(surface.vertices, lattice, keep),
+        carry=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
         of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
     )
 

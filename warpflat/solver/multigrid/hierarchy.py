@@ -10,12 +10,12 @@ import warp as wp
 from scipy.sparse import csr_array, eye
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.free_memory import give_back
+from warpflat.core.free_memory import return_freed_memory
 from warpflat.core.launch import launch_each
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.multigrid.coarsen import Coarser, coarser, is_coarsest, spread_surface, steps_down
-from warpflat.solver.multigrid.grid_coarsening import SpreadKind, Transfer
+from warpflat.solver.multigrid.coarsen import Coarser, coarser, is_coarsest, resampled_surface, steps_down
+from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
 from warpflat.surface.cells import cells_of
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, forget, is_large
@@ -23,7 +23,7 @@ from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import half_edges_of
 from warpflat.surface.untangle import untangle
 
-__all__ = ["Rung", "far_below", "let_go", "rungs_of", "stay"]
+__all__ = ["CoarseLevel", "device_levels", "let_go", "make_coarse_levels", "stay"]
 
 
 # A cell pressed to less than this share of its area is mended as if it were mirrored.
@@ -35,7 +35,7 @@ _WEIGHTS = (0.1, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
-class Rung:
+class CoarseLevel:
     """A coarser level of one piece: the step to it, its network, and its layout [m]."""
 
     step: Coarser
@@ -67,9 +67,9 @@ def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, 
     network.make_springs(stiffness)
 
 
-def rungs_of(
-    network: SpringNetwork, layout: FloatArray, *, mend: bool, known: Mapping[Surface, Rung] | None = None
-) -> list[Rung]:
+def make_coarse_levels(
+    network: SpringNetwork, layout: FloatArray, *, mend: bool, known: Mapping[Surface, CoarseLevel] | None = None
+) -> list[CoarseLevel]:
     """All coarser levels of a piece, the finest first.
 
     Args:
@@ -78,10 +78,10 @@ def rungs_of(
         mend: turn back what cells of coarser levels are mirrored there.
         known: levels that are there already, by their surfaces.
     """
-    rungs: list[Rung] = []
+    coarse_levels: list[CoarseLevel] = []
     # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
     ready: Iterator[Coarser] = steps_down(network.surface)
-    while not (_is_lowest(network) or (rungs and rungs[-1].step.is_lowest)):
+    while not (_is_lowest(network) or (coarse_levels and coarse_levels[-1].step.is_lowest)):
         step = next(ready, None)
         rung = known.get(step.surface) if known and step is not None else None
         rung = rung or _rung(network, layout, step, mend=mend)
@@ -90,24 +90,24 @@ def rungs_of(
             rung = _rung(network, layout, coarser(network.surface, layout))
         if rung is None:
             break
-        rungs.append(rung)
+        coarse_levels.append(rung)
         network, layout = rung.network, rung.layout
-    return rungs
+    return coarse_levels
 
 
-def let_go(network: SpringNetwork, rungs: Sequence[Rung]) -> None:
+def let_go(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) -> None:
     """Forget what the making of a large piece's networks asks for and a relaxation does not, up to a tenth of what that takes: sides of
     faces, and numbers of springs between quads. Triangles may be measured again, and keep these."""
     if is_large(network.surface):
-        for made in (network, *(rung.network for rung in rungs)):
+        for made in (network, *(rung.network for rung in coarse_levels)):
             forget(made.surface, half_edges_of)
             if made.surface.is_quad.all():
                 made.spring_arrays.around.forget_numbers()
         if row_by_row(network.surface) is None:
             # What else is made on the way, so that what that frees goes back, too.
-            for rung in rungs:
+            for rung in coarse_levels:
                 rung.step.transfer.make()
-            give_back()
+            return_freed_memory()
 
 
 def _is_lowest(network: SpringNetwork) -> bool:
@@ -118,24 +118,24 @@ def _is_lowest(network: SpringNetwork) -> bool:
 
 
 @dataclass(frozen=True, kw_only=True)
-class FarBelow:
+class DeviceLevels:
     """Where a large lattice starts: a small one's network and layout [m], what carries layouts up from it, in order, and the small one
     as one of the large one's levels, if it is."""
 
     network: SpringNetwork
     layout: FloatArray
     carries: Sequence[Callable[[FloatArray], FloatArray]]
-    rung: Rung | None = None
+    rung: CoarseLevel | None = None
 
 
-def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow | None:
+def device_levels(network: SpringNetwork, layout: FloatArray, most: int) -> DeviceLevels | None:
     """The small grid that is spread over a grid, or the largest coarser one of any other lattice that has at most so many vertices; None
     if there is none, or where it would be mirrored."""
-    spread = spread_surface(network.surface, _spread_for(network))
+    spread = resampled_surface(network.surface, _spread_for(network))
     if spread is not None:
         surface, carry, face_of = spread
         found = _network_below(network, surface, carry.sample(layout), face_of, mend=True)
-        return None if found is None else FarBelow(network=found[0], layout=found[1], carries=[carry])
+        return None if found is None else DeviceLevels(network=found[0], layout=found[1], carries=[carry])
     steps: list[Coarser] = []
     kept, face_of = (
         np.arange(network.vertex_count, dtype=np.int32),
@@ -151,18 +151,20 @@ def far_below(network: SpringNetwork, layout: FloatArray, most: int) -> FarBelow
     found = _network_below(network, steps[-1].surface, layout[kept], face_of, mend=True)
     if found is None:
         return None
-    rung = Rung(step=steps[-1], network=found[0], layout=found[1])
+    rung = CoarseLevel(step=steps[-1], network=found[0], layout=found[1])
     carries = [step.smooth_carry for step in reversed(steps) if step.smooth_carry is not None]
-    return FarBelow(network=rung.network, layout=rung.layout, carries=carries, rung=rung)
+    return DeviceLevels(network=rung.network, layout=rung.layout, carries=carries, rung=rung)
 
 
-def _spread_for(network: SpringNetwork) -> SpreadKind:
+def _spread_for(network: SpringNetwork) -> ResamplingKind:
     if network.goes_along_lines:
         return "fine"
     return "thirds" if network.is_stiff else "halves"
 
 
-def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False) -> Rung | None:
+def _rung(
+    fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False
+) -> CoarseLevel | None:
     """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
     if step is None:
         return None
@@ -171,7 +173,7 @@ def _rung(fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *,
         return None
     network, layout = found
     _calibrate(network, layout, fine, fine_layout)
-    return Rung(step=step, network=network, layout=layout)
+    return CoarseLevel(step=step, network=network, layout=layout)
 
 
 def _network_below(

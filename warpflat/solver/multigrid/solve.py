@@ -36,13 +36,13 @@ import numpy as np
 from warpflat.core.arrays import BoolArray
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.gauss_newton import relax_whole, whole_steps_pay
-from warpflat.solver.multigrid.acceleration import CycleMemory
-from warpflat.solver.multigrid.cascade import carry_up
+from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
+from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
+from warpflat.solver.multigrid.cascade import cascade_up
 from warpflat.solver.multigrid.cycle import ENERGY_WORK, FORCE_WORK, Levels
 from warpflat.solver.relax import Relaxation, RelaxOptions, Watch, relax
 
-__all__ = ["levels_pay", "relax_multilevel"]
+__all__ = ["multigrid_pays", "relax_multilevel"]
 
 
 # K/G from which levels are of little use on triangles of which there are no more vertices than this.
@@ -67,7 +67,7 @@ class _Pace:
     """
 
     near: bool = False
-    memory: CycleMemory = field(default_factory=CycleMemory)
+    memory: SubspaceAcceleration = field(default_factory=SubspaceAcceleration)
 
 
 @dataclass(kw_only=True)
@@ -103,7 +103,7 @@ class _Cycles:
         work = state.work_units
         self.levels.remember([pace.memory for pace in paces])
         self.levels.leap(self.levels.cycle(0, each_step))
-        state.hold_upright()
+        state.hold_grain()
         self.levels.follow()
         state.evaluate_at_rest()
         state.work_units += FORCE_WORK + ENERGY_WORK
@@ -112,7 +112,7 @@ class _Cycles:
             pace.near = enough is not None and look.gain[piece] <= enough * look.potential[piece]
 
 
-def levels_pay(network: SpringNetwork) -> bool:
+def multigrid_pays(network: SpringNetwork) -> bool:
     """Whether cycles take less work than plain or whole steps: always but for a soft cloth on a small mesh of triangles."""
     if network.surface.is_quad.all():
         return True
@@ -125,7 +125,7 @@ def _patience(network: SpringNetwork) -> float:
         return math.inf
     if network.model == "membrane":
         return math.inf if network.fabric.is_isotropic else _PATIENCE_WITH_MEMBRANE
-    if not whole_steps_pay(network):
+    if not gauss_newton_pays(network):
         return math.inf
     return 0.0 if network.fabric.softness >= _VERY_SOFT else _PATIENCE
 
@@ -154,11 +154,11 @@ def relax_multilevel(
     begun = time.perf_counter()
     whole, first, start = state, state.steps, state.work_units
     if not state.looked:
-        state.hold_upright()
+        state.hold_grain()
         state.begin()
-    below = carry_up(state) if nested and levels is None else None
+    below = cascade_up(state) if nested and levels is None else None
     if below is None:
-        state.hold_upright()
+        state.hold_grain()
     elif each_step is not None:
         each_step(state, state.last.total, float(state.last.residual.max()))
     levels, carried = Levels(state, mend=nested, below=below) if levels is None else levels, below is not None
@@ -175,7 +175,7 @@ def relax_multilevel(
 
     if nested and not carried:
         levels.rise()
-        state.hold_upright()
+        state.hold_grain()
         state.begin()
         tell(each_step)
     levels.follow()
@@ -189,7 +189,7 @@ def relax_multilevel(
                 relax(cycles.state, watch=watch, each_step=each_step)
             else:
                 most = options.max_steps - spent
-                relax_whole(cycles.state, most=most, enough=enough, watch=watch, each_step=each_step)
+                relax_gauss_newton(cycles.state, most=most, enough=enough, watch=watch, each_step=each_step)
             break
         left = cycles.without_done()
         if left is not None:

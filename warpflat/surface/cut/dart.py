@@ -239,9 +239,9 @@ def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArra
         np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
     )
     fade[0] = 1.0
-    faded = points + np.multiply.outer(fade, end - points[0])
-    faded[0] = end
-    return faded, fade > 0
+    falloff_weights = points + np.multiply.outer(fade, end - points[0])
+    falloff_weights[0] = end
+    return falloff_weights, fade > 0
 
 
 def draw_outline(
