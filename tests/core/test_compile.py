@@ -129,7 +129,7 @@ import warp as wp
 wp.config.kernel_cache_dir = {str(tmp_path)!r}
 import numpy as np
 from warpflat import compiling
-from warpflat.kernels.sums import subtract
+from warpflat.kernels.reduce import subtract
 from warpflat.launching import launch_each
 compiling._USUAL = ("sums", "springs")
 way = np.ones((3, 2))
@@ -140,4 +140,4 @@ sys.exit(int(way[0, 0]))
     assert done.returncode == 2, done.stderr
     # Both by the first kernel of one.
     compiled = {module.name.rpartition("_")[0] for module in tmp_path.glob("**/wp_warpflat*") if module.is_dir()}
-    assert compiled == {"wp_warpflat.kernels.sums", "wp_warpflat.kernels.springs"}
+    assert compiled == {"wp_warpflat.kernels.reduce", "wp_warpflat.kernels.springs"}

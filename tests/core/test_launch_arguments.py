@@ -8,8 +8,8 @@ import time
 import numpy as np
 import pytest
 import warp as wp
+from warpflat.kernels.prolongation import Weights, transfer
 from warpflat.kernels.stiffness import find_directions, measure_edges
-from warpflat.kernels.transfer import Weights, transfer
 
 from warpflat.core import launch_arguments as packing
 from warpflat.core.launch import launch_each, record

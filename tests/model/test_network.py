@@ -9,8 +9,8 @@ import pytest
 import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
+from warpflat.kernels.reduce import subtract
 from warpflat.kernels.springs import compute_spring_energy
-from warpflat.kernels.sums import subtract
 
 from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric, grain_axes

@@ -11,7 +11,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import begins
-from warpflat.kernels.sums import dot_blocks, least_of_blocks, sum_blocks
+from warpflat.kernels.reduce import dot_blocks, least_of_blocks, sum_blocks
 
 __all__ = ["DeviceSums"]
 

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
-from warpflat.kernels.lattice import lay_profiles
+from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarser, coarser_surfaces
 from warpflat.surface.cells import CellArrays, cells_of
 from warpflat.surface.grid import rows_and_columns

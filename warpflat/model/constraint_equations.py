@@ -1,4 +1,4 @@
-"""Ties: seams and constraints as equations on vertices, in the arrays that `kernels.seams` takes."""
+"""Ties: seams and constraints as equations on vertices, in the arrays that `kernels.constraints` takes."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT
+from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
     "ConstraintEquations",
@@ -37,7 +37,7 @@ WAVE, SMOOTH = 0.04, 0.3
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ConstraintEquations:
-    """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.seams` for the first five).
+    """Equations c(x) = 0 of one seam or constraint, or of several (see `kernels.constraints` for the first five).
 
     Attributes:
         ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.

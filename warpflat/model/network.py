@@ -40,12 +40,12 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
+from warpflat.kernels.constraints import Seams, compute_seam_misses
 from warpflat.kernels.implicit import Bonds
+from warpflat.kernels.line_solve import ThreadLines
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
-from warpflat.kernels.seams import Seams, compute_seam_misses
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
-from warpflat.kernels.thread_lines import ThreadLines
 from warpflat.model.membrane import Model, check_model, cloth_of, step_matrix
 from warpflat.model.springs import SpringArrays, shear_hold, shortened, springs_of, with_stiffness
 from warpflat.surface.cells import CellArrays, cells_of
@@ -298,13 +298,13 @@ class SpringNetwork:
         target: FloatArray | None = None,
         lever: FloatArray | None = None,
     ) -> None:
-        """Hold lengths and places to one another (see `kernels.seams`); by default, sew pairs of edges together.
+        """Hold lengths and places to one another (see `kernels.constraints`); by default, sew pairs of edges together.
 
         Args:
             ends: #P by 4, vertices of the first edge, then of the second.
             ratio: #P, wished length of the first over the second.
             stiffness: #P [N/m].
-            kind: #P, of `kernels.seams`.
+            kind: #P, of `kernels.constraints`.
             target: #P [m].
             lever: #P by 4 by 2.
         """

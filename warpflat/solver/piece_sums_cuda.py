@@ -18,9 +18,9 @@ from warpflat.core.launch import Launch, launch_each, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import begins
 from warpflat.kernels.implicit import count_braked, stop_braked
-from warpflat.kernels.sums import subtract
-from warpflat.kernels.transfer import inject
-from warpflat.kernels.turning import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
+from warpflat.kernels.prolongation import inject
+from warpflat.kernels.reduce import subtract
+from warpflat.kernels.rigid_motion import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark
 from warpflat.solver.grain_alignment import GrainAlignment

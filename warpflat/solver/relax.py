@@ -24,7 +24,7 @@ from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError, expect, is_number, nearest
 from warpflat.core.launch import launch_each
 from warpflat.core.sums import dot
-from warpflat.kernels.transfer import correct
+from warpflat.kernels.prolongation import correct
 from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import ConvergenceStatus, Energies, Outcome

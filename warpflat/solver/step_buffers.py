@@ -18,10 +18,10 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import begins
+from warpflat.kernels.constraints import evaluate_seams
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
-from warpflat.kernels.seams import evaluate_seams
+from warpflat.kernels.line_solve import go_along_lines, solve_lines
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
-from warpflat.kernels.thread_lines import go_along_lines, solve_lines
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.smoother import STEADY
 

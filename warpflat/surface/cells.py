@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.kernels.cells import find_least_shares
-from warpflat.kernels.surface_cells import add_areas
+from warpflat.kernels.unfold import add_areas
 from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
 from warpflat.surface.topology import border_of, corner_triangles
 from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases

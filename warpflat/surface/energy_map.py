@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
-from warpflat.kernels.surface_cells import measure_triangles
+from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
 from warpflat.surface.topology import corner_triangles
 

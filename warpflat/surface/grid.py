@@ -8,7 +8,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import BoolArray, IntArray
-from warpflat.kernels.lattice import number_faces
+from warpflat.kernels.grid_lists import number_faces
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
 from warpflat.surface.topology import border_of, half_edges_of, twins_of

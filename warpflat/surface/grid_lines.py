@@ -1,4 +1,4 @@
-"""The rows and columns of a piece's quads, along which steps go in a soft cloth (`warpflat.kernels.thread_lines`)."""
+"""The rows and columns of a piece's quads, along which steps go in a soft cloth (`warpflat.kernels.line_solve`)."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import warp as wp
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.kernels.lattice import (
+from warpflat.kernels.grid_lists import (
     is_row_by_row,
     list_corners,
     list_lengths,

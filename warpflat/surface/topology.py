@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
-from warpflat.kernels.surface_cells import unfold_diagonals
+from warpflat.kernels.unfold import unfold_diagonals
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
 

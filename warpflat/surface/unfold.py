@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.kernels.surface_cells import average_normals, find_bends, find_creases
-from warpflat.kernels.surface_cells import lay_cells as lay_each
+from warpflat.kernels.unfold import average_normals, find_bends, find_creases
+from warpflat.kernels.unfold import lay_cells as lay_each
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.topology import order_by, places_of

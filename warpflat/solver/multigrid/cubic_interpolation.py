@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.launch import launch_each
-from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
+from warpflat.kernels.cubic_interpolation import carry_along, carry_along_rows, sample_grid, weigh_cubics
 from warpflat.surface.grid import Lattice
 from warpflat.surface.vectors import norm, points_at
 

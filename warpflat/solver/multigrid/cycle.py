@@ -16,8 +16,8 @@ from scipy.sparse import block_diag, csr_array
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.launch import Launch, launch_each, record
 from warpflat.core.sums import begins
-from warpflat.kernels.sums import subtract
-from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
+from warpflat.kernels.prolongation import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
+from warpflat.kernels.reduce import subtract
 from warpflat.model.join import join_networks
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark

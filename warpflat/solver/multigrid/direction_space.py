@@ -11,7 +11,7 @@ import warp as wp
 from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import launch_each
 from warpflat.core.sums import products, weighted_rows
-from warpflat.kernels.sums import add_share, subtract
+from warpflat.kernels.reduce import add_share, subtract
 from warpflat.solver.convergence import Vectors
 
 __all__ = ["DeviceDirectionSpace", "DirectionSpace", "HostDirectionSpace", "make_direction_space"]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from warpflat.kernels.surface_cells import measure_triangles
+from warpflat.kernels.unfold import measure_triangles
 
 from warpflat.core.launch import launch_each
 from warpflat.surface.cells import cells_of

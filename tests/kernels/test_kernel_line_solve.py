@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, vec2
-from warpflat.kernels.thread_lines import go_along_lines, solve_lines
+from warpflat.kernels.line_solve import go_along_lines, solve_lines
 
 from warpflat.core.launch import launch_each
 from warpflat.model.network import SpringNetwork

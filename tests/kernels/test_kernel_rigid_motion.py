@@ -7,7 +7,7 @@ import warp as wp
 from devices import DEVICE
 from small_networks import vec2
 from warpflat.kernels.implicit import count_braked, stop_braked
-from warpflat.kernels.turning import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
+from warpflat.kernels.rigid_motion import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
 
 from warpflat.core.launch import launch_each
 

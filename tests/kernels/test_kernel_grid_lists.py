@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from warpflat.kernels.lattice import lay_profiles
+from warpflat.kernels.grid_lists import lay_profiles
 
 from warpflat.core.launch import launch_each
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import warp as wp
 from devices import DEVICE
-from warpflat.kernels.cubics import carry_along, carry_along_rows, sample_grid, weigh_cubics
-from warpflat.kernels.lattice import number_faces
+from warpflat.kernels.cubic_interpolation import carry_along, carry_along_rows, sample_grid, weigh_cubics
+from warpflat.kernels.grid_lists import number_faces
 
 from warpflat.core.launch import launch_each
 

@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
-from warpflat.kernels.seams import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_misses, evaluate_seams
+from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_misses, evaluate_seams
 
 POSITIONS = np.array([[0.0, 0.0], [0.11, 0.02], [0.5, 0.1], [0.52, 0.19], [0.1, 0.12]])
 # Two seams, one with ease; an edge of a fixed length; a vertex on a line through two others; a mirror image; one vertex alone.

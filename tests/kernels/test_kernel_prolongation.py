@@ -10,7 +10,7 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from scipy.sparse import csr_array, random_array
-from warpflat.kernels.transfer import Transpose, Weights, coarse_difference, coarse_load, correct, inject, transfer
+from warpflat.kernels.prolongation import Transpose, Weights, coarse_difference, coarse_load, correct, inject, transfer
 
 FINE, COARSE = 40, 13
 RNG = np.random.default_rng(1)

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from devices import DEVICE
-from warpflat.kernels.sums import add_share, dot_blocks, least_of_blocks, subtract, sum_blocks
+from warpflat.kernels.reduce import add_share, dot_blocks, least_of_blocks, subtract, sum_blocks
 
 from warpflat.core.device_sums import DeviceSums
 from warpflat.core.launch import launch_each
