@@ -225,7 +225,7 @@ def _no_links(*_: object, **__: object) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from warpflat.export.atomic import atomic_path, output_folder, remove_file
+from warpflat.core.atomic_files import atomic_path, output_folder, remove_file
 folder, number, links = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "True"
 replace = os.replace
 def fatal(source, target):
@@ -398,6 +398,6 @@ def test_a_temporary_file_that_cannot_be_written_is_not_blamed_on_standard_outpu
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("warpflat.cli.main._start_warp", full)
-    monkeypatch.setattr("warpflat.scene.run.load.load_scene", lambda _: None)
+    monkeypatch.setattr("warpflat.scene.load.load_scene", lambda _: None)
     assert main(["run", "cap.toml"]) == 2
     assert capfd.readouterr().err == "warpflat: cannot read or write a temporary file: no space left on device\n"

@@ -128,10 +128,10 @@ os.environ["WARPFLAT_THREADS"] = "2"
 import warp as wp
 wp.config.kernel_cache_dir = {str(tmp_path)!r}
 import numpy as np
-from warpflat import compiling
+from warpflat.core import compile
 from warpflat.kernels.reduce import subtract
-from warpflat.launching import launch_each
-compiling._USUAL = ("sums", "springs")
+from warpflat.core.launch import launch_each
+compile._USUAL = ("reduce", "springs")
 way = np.ones((3, 2))
 launch_each(subtract, 3, [np.full((3, 2), 5.0), np.full((3, 2), 3.0)], [way])
 sys.exit(int(way[0, 0]))

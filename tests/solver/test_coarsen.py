@@ -474,7 +474,7 @@ def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkey
     monkeypatch.setenv("WARPFLAT_THREADS", "2")
     with hierarchy_in_background(piece):
         pass
-    for made_once in ("cells.lay_cells", "springs.measure_edges"):
+    for made_once in ("surface.cells.lay_cells", "model.springs.measure_edges"):
         monkeypatch.setattr(f"warpflat.{made_once}", None)
     for step in coarser_surfaces(piece):
         assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)

@@ -11,7 +11,6 @@ from devices import DEVICE
 from scipy.spatial import Delaunay
 
 from warpflat import flatten_all
-from warpflat.core import free_memory as heap
 from warpflat.cutting.cut_piece import CutPlan, cut
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.flatten_piece import flatten
@@ -25,6 +24,7 @@ from warpflat.solver.multigrid.cascade import cascade_up
 from warpflat.solver.multigrid.cycle import Levels
 from warpflat.solver.multigrid.solve import relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface import mesh
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -400,7 +400,7 @@ def test_what_large_pieces_let_go_of_is_made_again_as_it_was(kind: str, monkeypa
         return make_shape("dome", resolution=16) if kind == "grid" else cracked(16, triangles=kind == "triangles")
 
     kept = flatten(piece(), device=DEVICE)
-    monkeypatch.setattr(heap, "_MUCH_IS_FREED", 100)
+    monkeypatch.setattr(mesh, "_MUCH_IS_FREED", 100)
     surface = piece()
     flat = flatten(surface, device=DEVICE)
     np.testing.assert_array_equal(flat.positions, kept.positions)

@@ -40,8 +40,8 @@ def remove_stale(
     """Write `metrics.json` at the end of a run, and remove what earlier ones have left and would be taken for its own.
 
     That is what a run of the same name has written and this one has not, and of other runs those files that bear no name,
-    such as `pattern.json`; never a file from which this run was made. In an :func:`warpflat.export.output_folder` they go when the new
-    files are there.
+    such as `pattern.json`; never a file from which this run was made. In an
+    :func:`warpflat.core.atomic_files.output_folder` they go when the new files are there.
 
     Args:
         folder: in which the run has written all else.

@@ -244,7 +244,7 @@ class PatternTable(Table):
 
 
 class MarkerTable(Table):
-    """The lay plan on a cloth (see `warpflat.pattern.Cloth`); one garment of each size. Lengths in metres."""
+    """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
 
     width: Annotated[float, Field(ge=0.1, le=10)]
     one_way: bool = False
@@ -287,7 +287,7 @@ class SceneTable(Table):
         ]
         | None
     ) = None
-    """A form's name, or a table of your own (see `warpflat.mannequin.form_from_mapping`)."""
+    """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
     lines: dict[str, LineTable] = Field(default_factory=dict)

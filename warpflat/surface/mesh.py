@@ -24,7 +24,7 @@ _UNKNOWN: Any = object()
 class Surface:
     """One piece of surface in space, checked and ready to be flattened.
 
-    Made by :func:`warpflat.surface.make_surface`, which validates and mends; nothing checks it again.
+    Made by :func:`warpflat.make_surface`, which validates and mends; nothing checks it again.
 
     Attributes:
         vertices: #V by 3, positions [m], float64.

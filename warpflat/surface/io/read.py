@@ -76,11 +76,11 @@ def read_surface(
         units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
             overrides what the file says.
         component: which connected part to take if there are several: "largest", or its number, largest first from 0.
-        name: what to call the piece (see :func:`warpflat.surface.make_surface`); by default the file's stem, or the USD prim's or
+        name: what to call the piece (see :func:`warpflat.make_surface`); by default the file's stem, or the USD prim's or
             GLB node's name, with "_" where no file can bear it.
         prim: which mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
         weld: whether vertices at the same place are one; by default judged by format and mesh (see
-            :func:`warpflat.surface.make_surface`).
+            :func:`warpflat.make_surface`).
 
     Raises:
         InputError: one line that names the file.
