@@ -23,7 +23,7 @@ def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
     worn, before = result.stages[-1].strain_energy_j, uncut.stages[-1].strain_energy_j
     change = {
         "strain energy": (worn, before),
-        "model energy": (result.stages[-1].potential_j, uncut.stages[-1].potential_j),
+        "model energy": (result.stages[-1].model_energy_j, uncut.stages[-1].model_energy_j),
     }
     captions = {"fabric": result.fabric.name}
     for name, (now, then) in change.items():
