@@ -1,4 +1,4 @@
-"""Draws docs/cutting.png, the paper's Fig. 6 on the bodice by formula: energy before and after cuts A and B.
+"""Draw docs/cutting.png, the paper's Fig. 6 for the bodice by formula: energy before and after cuts A and B.
 
 python docs/cutting_figure.py
 """
@@ -12,20 +12,18 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.flattening.result import Flattening
-from warpflat.surface.shapes import make_shape
 
 RESOLUTION = 65
 
 
 def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
-    """A row of the figure."""
+    """Return one row of the figure, with its energies and their change against the uncut piece."""
     worn, before = result.stages[-1].strain_energy_j, uncut.stages[-1].strain_energy_j
     change = {
-        "energy": (result.stages[-1].potential_j, uncut.stages[-1].potential_j),
-        "as worn": (worn, before),
+        "strain energy": (worn, before),
+        "model energy": (result.stages[-1].model_energy_j, uncut.stages[-1].model_energy_j),
     }
     captions = {"fabric": result.fabric.name}
     for name, (now, then) in change.items():
@@ -35,17 +33,17 @@ def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
 
 
 def main(file: str) -> None:
-    """Flatten, cut twice, draw."""
-    surface = make_shape("bodice", resolution=RESOLUTION)
+    """Flatten the bodice, make both cuts and write the figure to `file`."""
+    surface = warpflat.make_shape("bodice", resolution=RESOLUTION)
     grid = np.arange(RESOLUTION**2, dtype=np.int32).reshape(RESOLUTION, RESOLUTION)
     right = round((0.5 - 0.55 / np.pi) * (RESOLUTION - 1))
     left, level = RESOLUTION - 1 - right, round(0.28 / 0.45 * (RESOLUTION - 1))
     uncut = warpflat.flatten(surface, fabric="woven", datum="centre")
-    bust = CutPlan(name="bust", paths=(grid[level, : right + 1], grid[level, left:][::-1]))
-    princess = CutPlan(name="princess", paths=(grid[: level + 1, right], grid[: level + 1, left]))
+    bust = warpflat.CutPlan(name="bust", paths=(grid[level, : right + 1], grid[level, left:][::-1]))
+    princess = warpflat.CutPlan(name="princess", paths=(grid[: level + 1, right], grid[: level + 1, left]))
     rows = [row(uncut, "uncut", uncut)]
     for title, plan in (("A: bust line, from both sides", bust), ("B: princess lines, from the hem", princess)):
-        result = cut(uncut, plan)
+        result = warpflat.cut(uncut, plan)
         rows.append(row(result, title, uncut))
         print(title, rows[-1].captions, f"flips {result.flipped_faces}")
     write_picture(file, rows)
