@@ -15,13 +15,13 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarser, coarser_surfaces
 from warpflat.surface.cells import CellArrays, cells_of
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.edge_paths import chain_positions
 from warpflat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.surface.topology import (
     border_of,
@@ -264,7 +264,7 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
         beside = _beside(surface, grid, datum)
         if beside is not None:
             return beside
-    station = chain_positions(surface.vertices[datum])
+    station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
     lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
@@ -293,7 +293,7 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
         turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
         side = 1.0 if (turns == upwards) != mirrored else -1.0
         positions = np.empty((len(surface.vertices), 2))
-        given = [surface.vertices, ordered, at, side, chain_positions(surface.vertices[datum])]
+        given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
         launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
         return positions
     return None

@@ -8,10 +8,11 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables
-from warpflat.mannequin.profiles import Section, arc_lengths, resample, section_curve
+from warpflat.mannequin.profiles import Section, section_curve
 
 __all__ = ["PRINCESS", "blueprint_from_measurements"]
 
@@ -116,7 +117,7 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
     bust = profile(h["bust"])
     bust_centre_front = np.array([0.0, h["bust"], bust.curve[0, 1]])
     bust_centre_back = np.array([0.0, h["bust"], bust.curve[len(bust.curve) // 2, 1]])
-    side = resample(bust.curve, np.array([bust.side_left / arc_lengths(bust.curve, closed=True)[-1]]), closed=True)[0]
+    side = resample(bust.curve, bust.side_left / polyline_length(bust.curve, closed=True), closed=True)
     under = np.array([side[0] + 0.001, h["underarm"], side[1] - 0.002])
     level = h["underarm"] + _NOTCH * (tip[1] - h["underarm"])
     reach = {"front": 0.050 * size, "back": -0.053 * size}
@@ -148,7 +149,7 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
         t = arc_lengths(points) ** 1.0
         spline = CubicSpline(t, points, bc_type="periodic")
         dense = spline(np.linspace(0.0, t[4], 400))
-        return dense, float(arc_lengths(spline(np.linspace(0.0, t[2], 400)))[-1] / arc_lengths(dense)[-1])
+        return dense, polyline_length(spline(np.linspace(0.0, t[2], 400))) / polyline_length(dense)
 
     curves: dict[str, QuarterCurves] = {}
     for face, line, centre in (
@@ -159,7 +160,7 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
         spline = CubicSpline(arc_lengths(centre), centre)
         left = QuarterCurves(
             neckline=line, bend=0.52, shoulder=np.linspace(side_neck, tip, 50), armhole=hole, notch=notch,
-            chest=chest[face], centre=spline(np.linspace(0.0, arc_lengths(centre)[-1], 100)),
+            chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
         curves[f"{face}-right"] = _mirrored(left)
@@ -184,12 +185,12 @@ def _chest_row(start: FloatArray, end_z: float, length: float, swell: float) -> 
         z = start[2] + (end_z - start[2]) * t**2.6 + swell * np.sin(np.pi * np.clip(t / 0.9, 0.0, 1.0)) ** 2
         return np.column_stack([width * t, np.full_like(t, start[1]), z])
 
-    if arc_lengths(row(0.3 * length))[-1] > length:
+    if polyline_length(row(0.3 * length)) > length:
         raise InputError(
             f"measurements: {200 * length:.1f} cm across chest or back is too little for so deep a bust: wider chest_width or back_width, "
             "or nearer bust_points, would do"
         )
-    width = brentq(lambda w: arc_lengths(row(w))[-1] - length, 0.3 * length, 1.2 * length)
+    width = brentq(lambda w: polyline_length(row(w)) - length, 0.3 * length, 1.2 * length)
     return row(float(width))
 
 
@@ -207,7 +208,7 @@ def _neckline(m: Measurements) -> FloatArray:
     def loop(width: float) -> FloatArray:
         return np.column_stack([0.5 * width * np.sin(t), y, middle + 0.5 * depth * np.cos(t)])
 
-    width = brentq(lambda w: arc_lengths(loop(w), closed=True)[-1] - neck, 0.15 * neck, 0.6 * neck)
+    width = brentq(lambda w: polyline_length(loop(w), closed=True) - neck, 0.15 * neck, 0.6 * neck)
     return loop(float(width))
 
 
@@ -236,7 +237,7 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     def ring(at: float, girth: float, flat: float, forward: float) -> FloatArray:
         # From the underarm (-up) forward; `flat` is the depth over the height of the section.
         shape = np.outer(-np.cos(t), up) + flat * np.outer(np.sin(t), ahead)
-        scale = girth / arc_lengths(shape, closed=True)[-1]
+        scale = girth / polyline_length(shape, closed=True)
         return middle + at * axis + forward * ahead + scale * shape
 
     biceps_at = float((under - middle) @ axis) + 0.030

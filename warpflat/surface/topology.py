@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import polyline_length
 from warpflat.kernels.unfold import unfold_diagonals
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
@@ -386,7 +387,7 @@ def border_loops(faces: ArrayLike, vertices: FloatArray | None = None) -> list[I
     def length(loop: IntArray) -> float:
         if vertices is None:
             return float(len(loop))
-        return float(np.linalg.norm(vertices[loop] - vertices[np.roll(loop, -1)], axis=1).sum())
+        return polyline_length(vertices[loop], closed=True)
 
     return sorted(loops, key=length, reverse=True)
 

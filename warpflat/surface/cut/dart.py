@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.surface.cut.dart_legs import check_tip_back
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -154,8 +155,8 @@ def dart_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> Dar
         angle=angle,
         left_leg=legs[0],
         right_leg=legs[1],
-        left_seam=_length(x[a]),
-        right_seam=_length(x[b]),
+        left_seam=polyline_length(x[a]),
+        right_seam=polyline_length(x[b]),
         intake=sum(legs) * float(np.sin(angle / 2)),
     )
 
@@ -234,7 +235,7 @@ def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float
 
 def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
     """A line with its first point moved to `end` and the next ones along with it, less and less; which ones moved."""
-    reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    reach = arc_lengths(points)
     fade = (
         np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
     )
@@ -301,8 +302,8 @@ def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) ->
         station=station,
         first_angle=_angle(wide[1] - x[a[0]], wide[0] - x[a[0]]),
         last_angle=_angle(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
-        left_seam=_length(x[a]),
-        right_seam=_length(x[b]),
+        left_seam=polyline_length(x[a]),
+        right_seam=polyline_length(x[b]),
     )
 
 
@@ -417,7 +418,3 @@ def _unit(v: FloatArray) -> FloatArray:
     if length <= 0:
         raise InputError("the two legs of the dart point in opposite directions; it has no bisector")
     return v / length
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

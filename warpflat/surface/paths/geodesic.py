@@ -20,9 +20,9 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import arc_lengths
 from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.edge_paths import chain_positions
 from warpflat.surface.paths.lines import line_from_curve
 from warpflat.surface.topology import border_of, components, half_edges_of, order_by, triangulate, unfold_quad_diagonals
 from warpflat.surface.vectors import cross, dot, norm, points_at
@@ -81,7 +81,7 @@ def signed_distance_and_station(
     before = 0
     if extend:
         path, before = extend_to_border(surface, path)
-    station = chain_positions(surface.vertices[path])
+    station = arc_lengths(surface.vertices[path])
     station -= station[before]
     triangles = _short_triangles(surface)
     ways = _Ways(surface, triangles, path.astype(np.int64))
@@ -126,7 +126,7 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
     import potpourri3d
 
     points = surface.vertices[path]
-    length = chain_positions(points)
+    length = arc_lengths(points)
     # A path along edges wanders: its direction is that of its last fifth.
     back = int(np.searchsorted(length, 0.8 * length[-1]))
     direction = points[-1] - points[min(back, len(path) - 2)]
@@ -278,7 +278,7 @@ def _directions_at_line(
     side = np.concatenate([np.zeros(len(path)), np.bincount(number, right * far, minlength=len(beside))])
     nearest = np.arange(len(known))
     nearest[len(path) + number] = at
-    station = chain_positions(surface.vertices[path])[nearest]
+    station = arc_lengths(surface.vertices[path])[nearest]
     about_ends = []
     for end, up in ((0, 1.0), (len(path) - 1, -1.0)):
         about_end = np.column_stack([side, station - station[end]])

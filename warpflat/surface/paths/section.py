@@ -7,6 +7,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import project_on_segments
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.trace import (
     Place,
@@ -155,11 +156,7 @@ def _distances(surface: Surface, places: list[Place], closed: bool, origin: Floa
     """Distance [m] from a point to each segment of a row of places."""
     points = make_path(surface, places).points
     ends = np.roll(points, -1, axis=0) if closed else points[1:]
-    tail = points[: len(ends)]
-    along = ends - tail
-    squared = np.einsum("ij,ij->i", along, along)
-    share = np.clip(np.einsum("ij,ij->i", origin - tail, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-    return np.linalg.norm(tail + share[:, None] * along - origin, axis=1)
+    return project_on_segments(origin, points[: len(ends)], ends)[1]
 
 
 def _inwards(
