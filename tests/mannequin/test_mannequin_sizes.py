@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.layout import make_layout
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names

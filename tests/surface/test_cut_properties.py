@@ -6,11 +6,11 @@ from collections import Counter
 from itertools import pairwise
 
 import numpy as np
-from cut_meshes import cone, cylinder, flat, grid, surface
+from cut_meshes import cone, cylinder, flat, glue, grid, surface
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from warpflat.surface.cut.cut_mesh import cut_along_many, glue
+from warpflat.surface.cut.cut_mesh import cut_along_many
 from warpflat.surface.cut.pieces import apply_cut, split_pieces
 from warpflat.surface.topology import (
     border_edges,

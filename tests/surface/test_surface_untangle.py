@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from surface_meshes import cylinder, grid, plane, scattered
 
-from warpflat.surface import untangle
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.surface.paths.lines import line_on_plane
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.topology import triangulate
+from warpflat.surface.untangle import untangle
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")

@@ -139,11 +139,6 @@ class Mannequin:
                 break
         return cls(layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes)
 
-    @property
-    def brick_names(self) -> list[str]:
-        """Every brick's name, from the neck down, then the arms."""
-        return list(self.layout.bricks)
-
     def brick(self, name: str) -> Brick:
         """A brick with its vertices, faces and neighbours.
 

@@ -26,7 +26,6 @@ __all__ = [
     "DrawnFishEye",
     "FishEyeMeasure",
     "dart_measure",
-    "draw_outline",
     "fish_eye_measure",
     "mouth_first",
     "shape_dart",
@@ -243,32 +242,6 @@ def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArra
     falloff_weights = points + np.multiply.outer(fade, end - points[0])
     falloff_weights[0] = end
     return falloff_weights, fade > 0
-
-
-def draw_outline(
-    positions: ArrayLike, outline: ArrayLike, darts: Sequence[DrawnDart], *, folded: bool = False
-) -> FloatArray:
-    """The outline with cracks replaced by drawn darts.
-
-    Args:
-        positions: #P by 2, the layout [m].
-        outline: #O, the loop of border vertices, the first not repeated.
-        darts: shaped from these positions and this outline.
-        folded: true to run across each dart by its fold point, as the cloth is cut; false to run down one leg to the
-            tip and up the other, as the dart is drawn.
-
-    Returns:
-        #K by 2 [m], in the direction of `outline`, the first point not repeated.
-    """
-    x = np.array(positions, dtype=float)
-    loop = np.asarray(outline).tolist()
-    corner: dict[int, FloatArray] = {}
-    dropped: set[int] = set()
-    for dart in darts:
-        x[dart.moved] = dart.moved_to
-        corner[int(dart.left[-1])] = dart.fold_point if folded else dart.tip
-        dropped |= {int(v) for side in (dart.left, dart.right) for v in side[1:-1]}
-    return np.array([corner.get(v, x[v]) for v in loop if v not in dropped]).reshape(-1, 2)
 
 
 def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:
