@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.surface.cut.cut_mesh import Cut
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges
 
 
 def surface(vertices: NDArray, faces: NDArray, lines: Mapping[str, list[int]] | None = None) -> Surface:

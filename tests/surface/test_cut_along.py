@@ -7,8 +7,9 @@ import pytest
 from cut_meshes import cone, cylinder, glue, grid
 
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import border_loops, euler_characteristic
 from warpflat.surface.cut.cut_mesh import cut_along, cut_along_many, faces_at
-from warpflat.surface.topology import border_edges, border_loops, euler_characteristic
+from warpflat.surface.half_edges import border_edges
 
 FIVE = grid(5, 5)
 

@@ -7,9 +7,9 @@ import pytest
 from cut_meshes import flat, grid
 
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, shape_dart, shape_fish_eye
-from warpflat.surface.topology import border_loops
 
 N = 11
 ANGLE = np.radians(20.0)

@@ -19,11 +19,11 @@ from warpflat.core.polyline import points_at_lengths
 from warpflat.flattening.result import Flattening
 from warpflat.surface.curvature import curvature_tensors
 from warpflat.surface.energy_map import EnergyMap, energy_map, smooth_to_vertices
+from warpflat.surface.half_edges import border_edges, edge_faces
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, path_length
 from warpflat.surface.paths.geodesic import distance_from
 from warpflat.surface.paths.trace import SurfacePath, polyline_path
-from warpflat.surface.topology import border_edges, edge_faces
 
 __all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks"]
 

@@ -32,10 +32,10 @@ from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.cut.pieces import Piece, apply_cut, split_pieces
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.grid import cut_lattice, lattice_of
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface, known_of_faces
 from warpflat.surface.paths.edge_paths import path_length
 from warpflat.surface.paths.trace import SurfacePath
-from warpflat.surface.topology import mesh_edges
 from warpflat.surface.untangle import untangle
 
 __all__ = [

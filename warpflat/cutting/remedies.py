@@ -84,8 +84,8 @@ def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
 
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
+    from warpflat.surface.connectivity import border_of
     from warpflat.surface.paths.lines import line_between
-    from warpflat.surface.topology import border_of
 
     surface = result.surface
     worst = int(result.vertex_origin[misfit.vertex])

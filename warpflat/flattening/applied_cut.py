@@ -11,11 +11,11 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import Seam
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
 from warpflat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops
 
 __all__ = ["AppliedCut", "measure_cut", "seam_kind"]
 

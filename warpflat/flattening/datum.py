@@ -10,13 +10,11 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_between, line_from_indices, line_on_plane
-from warpflat.surface.topology import (
-    half_edges_of,
-    triangulate,
-)
+from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
     pass

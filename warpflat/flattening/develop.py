@@ -20,20 +20,12 @@ from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarser, coarser_surfaces
 from warpflat.surface.cells import CellArrays, cells_of
+from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.half_edges import half_edges, half_edges_of, twins_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.geodesic import signed_distance_and_station
-from warpflat.surface.topology import (
-    border_of,
-    corner_triangles,
-    euler_characteristic,
-    half_edges,
-    half_edges_of,
-    non_manifold_vertices,
-    places_of,
-    triangulate,
-    twins_of,
-)
+from warpflat.surface.triangles import corner_triangles, triangulate
 from warpflat.surface.untangle import signed_cell_areas, untangle
 from warpflat.surface.vectors import norm, points_at
 
@@ -163,7 +155,7 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
     that do not belong together.
     """
-    place = places_of(surface.vertices, surface.faces, border=border_of(surface))
+    place = coincident_vertices(surface.vertices, surface.faces, border=border_of(surface))
     here = np.arange(len(place))
     moves = place != here
     if not moves.any() or len(np.unique(place[datum])) < len(datum):

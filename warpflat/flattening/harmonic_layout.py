@@ -7,11 +7,9 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import (
-    border_loops,
-    triangulate,
-)
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["harmonic_layout"]
 

@@ -13,7 +13,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import segment_lengths
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
-from warpflat.surface.topology import border_loops
+from warpflat.surface.connectivity import border_loops
 
 __all__ = ["line_labels", "piece_from_mesh"]
 

@@ -13,7 +13,7 @@ from warpflat._version import __version__
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import polyline_length
 from warpflat.flattening.result import Flattening
-from warpflat.surface.topology import border_loops
+from warpflat.surface.connectivity import border_loops
 
 __all__ = ["Comparison", "outline"]
 

@@ -16,8 +16,8 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, project_on_segments
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops
 
 __all__ = ["NamedSeam", "SurfaceSeam", "surface_seams"]
 

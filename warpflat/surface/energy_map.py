@@ -15,7 +15,7 @@ from warpflat.core.launch import launch_each
 from warpflat.core.polyline import nearest_on_polyline, segment_lengths
 from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import corner_triangles
+from warpflat.surface.triangles import corner_triangles
 
 __all__ = [
     "EnergyMap",

@@ -19,8 +19,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import components_of, join_labels
+from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import HalfEdges, components_of, half_edges, join_labels
 
 __all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "faces_at"]
 

@@ -10,9 +10,11 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
+from warpflat.surface.connectivity import border_loops
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import as_vertex
-from warpflat.surface.topology import border_loops, half_edges_of, triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["SIDES", "line_on_border", "viewing_frame"]
 

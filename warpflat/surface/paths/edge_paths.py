@@ -11,8 +11,8 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.surface.half_edges import half_edges_of, mesh_edges
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import half_edges_of, mesh_edges
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
@@ -25,7 +25,7 @@ _NEAR_EDGES = 2.0
 
 
 def are_joined(edges: IntArray, a: ArrayLike, b: ArrayLike) -> BoolArray:
-    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`topology.mesh_edges`)."""
+    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`mesh_edges`)."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     begin, end = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
     joined = np.zeros(np.shape(low), dtype=bool)

@@ -21,10 +21,13 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.polyline import arc_lengths
+from warpflat.core.sorting import counting_sort
 from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
+from warpflat.surface.connectivity import border_of, components
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_from_curve
-from warpflat.surface.topology import border_of, components, half_edges_of, order_by, triangulate, unfold_quad_diagonals
+from warpflat.surface.triangles import triangulate, unfold_quad_diagonals
 from warpflat.surface.vectors import cross, dot, norm, points_at
 
 __all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
@@ -175,7 +178,7 @@ class _Ways:
         self._on_line = np.zeros(len(order), dtype=np.int32)
         self._on_line[self._rank[line]] = 1
         corner = self._rank[triangles]
-        slot, offset = order_by(corner.ravel(), len(order))
+        slot, offset = counting_sort(corner.ravel(), len(order))
         ends, seen = np.empty((corner.size, 2), dtype=np.int32), np.empty((corner.size, 3))
         launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
         waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
@@ -212,7 +215,7 @@ class _Ways:
         # Strongly connected components come numbered in such an order, of which nothing but the number of rounds depends.
         parts, label = connected_components(graph, connection="strong")
         straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
-        return order_by(label, parts)[0], straight
+        return counting_sort(label, parts)[0], straight
 
     def _carry(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
         """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
@@ -304,7 +307,7 @@ def _around(
     near = triangles[(place[triangles] >= 0).any(axis=1)]
     corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
     corner = corner[place[corner[:, 0]] >= 0]
-    order, offset = order_by(place[corner[:, 0]], len(path))
+    order, offset = counting_sort(place[corner[:, 0]], len(path))
     corner = corner[order]
     u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
     angle = np.arctan2(norm(cross(u, v)), dot(u, v))

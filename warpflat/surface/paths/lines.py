@@ -17,10 +17,10 @@ from warpflat.core.errors import InputError
 from warpflat.core.file_names import checked_label
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
 from warpflat.core.text import shown
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, are_joined, as_vertex, path_in
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import half_edges_of
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 

@@ -19,7 +19,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length, project_on_segments
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = [
     "Place",
@@ -62,6 +62,11 @@ class SurfacePath:
     def length(self) -> float:
         """Length [m]."""
         return polyline_length(self.points, closed=self.closed)
+
+    def place(self, index: int) -> Place:
+        """Return the place of a point, as its weights by vertex."""
+        support, weights = self.support[index].tolist(), self.weights[index].tolist()
+        return {v: w for v, w in zip(support, weights, strict=True) if v >= 0 and w > 0}
 
 
 def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
