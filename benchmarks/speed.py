@@ -44,7 +44,7 @@ import warpflat
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.strain import layout_errors
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 FloatArray = NDArray[np.float64]
 

@@ -23,7 +23,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.scene.cuts import plan_cuts
 from warpflat.scene.schema import CutTable
 from warpflat.solver.relax import Relaxation, RelaxOptions
-from warpflat.surface import topology
+from warpflat.surface import half_edges as mesh_half_edges
 from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.cut.pieces import apply_cut
@@ -219,12 +219,12 @@ def test_what_a_cut_knows_of_its_faces_is_not_worked_out_again(
 ):
     made: list[NDArray[np.int32]] = []
 
-    def noted(faces: NDArray[np.int32]) -> topology.HalfEdges:
+    def noted(faces: NDArray[np.int32]) -> mesh_half_edges.HalfEdges:
         made.append(faces)
         return half_edges(faces)
 
-    half_edges = topology.half_edges
-    monkeypatch.setattr(topology, "half_edges", noted)
+    half_edges = mesh_half_edges.half_edges
+    monkeypatch.setattr(mesh_half_edges, "half_edges", noted)
     again = cut(bodice, CutPlan(name="again", paths=bust_cut.cuts[0].paths), relax=RelaxOptions(max_steps=1))
     assert np.array_equal(again.faces, bust_cut.faces)
     assert sum(faces is again.faces for faces in made) == 1

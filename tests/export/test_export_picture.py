@@ -17,7 +17,8 @@ from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import png_bytes
 from warpflat.export.raster import Samples, rasterise, shade
-from warpflat.surface.topology import border_edges, triangulate
+from warpflat.surface.half_edges import border_edges
+from warpflat.surface.triangles import triangulate
 
 
 def piece_of(shape, density=None, **options) -> PicturePiece:

@@ -61,7 +61,8 @@ def test_the_library_holds_the_entries_of_the_literature_table():
     second_hand = {"wool-suiting", "cotton", "stretch-twill"}
     assert set(expected) | estimated | second_hand | {"woven", "isotropic"} == set(library)
     for name in estimated:
-        assert {"stiffness_warp", "stiffness_weft", "areal_density"} <= set(library[name].estimates)
+        for key in ("stiffness_warp", "stiffness_weft", "areal_density"):
+            assert library[name].provenance[key].is_estimate
 
 
 @pytest.mark.parametrize("fabric", load_library().values(), ids=lambda fabric: fabric.name)
@@ -84,7 +85,7 @@ def test_woven_is_the_measured_wool_plain_weave_balanced():
     wool = find_fabric("wool-plain")
     assert fabric.stiffness_warp == fabric.stiffness_weft == (wool.stiffness_warp + wool.stiffness_weft) / 2
     assert fabric.shear_stiffness == wool.shear_stiffness
-    assert not fabric.estimates
+    assert not any(origin.is_estimate for origin in fabric.provenance.values())
 
 
 def test_the_default_fabric_is_shipped():

@@ -12,12 +12,13 @@ from warpflat.flattening.develop import _winds_twice, develop, flat_layout, geod
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.surface.cells import cells_of
 from warpflat.surface.cut.cut_mesh import cut_along
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_from_indices
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import mesh_edges, triangulate
+from warpflat.surface.triangles import triangulate
 from warpflat.surface.untangle import signed_cell_areas, untangle
 
 FloatArray = NDArray[np.float64]

@@ -18,10 +18,10 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import Model
 from warpflat.model.wear import Wear
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import half_edges_of
 
 
 def cloth(shear: float) -> Fabric:

@@ -26,10 +26,10 @@ from warpflat.solver.multigrid.cycle import Levels
 from warpflat.solver.multigrid.solve import _Cycles, _Pace, multigrid_pays, relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
 from warpflat.surface.cells import cells_of
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import border_loops
 
 CLOTH = Fabric(
     name="cloth",

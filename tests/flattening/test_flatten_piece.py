@@ -29,11 +29,11 @@ from warpflat.scene.compare import laid_upon
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 from warpflat.solver.relax import RelaxOptions, Solver
+from warpflat.surface.half_edges import border_edges, mesh_edges
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import border_edges, mesh_edges
 
 FloatArray = NDArray[np.float64]
 

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.cutting.cut_piece import CutPlan, cut
 from warpflat.cutting.remedies import advise
 from warpflat.flattening.edit import change_fabric, change_surface
@@ -20,7 +21,6 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import FixedLength
 from warpflat.garment.ease import SeamWish
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.seam_length import polyline_length
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.wear import Wear

@@ -18,9 +18,9 @@ from warpflat.model.membrane import cloth_of
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.membrane_stiffness import TangentMatrix
 from warpflat.solver.smoother import STEADY
+from warpflat.surface.half_edges import border_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.topology import border_edges
 
 CLOTH = Fabric(
     name="cloth",

@@ -18,8 +18,8 @@ from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import quad_stiffness, shear_hold, springs_of, springs_of_sides
 from warpflat.surface.cells import cells_of
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges
 
 FloatArray = NDArray[np.float64]
 

@@ -9,10 +9,11 @@ from warpflat.kernels.unfold import measure_triangles
 
 from warpflat.core.launch import launch_each
 from warpflat.surface.cells import cells_of
+from warpflat.surface.connectivity import coincident_vertices
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import corner_triangles, places_of, unfold_quad_diagonals
+from warpflat.surface.triangles import corner_triangles, unfold_quad_diagonals
 from warpflat.surface.unfold import quad_creases
 
 FloatArray = NDArray[np.float64]
@@ -71,7 +72,7 @@ def creases(surface: Surface) -> NDArray[np.int8]:
     p = vertices[faces]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     normal[is_quad] = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])[is_quad]
-    place = places_of(vertices, faces)
+    place = coincident_vertices(vertices, faces)
     at_vertex = np.zeros_like(vertices)
     for k in range(4):
         there = faces[:, k] >= 0

@@ -56,7 +56,7 @@ def test_neighbours_share_their_border_exactly(body: Mannequin) -> None:
         other = body.brick(others[0])
         assert np.array_equal(ends[side](chest.vertices), ends[opposite[side]](other.vertices))
     # Every neighbourhood is mutual.
-    for name in body.brick_names:
+    for name in body.layout.bricks:
         for others in body.brick(name).neighbours.values():
             for other in others:
                 assert any(name in back for back in body.brick(other).neighbours.values()), (name, other)

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
 from warpflat.mannequin.blend import blended
-from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.forms import form_from_mapping, form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.profiles import convex_girth

@@ -43,7 +43,7 @@ def test_usd_holds_bricks_and_lines(written: tuple[Mannequin, dict[str, Path]]) 
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/body"))
     assert np.allclose(np.array(mesh.GetPointsAttr().Get()), body.vertices, atol=1e-6)
     subsets = {s.GetPrim().GetDisplayName(): s for s in UsdGeom.Subset.GetAllGeomSubsets(mesh)}
-    assert set(subsets) == set(body.brick_names)
+    assert set(subsets) == set(body.layout.bricks)
     name = "waist-abdomen/front-left-centre"
     assert sorted(subsets[name].GetIndicesAttr().Get()) == body.brick(name).faces.tolist()
     covered = np.concatenate([np.array(s.GetIndicesAttr().Get()) for s in subsets.values()])

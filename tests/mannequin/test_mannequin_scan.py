@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.scan_pose import ScanOptions

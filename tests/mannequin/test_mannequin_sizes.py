@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.checks import self_intersections
 from warpflat.mannequin.layout import make_layout
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.measurements import measurements_from_size, measurements_from_values, size_names
 from warpflat.mannequin.normals import face_normals
-from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth, superellipse_exponent
+from warpflat.mannequin.profiles import convex_girth, scale_to_girth, superellipse_exponent
 
 SIZES = [name for name in size_names() if not name.startswith("UK")]
 GIRTHS = ("bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee", "ankle", "neck")
@@ -281,9 +281,3 @@ def test_superellipse_fills_its_box() -> None:
     assert superellipse_exponent(np.pi / 4) == pytest.approx(2.0)
     with pytest.raises(InputError, match=r"0\.6 to 0\.97"):
         superellipse_exponent(0.99)
-
-
-def test_arc_lengths_close() -> None:
-    square = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
-    assert arc_lengths(square, closed=True)[-1] == 4.0
-    assert arc_lengths(square)[-1] == 3.0

@@ -22,9 +22,9 @@ from warpflat.scene.load import load_scene
 from warpflat.scene.surface import scene_surface
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import mesh_edges
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: the folder with the real meshes")

@@ -11,7 +11,8 @@ from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
 
 from warpflat.core.errors import InputError
-from warpflat.pattern.curves import arc_lengths, fit_curve, turning_angles
+from warpflat.core.polyline import arc_lengths, turning_angles
+from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.layout import lay_out, nests
@@ -480,10 +481,6 @@ def test_drafting_twice_gives_the_same_to_the_bit():
     once, again = (draft_garment(sample_dress(("38",))) for _ in range(2))
     for a, b in zip(once.pieces["38"], again.pieces["38"], strict=True):
         assert np.array_equal(a.cut_line, b.cut_line)
-
-
-def test_arc_lengths_of_a_unit_square():
-    assert arc_lengths(np.array([(0, 0), (1, 0), (1, 1)], dtype=float)).tolist() == [0.0, 1.0, 2.0]
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.interpolate import BSpline, splprep
 
-from warpflat.pattern.curves import arc_lengths
+from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.spline_lengths import HELD, _LengthSystem, with_lengths
 
 FloatArray = NDArray[np.float64]

@@ -28,19 +28,13 @@ from warpflat.solver.multigrid.coarsen import (
 )
 from warpflat.solver.multigrid.grid_coarsening import ResamplingKind
 from warpflat.surface.cells import cells_of
+from warpflat.surface.connectivity import border_loops, components, euler_characteristic, non_manifold_vertices
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.half_edges import half_edges_of, non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import (
-    border_loops,
-    components,
-    euler_characteristic,
-    half_edges_of,
-    non_manifold_edges,
-    non_manifold_vertices,
-)
 from warpflat.surface.untangle import signed_cell_areas
 
 FloatArray = NDArray[np.float64]

@@ -15,9 +15,9 @@ from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Energies
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import mesh_edges
 
 FloatArray = NDArray[np.float64]
 

@@ -7,8 +7,9 @@ from collections.abc import Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.surface.cut.cut_mesh import Cut
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges
 
 
 def surface(vertices: NDArray, faces: NDArray, lines: Mapping[str, list[int]] | None = None) -> Surface:
@@ -76,3 +77,11 @@ def cone(around: int, rows: int) -> Surface:
 
 def edge_set(faces: NDArray) -> set[tuple[int, int]]:
     return {(a, b) for a, b in half_edges(faces).edges.tolist()}
+
+
+def glue(cut: Cut) -> NDArray[np.int32]:
+    """The faces before the cut (#F by 4), bit for bit: every copy of a vertex becomes the old vertex again."""
+    faces = cut.faces.copy()
+    used = faces >= 0
+    faces[used] = cut.vertex_origin[faces[used]]
+    return faces

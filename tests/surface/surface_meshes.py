@@ -7,16 +7,9 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from warpflat.surface.connectivity import components, non_manifold_vertices, orient
+from warpflat.surface.half_edges import border_edges, half_edges, mesh_edges, non_manifold_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import (
-    border_edges,
-    components,
-    half_edges,
-    mesh_edges,
-    non_manifold_edges,
-    non_manifold_vertices,
-    orient,
-)
 
 Place = Callable[[NDArray[np.float64], NDArray[np.float64]], NDArray[np.float64]]
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from cut_meshes import cone, cylinder, grid
+from cut_meshes import cone, cylinder, glue, grid
 
 from warpflat.core.errors import InputError
-from warpflat.surface.cut.cut_mesh import cut_along, cut_along_many, faces_at, glue
-from warpflat.surface.topology import border_edges, border_loops, euler_characteristic
+from warpflat.surface.connectivity import border_loops, euler_characteristic
+from warpflat.surface.cut.cut_mesh import cut_along, cut_along_many, faces_at
+from warpflat.surface.half_edges import border_edges
 
 FIVE = grid(5, 5)
 
@@ -86,14 +87,6 @@ def test_cone_cut_along_a_generator_stays_a_disk_with_its_apex_whole():
     loop = border_loops(cut.faces)[0]
     assert len(loop) == 10 + 2 * 4
     assert apex in loop
-
-
-def test_vertex_components_follow_the_pieces():
-    cut = cut_along(FIVE, [2, 7, 12, 17, 22], vertex_count=25)
-    piece = cut.vertex_component
-    assert piece[cut.left].tolist() == [0] * 5
-    assert piece[cut.right].tolist() == [1] * 5
-    assert piece[4] == 1
 
 
 def test_cuts_that_meet_in_a_point():

@@ -6,20 +6,15 @@ from collections import Counter
 from itertools import pairwise
 
 import numpy as np
-from cut_meshes import cone, cylinder, flat, grid, surface
+from cut_meshes import cone, cylinder, flat, glue, grid, surface
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from warpflat.surface.cut.cut_mesh import cut_along_many, glue
+from warpflat.surface.connectivity import euler_characteristic, non_manifold_vertices
+from warpflat.surface.cut.cut_mesh import cut_along_many
 from warpflat.surface.cut.pieces import apply_cut, split_pieces
-from warpflat.surface.topology import (
-    border_edges,
-    corner_triangles,
-    euler_characteristic,
-    half_edges,
-    non_manifold_edges,
-    non_manifold_vertices,
-)
+from warpflat.surface.half_edges import border_edges, half_edges, non_manifold_edges
+from warpflat.surface.triangles import corner_triangles
 
 SETTINGS = settings(max_examples=120, deadline=None, derandomize=True, database=None)
 

@@ -7,16 +7,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from cut_meshes import cylinder, dome, edge_set, flat, grid, surface
+from cut_meshes import cylinder, dome, edge_set, flat, glue, grid, surface
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from warpflat.core.errors import InputError
-from warpflat.surface.cut.cut_mesh import cut_along, glue
+from warpflat.surface.connectivity import euler_characteristic, non_manifold_vertices
+from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.cut.split_faces import split_faces_along
+from warpflat.surface.half_edges import border_edges, non_manifold_edges
 from warpflat.surface.paths.section import plane_path, plane_section
 from warpflat.surface.paths.trace import VertexStar, geodesic_path, locate, path_triangles, polyline_path
-from warpflat.surface.topology import border_edges, euler_characteristic, non_manifold_edges, non_manifold_vertices
 
 DATA = os.environ.get("WARPFLAT_DATA")
 

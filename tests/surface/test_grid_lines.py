@@ -9,10 +9,10 @@ import pytest
 
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import mesh_edges
 
 
 def cracked(seed: int = 0) -> Surface:

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.shapes import SHAPES, make_shape
-from warpflat.surface.topology import border_loops
 
 
 def line_length(surface, name: str) -> float:

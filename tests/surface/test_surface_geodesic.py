@@ -12,7 +12,7 @@ from warpflat.surface.io.read import read_surface
 from warpflat.surface.paths.geodesic import distance_from, extend_to_border, signed_distance_and_station
 from warpflat.surface.paths.lines import line_on_plane
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")

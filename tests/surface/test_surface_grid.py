@@ -11,13 +11,14 @@ from surface_meshes import numbered_grid as grid
 
 from warpflat.solver.multigrid.coarsen import coarser, coarser_surfaces
 from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
+from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_columns
+from warpflat.surface.half_edges import non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import border_loops, components, euler_characteristic, non_manifold_edges
 
 BoolArray = NDArray[np.bool_]
 

@@ -5,10 +5,10 @@ import pytest
 from surface_meshes import check_invariants, cylinder, grid, scattered, sphere
 
 from warpflat.core.errors import InputError
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.paths.border import line_on_border
 from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.topology import mesh_edges
 
 
 def runs_along_edges(surface, line):

@@ -11,7 +11,7 @@ from surface_meshes import check_invariants, cylinder, grid
 from warpflat.core.errors import InputError
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.io.read_obj import chain_lines
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 SQUARE = "v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\n"
 

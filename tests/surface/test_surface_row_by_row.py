@@ -7,9 +7,9 @@ import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import half_edges
 from warpflat.surface.unfold import corners_around
 
 TURNS = [(turn, mirrored) for turn in range(4) for mirrored in (False, True)]

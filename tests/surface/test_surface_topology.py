@@ -7,28 +7,27 @@ from hypothesis import strategies as st
 from surface_meshes import grid
 
 from warpflat.core.errors import InputError
-from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import (
-    border_edges,
+from warpflat.core.sorting import counting_sort, stable_argsort
+from warpflat.surface.connectivity import (
     border_loops,
+    coincident_vertices,
     components,
-    corner_triangles,
-    edge_faces,
     euler_characteristic,
+    join_labels,
+    non_manifold_vertices,
+    orient,
+)
+from warpflat.surface.half_edges import (
+    border_edges,
+    edge_faces,
     half_edges,
     half_edges_of,
-    join_labels,
     mesh_edges,
     non_manifold_edges,
-    non_manifold_vertices,
-    order_by,
-    orient,
-    places_of,
-    stable_order,
-    triangulate,
     twins_of,
-    unfold_quad_diagonals,
 )
+from warpflat.surface.mesh import Surface
+from warpflat.surface.triangles import corner_triangles, triangulate, unfold_quad_diagonals
 
 MIXED = np.array([[0, 1, 2, 3], [1, 4, 2, -1]], dtype=np.int32)
 
@@ -252,17 +251,17 @@ def test_triangles_have_no_diagonals():
 def test_stable_order_is_that_of_a_stable_sort(greatest):
     keys = np.random.default_rng(4).integers(0, greatest, 500, dtype=np.int64)
     keys[::7] = keys[0]
-    assert np.array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
-    assert len(stable_order(keys[:0])) == 0
+    assert np.array_equal(stable_argsort(keys), np.argsort(keys, kind="stable"))
+    assert len(stable_argsort(keys[:0])) == 0
 
 
 def test_order_by_is_that_of_a_stable_sort_and_says_where_each_number_begins():
     keys = np.random.default_rng(4).integers(0, 20, 300, dtype=np.int32)
     keys[keys == 7] = 8
-    order, offset = order_by(keys, 22)
+    order, offset = counting_sort(keys, 22)
     assert np.array_equal(order, np.argsort(keys, kind="stable"))
     assert np.array_equal(offset, np.searchsorted(np.sort(keys), np.arange(23)))
-    none, offset = order_by(keys[:0], 3)
+    none, offset = counting_sort(keys[:0], 3)
     assert len(none) == 0
     assert offset.tolist() == [0, 0, 0, 0]
 
@@ -295,7 +294,7 @@ def test_half_edges_of_a_surface_are_made_once_and_not_to_be_changed():
 
 def test_the_two_sides_of_a_crack_are_at_one_place():
     vertices, quads = grid(4, 4)
-    assert np.array_equal(places_of(vertices, quads), np.arange(16))
+    assert np.array_equal(coincident_vertices(vertices, quads), np.arange(16))
     # The faces right of the line 1, 5, 9 get vertices 16, 17, 18 there, in the very same places.
     cut = quads.copy()
     right = np.isin(np.arange(9) % 3, [1, 2])
@@ -304,9 +303,11 @@ def test_the_two_sides_of_a_crack_are_at_one_place():
     # Another one inside, at the place of vertex 6, is no side of a crack.
     both = np.concatenate([vertices, vertices[[1, 5, 9]]])
     both[10] = both[6]
-    assert places_of(both, cut)[16:].tolist() == [1, 5, 9]
-    assert np.array_equal(places_of(both, cut)[:16], np.arange(16))
-    assert np.array_equal(places_of(both, cut, border=np.unique(border_edges(cut))), places_of(both, cut))
+    assert coincident_vertices(both, cut)[16:].tolist() == [1, 5, 9]
+    assert np.array_equal(coincident_vertices(both, cut)[:16], np.arange(16))
+    assert np.array_equal(
+        coincident_vertices(both, cut, border=np.unique(border_edges(cut))), coincident_vertices(both, cut)
+    )
 
 
 def test_twins_run_along_the_same_edge_the_other_way():

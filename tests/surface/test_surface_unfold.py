@@ -12,7 +12,7 @@ from warpflat.surface.cells import cells_of
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
-from warpflat.surface.topology import unfold_quad_diagonals
+from warpflat.surface.triangles import unfold_quad_diagonals
 from warpflat.surface.unfold import lay_cells, quad_creases
 
 FloatArray = NDArray[np.float64]

@@ -10,11 +10,12 @@ from hypothesis import strategies as st
 from surface_meshes import check_invariants, cylinder, grid, scattered
 
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.repair.polygons import _quad_corners, crossed_quads
 from warpflat.surface.repair.slivers import degenerate_faces
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.topology import border_loops, triangulate
+from warpflat.surface.triangles import triangulate
 
 DATA = os.environ.get("WARPFLAT_DATA")
 needs_data = pytest.mark.skipif(not DATA, reason="WARPFLAT_DATA is not set: no real meshes")

@@ -15,14 +15,15 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import points_at_lengths
 from warpflat.flattening.result import Flattening
 from warpflat.surface.curvature import curvature_tensors
 from warpflat.surface.energy_map import EnergyMap, energy_map, smooth_to_vertices
+from warpflat.surface.half_edges import border_edges, edge_faces
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.edge_paths import EdgeGraph, chain_positions
+from warpflat.surface.paths.edge_paths import EdgeGraph, path_length
 from warpflat.surface.paths.geodesic import distance_from
 from warpflat.surface.paths.trace import SurfacePath, polyline_path
-from warpflat.surface.topology import border_edges, edge_faces
 
 __all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks"]
 
@@ -171,7 +172,7 @@ def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> 
             if not len(outwards):
                 continue
             path = part[len(part) - 1 - int(outwards[0]) :]
-            if _length(surface, path) > _SHORTEST * size and _is_free(result, path):
+            if path_length(surface, [path]) > _SHORTEST * size and _is_free(result, path):
                 others = [other for k, other in enumerate(peaks.vertices) if k != number]
                 if others and min(_distance(surface, path, other) for other in others) < _REACH * size:
                     # It would run through another peak to this one; the part up to that is a candidate of its own.
@@ -238,7 +239,7 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     last = int(np.flatnonzero(np.isin(chain, rim)).max())
     path = path[last:]
     surface = result.surface
-    if len(path) < 2 or _length(surface, path) < _SHORTEST * _diagonal(surface) or not _is_free(result, path):
+    if len(path) < 2 or path_length(surface, [path]) < _SHORTEST * _diagonal(surface) or not _is_free(result, path):
         return None
     name = f"free path {_made_before(result, 'free path') + number + 1}"
     if surface.is_quad.all():
@@ -273,8 +274,7 @@ def _ways_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candida
     for kind, share in _INWARDS.items():
         try:
             way = polyline_path(surface, [start, hearts[nearest]])
-            station = share * way.length
-            point = np.array([np.interp(station, chain_positions(way.points), x) for x in way.points.T])
+            point = points_at_lengths(way.points, share * way.length)
             tip = int(np.argmin(np.linalg.norm(surface.vertices - point, axis=1)))
             drawn = polyline_path(surface, [start, tip])
         except InputError:
@@ -338,12 +338,8 @@ def _corners(points: FloatArray, stray: float) -> list[int]:
     return sorted(kept)
 
 
-def _length(surface: Surface, path: IntArray) -> float:
-    return float(np.linalg.norm(np.diff(surface.vertices[path], axis=0), axis=1).sum())
-
-
 def _extent(surface: Surface, one: Candidate) -> float:
-    return sum(_length(surface, path) for path in one.paths) + sum(path.length for path in one.drawn)
+    return path_length(surface, one.paths) + sum(path.length for path in one.drawn)
 
 
 def _without_doubles(candidates: list[Candidate]) -> list[Candidate]:

@@ -17,6 +17,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.applied_cut import AppliedCut, seam_kind
 from warpflat.flattening.datum import choose_datum
 from warpflat.flattening.develop import develop
@@ -31,10 +32,10 @@ from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.cut.pieces import Piece, apply_cut, split_pieces
 from warpflat.surface.cut.split_faces import split_faces_along
 from warpflat.surface.grid import cut_lattice, lattice_of
+from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface, known_of_faces
 from warpflat.surface.paths.edge_paths import path_length
 from warpflat.surface.paths.trace import SurfacePath
-from warpflat.surface.topology import mesh_edges
 from warpflat.surface.untangle import untangle
 
 __all__ = [
@@ -83,8 +84,8 @@ def line_part(surface: Surface, name: str, part: tuple[float, float] = (0.0, 1.0
     if name not in surface.lines:
         raise InputError(f"piece {surface.name!r} has no line {name!r} to cut along; {nearest(name, surface.lines)}")
     line = np.asarray(surface.lines[name], dtype=np.int32)
-    step = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1)
-    station = np.concatenate([[0.0], np.cumsum(step)]) / max(float(step.sum()), np.finfo(float).tiny)
+    arc = arc_lengths(surface.vertices[line])
+    station = arc / max(float(arc[-1]), np.finfo(float).tiny)
     first, last = (int(np.argmin(np.abs(station - share))) for share in part)
     if not (min(part) >= 0.0 and max(part) <= 1.0) or first == last:
         raise InputError(

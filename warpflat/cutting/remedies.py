@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.model.fit import Misfit, WornFit, assess_fit
 
 if TYPE_CHECKING:
@@ -83,8 +84,8 @@ def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
 
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
+    from warpflat.surface.connectivity import border_of
     from warpflat.surface.paths.lines import line_between
-    from warpflat.surface.topology import border_of
 
     surface = result.surface
     worst = int(result.vertex_origin[misfit.vertex])
@@ -134,7 +135,7 @@ def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
 
 def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy:
     points = result.surface.vertices[path]
-    length = float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+    length = polyline_length(points)
     start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
     return Remedy(
         words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm", path=path.astype(np.int32), length=length

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = [
     "Polylines",
@@ -92,7 +92,7 @@ def corner_average(
 def outline_edges(faces: IntArray) -> IntArray:
     """#B by 2, the edges with one face only, as (lower, higher) vertex: outer border, holes and the sides of cracks.
 
-    The same edges as ``warpflat.surface.topology.border_edges`` without their direction, which costs a sort of one
+    The same edges as ``warpflat.surface.half_edges.border_edges`` without their direction, which costs a sort of one
     array instead of an indexed one: it matters at a million faces.
     """
     keys = []

@@ -8,15 +8,14 @@ from dataclasses import dataclass
 from itertools import islice, pairwise
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.polyline import points_at_lengths, polyline_length, resample
 
 __all__ = [
     "LabelRoom",
     "Spot",
     "along_line",
-    "at_shares",
     "away_from",
     "beside",
     "beyond_ends",
@@ -176,31 +175,23 @@ def _discs(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
 
 def points_on(line: FloatArray, step: float) -> FloatArray:
     """#N by 2, points on a polyline (#M by 2) [in], no farther apart along it than a step, its ends among them."""
-    length = float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
-    return at_shares(line, np.linspace(0.0, 1.0, max(2, math.ceil(length / max(step, 1e-3)) + 1)))
+    return resample(line, np.linspace(0.0, 1.0, max(2, math.ceil(polyline_length(line) / max(step, 1e-3)) + 1)))
 
 
 def along_line(line: FloatArray, width: float, clearance: float) -> Iterator[Spot]:
     """Spots beside a polyline (#N by 2) [in] and parallel to it, from its middle outwards, on either side."""
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    total = float(steps.sum())
+    total = polyline_length(line)
     if total < 1.05 * width:
         return
-    reached = np.concatenate([[0.0], np.cumsum(steps)])
-
-    def at(distance: float) -> FloatArray:
-        return np.array([np.interp(distance, reached, line[:, axis]) for axis in range(2)])
-
     for share in (0.5, 0.42, 0.58, 0.35, 0.65, 0.28, 0.72, 0.22, 0.78, 0.16, 0.84, 0.1, 0.9):
         centre = min(max(share * total, 0.52 * width), total - 0.52 * width)
-        before, after = at(centre - 0.5 * width), at(centre + 0.5 * width)
+        stretch = points_at_lengths(line, centre + np.linspace(-0.5, 0.5, 9) * width)
+        before, after = stretch[[0, -1]]
         direction = (after - before) / max(float(np.linalg.norm(after - before)), 1e-12)
         if direction[0] < -1e-3 or (abs(direction[0]) <= 1e-3 and direction[1] < 0):
             direction = -direction
         # Beside the whole stretch, however it bends.
-        bend = (np.array([at(centre + shift * width) for shift in np.linspace(-0.5, 0.5, 9)]) - before) @ np.array(
-            [-direction[1], direction[0]]
-        )
+        bend = (stretch - before) @ np.array([-direction[1], direction[0]])
         middle = 0.5 * (before + after)
         for offset in (float(bend.max()) + clearance, float(bend.min()) - clearance):
             x, y = middle + offset * np.array([-direction[1], direction[0]])
@@ -242,13 +233,6 @@ def beside(
             for side in sides:
                 x = point[0] + side * (far + 0.5 * width)
                 yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
-
-
-def at_shares(line: FloatArray, shares: ArrayLike) -> FloatArray:
-    """Points of a polyline (#N by 2) [in] at these shares of its length, one for each."""
-    reached = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    places = np.asarray(shares) * reached[-1]
-    return np.column_stack([np.interp(places, reached, line[:, axis]) for axis in range(2)])
 
 
 def away_from(line: FloatArray, width: float) -> Iterator[Spot]:

@@ -11,11 +11,11 @@ from collections.abc import Iterable, Iterator
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.polyline import polyline_length, resample
 from warpflat.export.labels import (
     LabelRoom,
     Spot,
     along_line,
-    at_shares,
     away_from,
     beside,
     beyond_ends,
@@ -131,7 +131,7 @@ class _Names:
         spots = beside([(float(end[0]), float(end[1]))], width, [side])
         out = next(self._clear(spots, width, height, covered=False), None)
         leader = None if out is None else leader_of(out, width)
-        return np.inf if leader is None else _length_of(leader)
+        return np.inf if leader is None else polyline_length(leader)
 
     def put_outside(self, names: Iterable[str]) -> None:
         """Off the cloth beside their lines, level, as near as there is room."""
@@ -142,7 +142,7 @@ class _Names:
 
     def _own_points(self, name: str) -> list[tuple[float, float]]:
         """Points of a line that are not near to others, if there are such."""
-        points = at_shares(self._lines[name], _SHARES)
+        points = resample(self._lines[name], _SHARES)
         others = np.concatenate([np.empty((0, 2)), *(line for other, line in self._lines.items() if other != name)])
         away = np.linalg.norm(points[:, None] - others, axis=2).min(axis=1, initial=np.inf)
         clear = away > _OF_ANOTHER if (away > _OF_ANOTHER).any() else np.ones(len(points), dtype=bool)
@@ -199,9 +199,4 @@ def _draw(pen: Pen, drawn: DrawnView, parts: list[IntArray], *, is_datum: bool) 
                 pen.line(points, width=1.3, colour=GRAIN if is_datum else INK, style=style, halo=True)
         else:
             drawn.draw_segments(pen.axes, np.column_stack([part[:-1], part[1:]]), width=1.1, halo=True, zorder=5)
-    return max(visible, key=_length_of)
-
-
-def _length_of(line: FloatArray) -> float:
-    """The length of a polyline (#N by 2) [in]."""
-    return float(np.linalg.norm(np.diff(line, axis=0), axis=1).sum())
+    return max(visible, key=polyline_length)

@@ -14,7 +14,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["DrawnView", "Facets", "View", "facets_of", "pattern_view", "surface_view"]
 

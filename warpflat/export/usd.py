@@ -36,7 +36,7 @@ from warpflat.export.usd_prims import (
     valid_name,
 )
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["FrameWriter"]
 

@@ -176,11 +176,6 @@ class Fabric:
             pulled = np.where(e > xs[-1], ys[-1] + slope * (e - xs[-1]), np.interp(e, xs, ys))
         return np.where(e < 0.0, self.compression_factor * stiffness * e, pulled)
 
-    @property
-    def estimates(self) -> tuple[str, ...]:
-        """Names of the values that are estimates."""
-        return tuple(key for key, origin in self.provenance.items() if origin.is_estimate)
-
 
 def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
     """Return a library's fabric of that name or alias; case, spaces and underscores do not matter.

@@ -10,11 +10,12 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.cut_mesh import Seam
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_first, shape_dart, shape_fish_eye
 from warpflat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops
 
 __all__ = ["AppliedCut", "measure_cut", "seam_kind"]
 
@@ -89,8 +90,7 @@ def _measure_seam(
         gap = np.linalg.norm(positions[seam.left] - positions[seam.right], axis=1)
         found |= {"opening_m": float(gap[[0, -1]].max()), "widest_m": float(gap.max())}
     for side, line in (("left", seam.left), ("right", seam.right)):
-        steps = np.linalg.norm(np.diff(positions[line], axis=0), axis=1)
-        found[f"{side}_seam_m"] = float(steps.sum())
+        found[f"{side}_seam_m"] = polyline_length(positions[line])
     if kind != "parting":
         found["drawn"] = _drawn(positions, seam, kind, tip_back, loops)
     return found
@@ -129,7 +129,7 @@ def _curved(left: FloatArray, right: FloatArray) -> dict[str, Any]:
     """A dart along its curved legs, both from the border to the tip."""
     tip = left[-1]
     to_left, to_right = left[0] - tip, right[0] - tip
-    lengths = [float(np.linalg.norm(np.diff(leg, axis=0), axis=1).sum()) for leg in (left, right)]
+    lengths = [polyline_length(leg) for leg in (left, right)]
     return {
         "leg_m": sum(lengths) / 2,
         "angle_deg": math.degrees(np.arctan2(abs(np.linalg.det([to_left, to_right])), to_left @ to_right)),

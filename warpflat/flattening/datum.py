@@ -9,13 +9,12 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import polyline_length
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_between, line_from_indices, line_on_plane
-from warpflat.surface.topology import (
-    half_edges_of,
-    triangulate,
-)
+from warpflat.surface.triangles import triangulate
 
 if TYPE_CHECKING:
     pass
@@ -170,6 +169,6 @@ def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntA
 
 def datum_extent(surface: Surface, line: IntArray) -> str:
     """How long a datum is (vertex indices of the line), and its ends as they were read."""
-    length = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1).sum()
+    length = polyline_length(surface.vertices[line])
     ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
     return f"{100 * length:.1f} cm ({ends})"

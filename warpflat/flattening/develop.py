@@ -15,25 +15,17 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarser, coarser_surfaces
 from warpflat.surface.cells import CellArrays, cells_of
+from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.half_edges import half_edges, half_edges_of, twins_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.edge_paths import chain_positions
 from warpflat.surface.paths.geodesic import signed_distance_and_station
-from warpflat.surface.topology import (
-    border_of,
-    corner_triangles,
-    euler_characteristic,
-    half_edges,
-    half_edges_of,
-    non_manifold_vertices,
-    places_of,
-    triangulate,
-    twins_of,
-)
+from warpflat.surface.triangles import corner_triangles, triangulate
 from warpflat.surface.untangle import signed_cell_areas, untangle
 from warpflat.surface.vectors import norm, points_at
 
@@ -163,7 +155,7 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
     that do not belong together.
     """
-    place = places_of(surface.vertices, surface.faces, border=border_of(surface))
+    place = coincident_vertices(surface.vertices, surface.faces, border=border_of(surface))
     here = np.arange(len(place))
     moves = place != here
     if not moves.any() or len(np.unique(place[datum])) < len(datum):
@@ -264,7 +256,7 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
         beside = _beside(surface, grid, datum)
         if beside is not None:
             return beside
-    station = chain_positions(surface.vertices[datum])
+    station = arc_lengths(surface.vertices[datum])
     positions = np.full((len(surface.vertices), 2), np.nan)
     positions[datum] = np.column_stack([np.zeros(len(datum)), station])
     lines = _grid_lines(surface, np.stack([datum, datum[::-1]]))
@@ -293,7 +285,7 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
         turns = np.sum(x * np.roll(y, -1) - y * np.roll(x, -1)) > 0
         side = 1.0 if (turns == upwards) != mirrored else -1.0
         positions = np.empty((len(surface.vertices), 2))
-        given = [surface.vertices, ordered, at, side, chain_positions(surface.vertices[datum])]
+        given = [surface.vertices, ordered, at, side, arc_lengths(surface.vertices[datum])]
         launch_each(lay_profiles, len(ordered), given, [positions], least=_FEW_ROWS)
         return positions
     return None

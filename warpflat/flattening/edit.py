@@ -24,13 +24,13 @@ from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.relax import RelaxOptions, given_options
 from warpflat.surface.cells import inherit_cells
+from warpflat.surface.connectivity import components_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import path_length
 from warpflat.surface.repair.polygons import crossed_quads
 from warpflat.surface.repair.slivers import degenerate_faces
 from warpflat.surface.repair.validate import checked_positions
 from warpflat.surface.repair.weld import weld_map
-from warpflat.surface.topology import components_of
 
 __all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
 

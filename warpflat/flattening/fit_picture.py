@@ -18,7 +18,7 @@ from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_png import save_png
 from warpflat.flattening.fit_report import RANGES, help_words, pressure_words, strain_words
 from warpflat.model.fit import MAPS, WornFit
-from warpflat.surface.topology import border_edges
+from warpflat.surface.half_edges import border_edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -6,11 +6,10 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import (
-    border_loops,
-    triangulate,
-)
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["harmonic_layout"]
 
@@ -49,8 +48,8 @@ def harmonic_layout(surface: Surface) -> FloatArray:
     matrix = diags(1.0 / np.asarray(matrix.sum(axis=1)).ravel()) @ matrix
 
     border = loops[0]
-    arc = np.linalg.norm(surface.vertices[np.roll(border, -1)] - surface.vertices[border], axis=1)
-    angle = 2 * np.pi * np.concatenate([[0.0], np.cumsum(arc)[:-1]]) / arc.sum()
+    arc = arc_lengths(surface.vertices[border], closed=True)
+    angle = 2 * np.pi * arc[:-1] / arc[-1]
     q = surface.vertices[triangles]
     area = 0.5 * np.linalg.norm(np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0]), axis=1).sum()
     layout = np.zeros((size, 2))
@@ -68,7 +67,7 @@ def refuse_tubes(surface: Surface) -> None:
         corner_angle = _border_angles(surface)[loop]
         turning = float((np.pi - corner_angle).sum())
         if turning > -np.pi:
-            size = np.linalg.norm(surface.vertices[np.roll(loop, -1)] - surface.vertices[loop], axis=1).sum()
+            size = polyline_length(surface.vertices[loop], closed=True)
             raise InputError(
                 f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
                 f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first, in the mesh (its vertices "

@@ -10,6 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import segment_lengths
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.constraint_equations import (
     ConstraintEquations,
@@ -108,7 +109,7 @@ def equations_of_constraint(
     surface = piece.network.surface
     line = _line(constraint, piece)
     if isinstance(constraint, FixedLength):
-        lengths = np.linalg.norm(np.diff(surface.vertices[line], axis=0), axis=1)
+        lengths = segment_lengths(surface.vertices[line])
         if constraint.length is not None:
             there = lengths.sum() * (2.0 if _goes_on_beyond(fold, line) else 1.0)
             lengths = lengths * (constraint.length / there)

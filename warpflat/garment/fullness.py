@@ -25,9 +25,10 @@ from warpflat.model.strain import strain_energy
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
 from warpflat.surface.cells import CellArrays, first_of_faces
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops, half_edges_of
 
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
 

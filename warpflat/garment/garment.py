@@ -11,6 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, expect, expect_callback, expect_each, nearest
+from warpflat.core.polyline import polyline_length
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
@@ -19,7 +20,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.ease import SeamWish, wished_seams
 from warpflat.garment.fullness import FullEdge, give_fullness
-from warpflat.garment.seam_length import SeamLengths, polyline_length
+from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import FormResult

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from warpflat.pattern.curves import arc_lengths
+from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
 if TYPE_CHECKING:

@@ -5,11 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
-from warpflat.core.arrays import FloatArray
-
-__all__ = ["SeamLengths", "polyline_length"]
+__all__ = ["SeamLengths"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -48,8 +44,3 @@ class SeamLengths:
             "ease": self.ease,
             "price_j": self.price,
         }
-
-
-def polyline_length(points: FloatArray) -> float:
-    """Length of a polyline, #P by 2 or 3 [m]."""
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

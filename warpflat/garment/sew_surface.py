@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from typing import Any
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
-from warpflat.garment.seam_length import SeamLengths, polyline_length
+from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.solver.relax import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams

@@ -16,7 +16,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.relax import Relaxation
-from warpflat.surface.topology import components
+from warpflat.surface.connectivity import components
 
 __all__ = ["SewingNetwork"]
 

@@ -16,9 +16,9 @@ from warpflat.garment.edge_rules import EdgeRules, unused
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.dart import fish_eye_measure
 from warpflat.surface.cut.dart_legs import are_curved, pull_back, pull_back_eye
-from warpflat.surface.topology import border_loops
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening

@@ -11,8 +11,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
-from warpflat.mannequin.profiles import arc_lengths, convex_girth, scale_to_girth
+from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["Adjustment", "adjusted_vertices", "blended"]
@@ -242,7 +243,7 @@ def _rule_arm(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: 
 def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
     """How an arm's closed row moves: in its own plane, about its middle."""
     middle = row.mean(axis=0)
-    length = arc_lengths(row, closed=True)[-1]
+    length = polyline_length(row, closed=True)
     shape = row - middle
     if other is not None:
         second = other - other.mean(axis=0)

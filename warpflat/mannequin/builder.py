@@ -7,9 +7,10 @@ import itertools
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Layout
-from warpflat.mannequin.profiles import arc_lengths, convex_girth, resample, scale_to_girth
+from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["build_vertices", "girth_ring", "quarter_fractions"]
@@ -58,7 +59,7 @@ def quarter_fractions(layout: Layout, princess: float) -> FloatArray:
 
 def girth_ring(layout: Layout, profile: Profile, height: float) -> FloatArray:
     """One closed row of the grid, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
-    total = arc_lengths(profile.curve, closed=True)[-1]
+    total = polyline_length(profile.curve, closed=True)
     ends = (
         profile.centre_front,
         profile.side_left,
@@ -138,7 +139,7 @@ def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> N
 def _to_length(loop: FloatArray, length: float) -> FloatArray:
     """A closed polygon, #P by 3, blown up about its middle until it is `length` [m] long."""
     middle = loop.mean(axis=0)
-    return middle + (loop - middle) * (length / arc_lengths(loop, closed=True)[-1])
+    return middle + (loop - middle) * (length / polyline_length(loop, closed=True))
 
 
 def _yoke_share(c: QuarterCurves) -> float:
@@ -146,8 +147,8 @@ def _yoke_share(c: QuarterCurves) -> float:
 
     As far down as the neckline's bend lies below the shoulder seam, within what leaves both strips of rows room.
     """
-    upper = c.notch * arc_lengths(c.armhole)[-1]
-    drop = (1.0 - c.bend) * arc_lengths(c.neckline)[-1]
+    upper = c.notch * polyline_length(c.armhole)
+    drop = (1.0 - c.bend) * polyline_length(c.neckline)
     return float(np.clip(0.9 * drop / max(upper, 1e-9), 0.22, 0.5))
 
 
@@ -165,7 +166,7 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
         )
         even = np.arange(len(hole)) / len(hole)
         rings = [
-            _to_length(resample(loop, w * even + (1 - w) * shares, closed=True), arc_lengths(loop, closed=True)[-1])
+            _to_length(resample(loop, w * even + (1 - w) * shares, closed=True), polyline_length(loop, closed=True))
             for loop, w in ((c.biceps, 0.5), (c.elbow, 0.8), (c.wrist, 1.0))
         ]
         middles = [r.mean(axis=0) for r in rings]

@@ -47,9 +47,9 @@ class Form:
     """A garment on the mannequin.
 
     Attributes:
-        name: what the form is called.
+        name: of the form.
         pieces: recipes by piece name.
-        profiles: what is done to the body's profiles, by level.
+        profiles: adjustments of the body's profiles, by level.
         ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
 
@@ -101,12 +101,12 @@ def _shipped() -> dict[str, Any]:
 
 
 def form_names() -> list[str]:
-    """Names of the forms that ship with the package."""
+    """Return the names of the forms that ship with the package."""
     return list(_shipped())
 
 
 def shipped_form(name: str) -> Form:
-    """A form of ``data/forms.toml``.
+    """Return a form of ``data/forms.toml``.
 
     Raises:
         InputError: if there is none of that name.
@@ -117,10 +117,10 @@ def shipped_form(name: str) -> Form:
 
 
 def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
-    """A form from a scene file's table.
+    """Make a form from a scene file's table.
 
     Args:
-        name: what the form is called.
+        name: of the form.
         data: keys ``pieces`` (by name, which names a file, too: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
             :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``like``
             (a shipped form whose pieces and profiles are taken over where this one gives none).
@@ -131,8 +131,27 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     where = f"form {name}"
     _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like"}, where)
     base = shipped_form(str(data["like"])) if "like" in data else None
-    pieces = dict(base.pieces) if base and "pieces" not in data else {}
-    for piece, recipe in _table(data.get("pieces", {}), f"{where}: pieces").items():
+    pieces = _pieces_from(data.get("pieces", {}), where)
+    if base and "pieces" not in data:
+        pieces = dict(base.pieces)
+    if not pieces:
+        raise InputError(f"{where}: pieces is missing; give at least one [pieces.NAME] with its bricks")
+    profiles = dict(base.profiles) if base else {}
+    known = {f.name for f in fields(Adjustment)}
+    for level, values in _table(data.get("profiles", {}), f"{where}: profiles").items():
+        _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
+        profiles[level] = _adjustment(values, f"{where}: profile {level}")
+    ruled = (*(base.ruled if base else ()), *_ruled_from(data.get("ruled", []), where))
+    blend = base.blend if base else None
+    if "blend" in data:
+        blend = _blend_from(data["blend"], where)
+    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend)
+
+
+def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
+    """Read the ``pieces`` of a form's table."""
+    pieces = {}
+    for piece, recipe in _table(value, f"{where}: pieces").items():
         _check_keys(_table(recipe, f"{where}: piece {piece}"), {"bricks", "datum", "open"}, f"{where}: piece {piece}")
         bricks = _strings(recipe.get("bricks"), f"{where}: piece {piece}: bricks")
         if not bricks:
@@ -141,31 +160,30 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
             bricks=bricks, datum=str(recipe.get("datum", "")),
             open=_strings(recipe.get("open", []), f"{where}: piece {piece}: open"),
         )  # fmt: skip
-    if not pieces:
-        raise InputError(f"{where}: pieces is missing; give at least one [pieces.NAME] with its bricks")
-    profiles = dict(base.profiles) if base else {}
-    known = {f.name for f in fields(Adjustment)}
-    for level, values in _table(data.get("profiles", {}), f"{where}: profiles").items():
-        _check_keys(_table(values, f"{where}: profile {level}"), known, f"{where}: profile {level}")
-        profiles[level] = _adjustment(values, f"{where}: profile {level}")
-    ruled = list(base.ruled) if base else []
-    pairs = data.get("ruled", [])
+    return pieces
+
+
+def _ruled_from(pairs: object, where: str) -> list[tuple[str, str]]:
+    """Read the ``ruled`` pairs of levels of a form's table."""
     if not isinstance(pairs, (list, tuple)):
         raise InputError(f"{where}: ruled = {shown(pairs)}: a list of pairs of levels is needed, as [['hip', 'knee']]")
+    ruled = []
     for pair in pairs:
         levels = _strings(pair, f"{where}: ruled")
         if len(levels) != 2:
             raise InputError(f"{where}: ruled: each entry is a pair of levels, as ['hip', 'knee']; got {list(levels)}")
         ruled.append((levels[0], levels[1]))
-    blend = base.blend if base else None
-    if "blend" in data:
-        mix = _table(data["blend"], f"{where}: blend")
-        _check_keys(mix, {"with", "weight"}, f"{where}: blend")
-        if "with" not in mix:
-            raise InputError(f"{where}: blend: with is missing; name a form: {', '.join(form_names())}")
-        weight = _number(mix.get("weight", 0.5), f"{where}: blend: weight", 0.0, 1.0)
-        blend = (shipped_form(str(mix["with"])), weight)
-    return Form(name=name, pieces=pieces, profiles=profiles, ruled=tuple(ruled), blend=blend)
+    return ruled
+
+
+def _blend_from(value: object, where: str) -> tuple[Form, float]:
+    """Read the other form of a ``blend`` and its weight."""
+    mix = _table(value, f"{where}: blend")
+    _check_keys(mix, {"with", "weight"}, f"{where}: blend")
+    if "with" not in mix:
+        raise InputError(f"{where}: blend: with is missing; name a form: {', '.join(form_names())}")
+    weight = _number(mix.get("weight", 0.5), f"{where}: blend: weight", 0.0, 1.0)
+    return shipped_form(str(mix["with"])), weight
 
 
 def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = False) -> FormResult:

@@ -18,12 +18,12 @@ _LISTED = 4
 
 
 def is_side(brick: str, side: str) -> bool:
-    """Whether a brick lies on the ``left`` or the ``right`` of the body."""
+    """Return whether a brick lies on a side of the body, ``left`` or ``right``."""
     return side in brick.partition("/")[2].split("-")
 
 
 def lies_on_both(bricks: Iterable[str]) -> bool:
-    """Whether bricks lie on the left and on the right of the body."""
+    """Return whether bricks lie on both sides of the body."""
     return {is_side(b, "left") for b in bricks} == {True, False}
 
 
@@ -38,23 +38,11 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
     """
     used = {b for bricks, _, _ in pieces.values() for b in bricks}
     for name, (bricks, datum, opened) in pieces.items():
-        image = {_mirrored(b) for b in bricks}
         if lies_on_both(bricks):
+            _check_symmetric(name, bricks)
             partner = name
-            if image != set(bricks):
-                lone = [b for b in bricks if b not in image]
-                raise InputError(
-                    f"form: half = true mirrors the left half, but in piece {name} {_listed(lone)} "
-                    f"{'has' if len(lone) == 1 else 'have'} no mirror image; {_WHOLE}"
-                )
         else:
-            partner = next((other for other, (theirs, _, _) in pieces.items() if set(theirs) == image), "")
-            if not partner:
-                lone = [b for b in bricks if _mirrored(b) not in used] or list(bricks)
-                raise InputError(
-                    f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} "
-                    f"({_listed(lone)}); {_WHOLE}"
-                )
+            partner = _mirror_image(name, bricks, pieces, used)
         _, their_datum, theirs = pieces[partner]
         lines = [line for line in opened if _mirrored(line) not in theirs]
         if lines:
@@ -69,8 +57,35 @@ def check_halves(pieces: Mapping[str, Cut]) -> None:
             )
 
 
+def _check_symmetric(name: str, bricks: Sequence[str]) -> None:
+    """See that a piece on both sides of the body is its own mirror image."""
+    image = {_mirrored(b) for b in bricks}
+    if image != set(bricks):
+        lone = [b for b in bricks if b not in image]
+        raise InputError(
+            f"form: half = true mirrors the left half, but in piece {name} {_listed(lone)} "
+            f"{'has' if len(lone) == 1 else 'have'} no mirror image; {_WHOLE}"
+        )
+
+
+def _mirror_image(name: str, bricks: Sequence[str], pieces: Mapping[str, Cut], used: set[str]) -> str:
+    """Return the piece that is the mirror image of one on one side of the body; `used` are the bricks of all pieces.
+
+    Raises:
+        InputError: there is none.
+    """
+    image = {_mirrored(b) for b in bricks}
+    for other, (theirs, _, _) in pieces.items():
+        if set(theirs) == image:
+            return other
+    lone = [b for b in bricks if _mirrored(b) not in used] or list(bricks)
+    raise InputError(
+        f"form: half = true mirrors the left half, but no piece is the mirror image of piece {name} ({_listed(lone)}); {_WHOLE}"
+    )
+
+
 def fold_among(edges: Iterable[str], opened: Sequence[str], name: str) -> str:
-    """The edge along which the left half of a piece lies on the fold.
+    """Return the edge along which the left half of a piece lies on the fold.
 
     Args:
         edges: of the left half.
@@ -94,7 +109,7 @@ def fold_among(edges: Iterable[str], opened: Sequence[str], name: str) -> str:
 
 
 def _mirrored(name: str) -> str:
-    """The name of the brick or line on the other side; of one on the midplane, its own."""
+    """Return the name of a brick or line on the other side of the body; that of one on the midplane stays."""
     return re.sub(r"\b(left|right)\b", lambda side: "right" if side[0] == "left" else "left", name)
 
 

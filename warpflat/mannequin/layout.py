@@ -34,8 +34,8 @@ _ARM_GAPS = (0.10, 0.16, 0.25)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Layout:
-    """Vertex indices of every strip of the grid. Rows run upward (outward on arms), columns from the front leftward.
+class Strips:
+    """The strips of the grid, as vertex indices. Rows run upward (outward on arms), columns from the front leftward.
 
     Attributes:
         resolution: wished quad edge [m].
@@ -49,11 +49,7 @@ class Layout:
         arms: for ``left`` and ``right`` #rows by #columns, closed rows from armhole to wrist, columns from the underarm
             forward.
         arm_row: row in `arms` of every arm level.
-        bricks: grid of vertex indices of every brick by name.
-        lines: feature profiles and lines by name; a closed one repeats its first vertex.
         vertex_count: number of vertices.
-        faces: #F by 4, outward.
-        face_brick: #F, index of the brick in `bricks`' order.
     """
 
     resolution: float
@@ -66,15 +62,11 @@ class Layout:
     neck: IntArray
     arms: Mapping[str, IntArray]
     arm_row: Mapping[str, int]
-    bricks: Mapping[str, IntArray]
-    lines: Mapping[str, IntArray]
     vertex_count: int
-    faces: IntArray
-    face_brick: IntArray
 
     @property
     def mirror(self) -> IntArray:
-        """For every vertex the one in its mirror image at the midplane."""
+        """For each vertex its mirror image at the midplane."""
         out = np.full(self.vertex_count, -1, np.int32)
         n = self.rings.shape[1]
         out[self.rings] = self.rings[:, -np.arange(n) % n]
@@ -98,9 +90,31 @@ class Layout:
         """Columns from the centre line to the arm column."""
         return sum(self.columns[:3])
 
+    @property
+    def to_princess(self) -> int:
+        """Columns from the centre line to the princess line."""
+        return sum(self.columns[:2])
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Layout(Strips):
+    """The grid of the mannequin: its strips, and the bricks, lines and faces on them.
+
+    Attributes:
+        bricks: grid of vertex indices of every brick by name.
+        lines: feature profiles and lines by name; a closed one repeats its first vertex.
+        faces: #F by 4, outward.
+        face_brick: #F, index of the brick in `bricks`' order.
+    """
+
+    bricks: Mapping[str, IntArray]
+    lines: Mapping[str, IntArray]
+    faces: IntArray
+    face_brick: IntArray
+
 
 def make_layout(resolution_mm: float = 10.0) -> Layout:
-    """The grid at a resolution; the same for every body.
+    """Make the grid at a resolution; it is one for all bodies.
 
     Args:
         resolution_mm: wished quad edge [mm], 2 to 40.
@@ -110,10 +124,21 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     """
     if not 2.0 <= resolution_mm <= 40.0:
         raise InputError(f"mannequin resolution {resolution_mm:g} mm: valid range 2 to 40 mm")
-    h = resolution_mm / 1000.0
+    strips = _strips(resolution_mm / 1000.0)
+    bricks = _bricks(strips)
+    faces = np.concatenate([_grid_faces(grid) for grid in bricks.values()])
+    face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
+    return Layout(
+        **vars(strips), bricks=bricks, lines=_lines(strips), faces=faces.astype(np.int32),
+        face_brick=face_brick.astype(np.int32),
+    )  # fmt: skip
+
+
+def _strips(resolution: float) -> Strips:
+    """Number the vertices of the grid, strip by strip, for a wished quad edge [m]."""
 
     def cells(length: float, least: int = 2) -> int:
-        return max(least, round(length / h))
+        return max(least, round(length / resolution))
 
     n0, n1, n2, n3 = (cells(s) for s in _COLUMN_LENGTHS)
     k, q, n = n0 + n1 + n2, n0 + n1 + n2 + n3, 4 * (n0 + n1 + n2 + n3)
@@ -152,15 +177,9 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     arm_row = dict(zip(ARM_LEVELS, [0, *np.cumsum(arm_steps).tolist()], strict=True))
     arms = {side: np.vstack([loop, fresh(arm_row["wrist"], len(loop))]) for side, loop in armholes.items()}
 
-    columns = (n0, n1, n2, n3)
-    bricks = _bricks(columns, rings, level_row, front, back, yokes, neck, arms, arm_row)
-    lines = _lines(columns, rings, level_row, front, back, yokes, neck, arms, arm_row)
-    faces = np.concatenate([_grid_faces(grid) for grid in bricks.values()])
-    face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
-    return Layout(
-        resolution=h, columns=columns, rings=rings, level_row=level_row, front=front, back=back, yokes=yokes, neck=neck,
-        arms=arms, arm_row=arm_row, bricks=bricks, lines=lines, vertex_count=next(counter),
-        faces=faces.astype(np.int32), face_brick=face_brick.astype(np.int32),
+    return Strips(
+        resolution=resolution, columns=(n0, n1, n2, n3), rings=rings, level_row=level_row, front=front, back=back,
+        yokes=yokes, neck=neck, arms=arms, arm_row=arm_row, vertex_count=next(counter),
     )  # fmt: skip
 
 
@@ -186,13 +205,11 @@ def _grid_faces(grid: IntArray) -> IntArray:
     return np.stack([grid[:-1, :-1], grid[:-1, 1:], grid[1:, 1:], grid[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
-def _bricks(
-    columns: tuple[int, int, int, int], rings: IntArray, level_row: Mapping[str, int], front: IntArray, back: IntArray,
-    yokes: Mapping[str, IntArray], neck: IntArray, arms: Mapping[str, IntArray], arm_row: Mapping[str, int],
-) -> dict[str, IntArray]:  # fmt: skip
-    """Every brick's grid by name, ``upper-lower/column``, from the neck down, then the arms."""
-    n0, n1, n2, n3 = columns
-    p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
+def _bricks(strips: Strips) -> dict[str, IntArray]:
+    """Return the grid of every brick by its name, ``upper-lower/column``, from the neck down, then the arms."""
+    n0, n1, n2, _ = strips.columns
+    p, k, q = strips.to_princess, strips.to_arm, strips.quarter
+    front, back, yokes, neck = strips.front, strips.back, strips.yokes, strips.neck
     bricks: dict[str, IntArray] = {}
     m3 = len(yokes["front-left"]) - 1
     quarter_neck = n0 + m3
@@ -216,38 +233,36 @@ def _bricks(
         "yoke-chest/front-right-side": front[:, : k - p + 1],
         "yoke-chest/front-right-centre": front[:, k - p : k + 1],
     }
-    closed = np.hstack([rings, rings[:, :1]])
+    closed = np.hstack([strips.rings, strips.rings[:, :1]])
     cuts = (0, p, q, 2 * q - p, 2 * q, 2 * q + p, 3 * q, 4 * q - p, 4 * q)
     orders = (("centre", "side"), ("side", "centre")) * 2
     names = [f"{quarter}-{part}" for quarter, order in zip(QUARTERS, orders, strict=True) for part in order]
     levels = [*RING_LEVELS, "chest"]
     for low, high in reversed(list(itertools.pairwise(levels))):
-        rows = closed[level_row[low] : level_row[high] + 1]
+        rows = closed[strips.level_row[low] : strips.level_row[high] + 1]
         for name, a, b in zip(names, cuts[:-1], cuts[1:], strict=True):
             bricks[f"{high}-{low}/{name}"] = rows[:, a : b + 1]
-    for arm, grid in arms.items():
+    for arm, grid in strips.arms.items():
         loop = np.hstack([grid, grid[:, :1]])
         half = grid.shape[1] // 2
         for high, low in itertools.pairwise(ARM_LEVELS):
-            rows = loop[arm_row[high] : arm_row[low] + 1]
+            rows = loop[strips.arm_row[high] : strips.arm_row[low] + 1]
             for name, part in (("front", rows[:, : half + 1]), ("back", rows[:, half:])):
                 # Columns run upward in front on both arms; the left one's rows are turned, so that it faces outward too.
                 bricks[f"{high}-{low}/arm-{arm}-{name}"] = part[::-1] if arm == "left" else part
     return bricks
 
 
-def _lines(
-    columns: tuple[int, int, int, int], rings: IntArray, level_row: Mapping[str, int], front: IntArray, back: IntArray,
-    yokes: Mapping[str, IntArray], neck: IntArray, arms: Mapping[str, IntArray], arm_row: Mapping[str, int],
-) -> dict[str, IntArray]:  # fmt: skip
-    """Feature profiles (closed around the body or an arm) and feature lines, bottom up."""
-    n0, n1, n2, n3 = columns
-    p, k, q = n0 + n1, n0 + n1 + n2, n0 + n1 + n2 + n3
+def _lines(strips: Strips) -> dict[str, IntArray]:
+    """Return feature profiles (closed around the body or an arm) and feature lines, bottom up."""
+    n0, n1, n2, _ = strips.columns
+    p, k, q = strips.to_princess, strips.to_arm, strips.quarter
+    rings, front, back, yokes, neck = strips.rings, strips.front, strips.back, strips.yokes, strips.neck
 
     def loop(ids: IntArray) -> IntArray:
         return np.append(ids, ids[:1])
 
-    lines = {level: loop(rings[level_row[level]]) for level in RING_LEVELS}
+    lines = {level: loop(rings[strips.level_row[level]]) for level in RING_LEVELS}
     lines |= {"chest front": front[0], "chest back": back[0]}
     lines |= {"yoke front left": front[-1, k + n0 :], "yoke front right": front[-1, : k - n0 + 1]}
     lines |= {"yoke back left": back[-1, : k - n0 + 1], "yoke back right": back[-1, k + n0 :]}
@@ -263,9 +278,9 @@ def _lines(
         ("princess back right", 2 * q + p, back, k + p, yokes["back-right"][:, n1]),
     ):
         lines[name] = np.concatenate([rings[:, column], patch[1:, at], up[1:]])
-    for side, grid in arms.items():
+    for side, grid in strips.arms.items():
         for level in ARM_LEVELS:
-            lines[f"{level} {side}"] = loop(grid[arm_row[level]])
+            lines[f"{level} {side}"] = loop(grid[strips.arm_row[level]])
         lines[f"underarm {side}"] = grid[:, 0]
         lines[f"overarm {side}"] = grid[:, grid.shape[1] // 2]
     return {name: np.ascontiguousarray(ids, np.int32) for name, ids in lines.items()}

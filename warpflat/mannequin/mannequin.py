@@ -11,11 +11,12 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import polyline_length
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
-from warpflat.mannequin.profiles import arc_lengths, convex_girth
+from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.table_body import blueprint_from_measurements
 from warpflat.surface.mesh import Surface
 
@@ -126,7 +127,7 @@ class Mannequin:
             vertices = build_vertices(layout, blueprint_from_measurements(replace(measurements, lengths=lengths)))
             worst = 0.0
             for name, line in wished.items():
-                found = float(arc_lengths(vertices[layout.lines[line]])[-1])
+                found = polyline_length(vertices[layout.lines[line]])
                 miss = found - measurements.lengths[name]
                 worst = max(worst, abs(miss))
                 slope = 1.0
@@ -137,11 +138,6 @@ class Mannequin:
             if worst < 0.0002:
                 break
         return cls(layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes)
-
-    @property
-    def brick_names(self) -> list[str]:
-        """Every brick's name, from the neck down, then the arms."""
-        return list(self.layout.bricks)
 
     def brick(self, name: str) -> Brick:
         """A brick with its vertices, faces and neighbours.
@@ -174,7 +170,7 @@ class Mannequin:
         found: dict[str, Level] = {}
         for name in ("neck", "shoulder left", "shoulder right", "chest front", "chest back"):
             points = self.line(name)
-            found[name] = Level(height=float(points[:, 1].mean()), girth=float(arc_lengths(points)[-1]))
+            found[name] = Level(height=float(points[:, 1].mean()), girth=polyline_length(points))
         for name in reversed(RING_LEVELS):
             points = self.line(name)[:-1]
             found[name] = Level(
@@ -186,9 +182,7 @@ class Mannequin:
         for side in ("left", "right"):
             for level in ARM_LEVELS:
                 points = self.line(f"{level} {side}")
-                found[f"{level} {side}"] = Level(
-                    height=float(points[:, 1].mean()), girth=float(arc_lengths(points)[-1])
-                )
+                found[f"{level} {side}"] = Level(height=float(points[:, 1].mean()), girth=polyline_length(points))
         return found
 
     def surface(self) -> Surface:

@@ -9,8 +9,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import resample
 
-__all__ = ["Section", "arc_lengths", "convex_girth", "resample", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
+__all__ = ["Section", "convex_girth", "scale_to_girth", "section_curve", "superellipse_exponent"]  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,33 +82,6 @@ def superellipse_exponent(area: float) -> float:
         return float(np.exp(2.0 * gammaln(1.0 + 1.0 / n) - gammaln(1.0 + 2.0 / n))) - area
 
     return float(brentq(miss, 1.1, 12.0))
-
-
-def arc_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
-    """Arc length [m] at every point of a polyline, and the whole length at the end if it is closed.
-
-    Args:
-        points: #P by 2 or 3.
-        closed: whether the last point runs on to the first.
-    """
-    around = np.vstack([points, points[:1]]) if closed else points
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(around, axis=0), axis=1))])
-
-
-def resample(points: FloatArray, fractions: FloatArray, *, closed: bool = False) -> FloatArray:
-    """Points of a polyline at fractions of its length.
-
-    Args:
-        points: #P by 2 or 3.
-        fractions: #F, 0 is the first point and 1 the last (the first again if closed).
-        closed: whether the last point runs on to the first.
-    """
-    s = arc_lengths(points, closed=closed)
-    around = np.vstack([points, points[:1]]) if closed else points
-    if s[-1] <= 0.0:
-        return np.repeat(points[:1], len(fractions), axis=0)
-    at = (fractions % 1.0 if closed else np.clip(fractions, 0.0, 1.0)) * s[-1]
-    return np.column_stack([np.interp(at, s, around[:, i]) for i in range(points.shape[1])])
 
 
 def convex_girth(points: FloatArray) -> float:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
-from warpflat.mannequin.profiles import arc_lengths
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, upright

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
-from warpflat.mannequin.profiles import arc_lengths, resample
 from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
 
@@ -70,7 +70,7 @@ def neck_and_arms(
                 neckline=line, bend=0.52, shoulder=seam, armhole=curve, notch=float(s[notch] / s[-1]), chest=row,
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
-    length = float(arc_lengths(neckline, closed=True)[-1])
+    length = polyline_length(neckline, closed=True)
     return {name: quarters[name] for name in QUARTERS}, arms, length, collar
 
 
@@ -123,7 +123,7 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     base = ring(0.004)
     top = ring(0.035)
     # A collar plane that meets the chin bulges: keep to a cylinder's growth.
-    wide = arc_lengths(top, closed=True)[-1] / arc_lengths(base, closed=True)[-1]
+    wide = polyline_length(top, closed=True) / polyline_length(base, closed=True)
     if wide > 1.02:
         top = top.mean(axis=0) + (top - top.mean(axis=0)) * (0.95 / wide)
     return base, top
@@ -229,7 +229,7 @@ def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
         return _loop(part.points, part.points.mean(axis=0), -up, ahead, 4, 240)
 
     shares = np.linspace(0.60, 0.84, 25)
-    girths = np.array([arc_lengths(ring(float(s)), closed=True)[-1] for s in shares])
+    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in shares])
     # Where the scan's hand is missing, the arm's torn end gives sections of half its girth and less.
     whole = np.flatnonzero(girths > 0.6 * np.median(girths[:9]))
     wrist = float(shares[whole[int(np.argmin(girths[whole]))]])

@@ -1,9 +1,10 @@
-"""A scan brought upright: unit, up axis and facing told from the body's shape, or a clear refusal."""
+"""A scan brought upright: its unit, up axis and facing are found from the body's shape."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,15 +33,19 @@ _LANDMARKS = (
 )
 
 
+#: A part of a section: area and centroid of its convex hull in the section's plane, in the scan's unit.
+_Part: TypeAlias = tuple[float, FloatArray]
+
+
 @dataclass(frozen=True, kw_only=True)
 class ScanOptions:
-    """What is known about a scan; what is left at None is told from the body's shape.
+    """What the user knows about a scan; values left at None are found from the body's shape.
 
     Attributes:
         unit: ``m``, ``dm``, ``cm``, ``mm`` or ``in``.
         up: axis that points to the head, as ``+y``.
         facing: axis towards which the body looks, as ``+z``.
-        landmarks: heights above the floor [m] that are known better than shape can tell: bust, waist, hip, armpit, ...
+        landmarks: known heights above the floor [m]: bust, waist, hip, armpit, ...
         mirror: average the left and the right side.
     """
 
@@ -51,7 +56,11 @@ class ScanOptions:
     mirror: bool = False
 
     def check(self) -> None:
-        """Raises InputError for an unknown unit, axis or landmark."""
+        """Check the values.
+
+        Raises:
+            InputError: an unknown unit, axis or landmark.
+        """
         if self.unit is not None and self.unit not in _UNITS:
             raise InputError(f"scan unit {self.unit!r} is unknown: {nearest(self.unit, _UNITS)}")
         for name in ("up", "facing"):
@@ -93,7 +102,7 @@ class Slicer:
         self.triangles = triangles
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
-        """The parts of the section where normal . x = offset, largest first by length."""
+        """Return the connected parts of the section where normal . x = offset, longest first."""
         from scipy.sparse import coo_matrix
         from scipy.sparse.csgraph import connected_components
 
@@ -126,15 +135,15 @@ class Slicer:
 def upright(
     vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
 ) -> tuple[FloatArray, NDArray[np.int64], list[str]]:
-    """A scan in metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
+    """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
     Args:
         vertices: #V by 3, any unit.
         faces: #F by 3 or 4, -1 in the last column for a triangle.
-        options: what is known.
+        options: what the user knows about the scan.
 
     Returns:
-        vertices (#W by 3 [m], welded), triangles (#T by 3), and what was found out, one sentence each.
+        Vertices (#W by 3 [m], welded), triangles (#T by 3), and notes of what was found, one sentence each.
 
     Raises:
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be told.
@@ -227,7 +236,7 @@ def _unit_of(height: float) -> str:
 
 
 def _hull_area_and_middle(points: FloatArray) -> tuple[float, FloatArray]:
-    """Area and centroid of the convex hull of plane points; the same however the plane's axes lie."""
+    """Return the area and the centroid of the convex hull of plane points, which do not depend on the plane's axes."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:
@@ -243,7 +252,7 @@ def _hull_area_and_middle(points: FloatArray) -> tuple[float, FloatArray]:
 
 
 def _plane_axes(up: FloatArray) -> FloatArray:
-    """Two axes across `up`, 2 by 3."""
+    """Return two unit vectors at right angles to `up` and to each other, 2 by 3."""
     first = np.eye(3)[int(np.argmin(np.abs(up)))]
     first = first - up * (first @ up)
     first /= np.linalg.norm(first)
@@ -251,46 +260,55 @@ def _plane_axes(up: FloatArray) -> FloatArray:
 
 
 def _legs(slicer: Slicer, up: FloatArray) -> tuple[float, FloatArray | None]:
-    """How much like a standing body the mesh is if `up` is up (0 to 1), and the direction from leg to leg."""
+    """Rate how much the mesh is like a standing body if `up` is up.
+
+    Returns:
+        A score from 0 to 1, and the direction from leg to leg; None without legs.
+    """
     points = slicer.vertices
     low, high = float((points @ up).min()), float((points @ up).max())
     across = _plane_axes(up)
 
-    def parts(share: float) -> list[tuple[float, FloatArray]]:
-        found = []
-        for part in slicer.cut(up, low + share * (high - low)):
-            found.append(_hull_area_and_middle(part.points @ across.T))
-        found.sort(key=lambda f: -f[0])
-        return [f for f in found if f[0] > 0.15 * found[0][0]] if found else []
+    def parts(share: float) -> list[_Part]:
+        return _large_parts(slicer, up, low + share * (high - low), across)
 
     levels = np.linspace(0.07, 0.40, 12)
-    good, apart, middles = 0, [], []
-    for share in levels:
-        legs = parts(float(share))
-        if len(legs) == 2 and legs[0][0] < 2.0 * legs[1][0]:
-            good += 1
-            apart.append(legs[0][1] - legs[1][1])
-            middles.append(0.5 * (legs[0][1] + legs[1][1]))
-    if not apart:
+    pairs = [legs for share in levels if _is_pair(legs := parts(float(share)))]
+    if not pairs:
         return 0.0, None
-    reference = apart[0]
-    direction = np.mean([a * np.sign(a @ reference) for a in apart], axis=0)
+    apart = [legs[0][1] - legs[1][1] for legs in pairs]
+    direction = np.mean([a * np.sign(a @ apart[0]) for a in apart], axis=0)
     if np.linalg.norm(direction) == 0.0:
         return 0.0, None
-    middle = np.mean(middles, axis=0)
-    reach = 0.12 * (high - low)
-    # One trunk over the legs, broader than either of them, and one head over it, narrower than the trunk.
-    trunk, head = parts(0.62), parts(0.93)
-    body = bool(trunk) and np.linalg.norm(trunk[0][1] - middle) < reach
-    top = len(head) == 1 and np.linalg.norm(head[0][1] - middle) < 1.5 * reach
-    narrow = body and top and head[0][0] < 0.9 * trunk[0][0]
-    square = body and trunk[0][0] < (0.42 * (high - low)) ** 2
-    score = good / len(levels) if narrow and square else 0.0
-    return score, direction @ across
+    middle = np.mean([0.5 * (legs[0][1] + legs[1][1]) for legs in pairs], axis=0)
+    stands = _is_body(middle, parts(0.62), parts(0.93), high - low)
+    return len(pairs) / len(levels) if stands else 0.0, direction @ across
+
+
+def _large_parts(slicer: Slicer, up: FloatArray, height: float, across: FloatArray) -> list[_Part]:
+    """Return the parts of a horizontal section, largest first, of at least 15 % of the largest one's area."""
+    found = [_hull_area_and_middle(part.points @ across.T) for part in slicer.cut(up, height)]
+    found.sort(key=lambda part: -part[0])
+    return [part for part in found if part[0] > 0.15 * found[0][0]]
+
+
+def _is_pair(legs: list[_Part]) -> bool:
+    """Return whether parts of a section are two of similar size, as those of two legs are."""
+    return len(legs) == 2 and legs[0][0] < 2.0 * legs[1][0]
+
+
+def _is_body(middle: FloatArray, trunk: list[_Part], head: list[_Part], height: float) -> bool:
+    """Return whether one trunk, broader than either leg, stands over the legs' middle, and one head, narrower, over the trunk."""
+    reach = 0.12 * height
+    if not trunk or np.linalg.norm(trunk[0][1] - middle) >= reach:
+        return False
+    if len(head) != 1 or np.linalg.norm(head[0][1] - middle) >= 1.5 * reach:
+        return False
+    return head[0][0] < 0.9 * trunk[0][0] and trunk[0][0] < (0.42 * height) ** 2
 
 
 def _facing(slicer: Slicer, up: FloatArray, ahead: FloatArray) -> float:
-    """+1 if the body looks along `ahead`, -1 if the other way.
+    """Return +1 if the body looks along `ahead`, -1 if the other way.
 
     Feet reach forward from the ankles; the seat stands out behind the waist more than anything stands out in front.
     """

@@ -1,4 +1,4 @@
-"""The blueprint of a body that is known by its measurements only: a dress form."""
+"""The blueprint of a dress form, a body that is known by its measurements only."""
 
 from __future__ import annotations
 
@@ -8,10 +8,11 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables
-from warpflat.mannequin.profiles import Section, arc_lengths, resample, section_curve
+from warpflat.mannequin.profiles import Section, section_curve
 
 __all__ = ["PRINCESS", "blueprint_from_measurements"]
 
@@ -27,7 +28,7 @@ _NOTCH = 0.22
 
 
 def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
-    """A symmetric dress form to a set of measurements.
+    """Make the blueprint of a symmetric dress form to a set of measurements.
 
     Source of the cross-sections: ``data/sizes.toml``, sections of average statistical bodies.
     """
@@ -44,7 +45,7 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
 
 
 def _profiles(m: Measurements) -> Callable[[float], Profile]:
-    """The horizontal profile at any height up to the bust."""
+    """Return a function that gives the horizontal profile at any height [m] up to the bust."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
     sections = size_tables()["bodies"][m.body]["sections"]
@@ -102,7 +103,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
 
 
 def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str, QuarterCurves]:
-    """Neckline, shoulder, armhole and across-chest row to the measured widths and lengths."""
+    """Return neckline, shoulder, armhole and across-chest row of each quarter, to the measured widths and lengths."""
     from scipy.interpolate import CubicSpline
 
     h, size = m.heights, m.lengths["bust"] / 0.88
@@ -116,7 +117,7 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
     bust = profile(h["bust"])
     bust_centre_front = np.array([0.0, h["bust"], bust.curve[0, 1]])
     bust_centre_back = np.array([0.0, h["bust"], bust.curve[len(bust.curve) // 2, 1]])
-    side = resample(bust.curve, np.array([bust.side_left / arc_lengths(bust.curve, closed=True)[-1]]), closed=True)[0]
+    side = resample(bust.curve, bust.side_left / polyline_length(bust.curve, closed=True), closed=True)
     under = np.array([side[0] + 0.001, h["underarm"], side[1] - 0.002])
     level = h["underarm"] + _NOTCH * (tip[1] - h["underarm"])
     reach = {"front": 0.050 * size, "back": -0.053 * size}
@@ -128,42 +129,48 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
         "back": _chest_row(start_back, under[2] + reach["back"], 0.5 * m.lengths["back_width"], -0.010 * size),
     }
 
-    def armhole(face: str) -> tuple[FloatArray, float]:
-        notch = chest[face][-1]
-        other = chest["back" if face == "front" else "front"][-1]
-
-        def scoop(point: FloatArray) -> FloatArray:
-            at = 0.62 * point + 0.38 * under
-            at[1] = under[1] + 0.24 * (point[1] - under[1])
-            return at
-
-        def brow(point: FloatArray) -> FloatArray:
-            at = 0.60 * point + 0.40 * tip
-            at[2] = under[2] + 1.06 * (point[2] - under[2])
-            return at
-
-        points = np.array([
-            tip, brow(notch), notch, scoop(notch), under, scoop(other), other, brow(other), tip,
-        ])  # fmt: skip
-        t = arc_lengths(points) ** 1.0
-        spline = CubicSpline(t, points, bc_type="periodic")
-        dense = spline(np.linspace(0.0, t[4], 400))
-        return dense, float(arc_lengths(spline(np.linspace(0.0, t[2], 400)))[-1] / arc_lengths(dense)[-1])
-
     curves: dict[str, QuarterCurves] = {}
     for face, line, centre in (
         ("front", neckline[: quarter + 1], np.array([bust_centre_front, start_front, neckline[0]])),
         ("back", neckline[quarter : half + 1][::-1], np.array([bust_centre_back, start_back, neckline[half]])),
     ):
-        hole, notch = armhole(face)
+        hole, notch = _armhole(chest[face][-1], chest["back" if face == "front" else "front"][-1], under, tip)
         spline = CubicSpline(arc_lengths(centre), centre)
         left = QuarterCurves(
             neckline=line, bend=0.52, shoulder=np.linspace(side_neck, tip, 50), armhole=hole, notch=notch,
-            chest=chest[face], centre=spline(np.linspace(0.0, arc_lengths(centre)[-1], 100)),
+            chest=chest[face], centre=spline(np.linspace(0.0, polyline_length(centre), 100)),
         )  # fmt: skip
         curves[f"{face}-left"] = left
         curves[f"{face}-right"] = _mirrored(left)
     return {name: curves[name] for name in QUARTERS}
+
+
+def _armhole(notch: FloatArray, other: FloatArray, under: FloatArray, tip: FloatArray) -> tuple[FloatArray, float]:
+    """Return half of the left armhole, from the shoulder point to the underarm, and the share of its length down to the notch.
+
+    Args:
+        notch: the end of this half's across-chest row on the armhole [m].
+        other: that of the other half's row.
+        under: the underarm point.
+        tip: the shoulder point.
+    """
+    from scipy.interpolate import CubicSpline
+
+    def scoop(point: FloatArray) -> FloatArray:
+        at = 0.62 * point + 0.38 * under
+        at[1] = under[1] + 0.24 * (point[1] - under[1])
+        return at
+
+    def brow(point: FloatArray) -> FloatArray:
+        at = 0.60 * point + 0.40 * tip
+        at[2] = under[2] + 1.06 * (point[2] - under[2])
+        return at
+
+    points = np.array([tip, brow(notch), notch, scoop(notch), under, scoop(other), other, brow(other), tip])
+    t = arc_lengths(points)
+    spline = CubicSpline(t, points, bc_type="periodic")
+    half = spline(np.linspace(0.0, t[4], 400))
+    return half, polyline_length(spline(np.linspace(0.0, t[2], 400))) / polyline_length(half)
 
 
 def _mirrored(curves: QuarterCurves) -> QuarterCurves:
@@ -175,7 +182,7 @@ def _mirrored(curves: QuarterCurves) -> QuarterCurves:
 
 
 def _chest_row(start: FloatArray, end_z: float, length: float, swell: float) -> FloatArray:
-    """The level row from the centre to the notch, exactly `length` long; `swell` [m] is added at the blade."""
+    """Return the level row from the centre to the notch, `length` [m] long; `swell` [m] is added at the blade."""
     from scipy.optimize import brentq
 
     t = np.linspace(0.0, 1.0, 200)
@@ -184,17 +191,17 @@ def _chest_row(start: FloatArray, end_z: float, length: float, swell: float) -> 
         z = start[2] + (end_z - start[2]) * t**2.6 + swell * np.sin(np.pi * np.clip(t / 0.9, 0.0, 1.0)) ** 2
         return np.column_stack([width * t, np.full_like(t, start[1]), z])
 
-    if arc_lengths(row(0.3 * length))[-1] > length:
+    if polyline_length(row(0.3 * length)) > length:
         raise InputError(
             f"measurements: {200 * length:.1f} cm across chest or back is too little for so deep a bust: wider chest_width or back_width, "
             "or nearer bust_points, would do"
         )
-    width = brentq(lambda w: arc_lengths(row(w))[-1] - length, 0.3 * length, 1.2 * length)
+    width = brentq(lambda w: polyline_length(row(w)) - length, 0.3 * length, 1.2 * length)
     return row(float(width))
 
 
 def _neckline(m: Measurements) -> FloatArray:
-    """The closed neck base, from centre front over the left; its length is the neck measurement."""
+    """Return the closed neck base, from centre front over the left; its length is the neck measurement."""
     from scipy.optimize import brentq
 
     h, neck = m.heights, m.lengths["neck"]
@@ -207,12 +214,12 @@ def _neckline(m: Measurements) -> FloatArray:
     def loop(width: float) -> FloatArray:
         return np.column_stack([0.5 * width * np.sin(t), y, middle + 0.5 * depth * np.cos(t)])
 
-    width = brentq(lambda w: arc_lengths(loop(w), closed=True)[-1] - neck, 0.15 * neck, 0.6 * neck)
+    width = brentq(lambda w: polyline_length(loop(w), closed=True) - neck, 0.15 * neck, 0.6 * neck)
     return loop(float(width))
 
 
 def _collar(m: Measurements) -> FloatArray:
-    """The upper end of the neck: a slighter, flatter curve above the neck base."""
+    """Return the upper end of the neck, a shorter and flatter curve above the neck base."""
     base = _neckline(m)
     middle = base.mean(axis=0)
     top = middle + (base - middle) * np.array([0.90, 0.55, 0.98])
@@ -220,7 +227,7 @@ def _collar(m: Measurements) -> FloatArray:
 
 
 def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, ArmCurves]:
-    """Both arms, hanging a little away from the body."""
+    """Return both arms, which hang a little away from the body."""
     front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
     middle = np.vstack([front, back]).mean(axis=0)
     tip, under = front[0], front[-1]
@@ -236,7 +243,7 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     def ring(at: float, girth: float, flat: float, forward: float) -> FloatArray:
         # From the underarm (-up) forward; `flat` is the depth over the height of the section.
         shape = np.outer(-np.cos(t), up) + flat * np.outer(np.sin(t), ahead)
-        scale = girth / arc_lengths(shape, closed=True)[-1]
+        scale = girth / polyline_length(shape, closed=True)
         return middle + at * axis + forward * ahead + scale * shape
 
     biceps_at = float((under - middle) @ axis) + 0.030

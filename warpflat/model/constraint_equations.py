@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.polyline import arc_lengths, segment_lengths
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
@@ -118,8 +119,8 @@ def stretch_equations(
         ratio: of the whole lengths.
     """
     rows = (first, second)
-    shares = [arc / arc[-1] for arc in (_arc(body[row]) for row in rows)]
-    arcs = [_arc(positions[row]) for row in rows]
+    shares = [arc / arc[-1] for arc in (arc_lengths(body[row]) for row in rows)]
+    arcs = [arc_lengths(positions[row]) for row in rows]
     steps = [np.diff(arc) for arc in arcs]
     ties = []
     for side, row in enumerate(rows):
@@ -133,10 +134,6 @@ def stretch_equations(
     own = np.diff(arcs[1][joints[:, 1]])
     between = _ties(ends, LENGTHS, ratio=ratio * there / own * share[0] / share[1], tolerance=_EDGE_TOLERANCE)
     return replace(one_group(*ties, between), sum_tolerance=np.array([_SUM_TOLERANCE]))
-
-
-def _arc(points: FloatArray) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
 
 
 def length_equations(line: IntArray, lengths: FloatArray) -> ConstraintEquations:
@@ -167,7 +164,7 @@ def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | Non
         fold: vertices on an upright fold, if there is one. A row that ends there goes on beyond it as its mirror image, and
             each half has half of what holds the end.
     """
-    step = float(np.linalg.norm(np.diff(positions[line], axis=0), axis=1).mean())
+    step = float(segment_lengths(positions[line]).mean())
     ties, reach = [], 1
     while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
         soft = SMOOTH * WAVE / (2 * step) / reach**2

@@ -198,13 +198,14 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
 def _misfits(
     surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
 ) -> tuple[Misfit, ...]:
-    from warpflat.surface.topology import components, order_by
+    from warpflat.core.sorting import counting_sort
+    from warpflat.surface.connectivity import components
 
     outside = np.flatnonzero(excess > 1e-9)
     if len(outside) == 0:
         return ()
     part = components(surface.faces[outside])
-    order, begin = order_by(part.astype(np.int32), int(part.max()) + 1)
+    order, begin = counting_sort(part.astype(np.int32), int(part.max()) + 1)
     found = []
     for faces in np.split(outside[order], begin[1:-1]):
         worst = faces[np.argmax(excess[faces])]

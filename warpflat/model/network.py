@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
 from warpflat.kernels.constraints import Seams, compute_seam_misses
@@ -51,7 +52,6 @@ from warpflat.model.springs import SpringArrays, shear_hold, shortened, springs_
 from warpflat.surface.cells import CellArrays, cells_of
 from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import order_by
 
 __all__ = ["SpringNetwork"]
 
@@ -319,7 +319,7 @@ class SpringNetwork:
         seams.stiffness = wp.array(stiffness, dtype=wp.float64, device=device)
         seams.offset = wp.zeros(count, dtype=wp.float64, device=device)
         self.seams = seams
-        slot, offset = order_by(np.ascontiguousarray(ends, dtype=np.int32).ravel(), self.vertex_count)
+        slot, offset = counting_sort(np.ascontiguousarray(ends, dtype=np.int32).ravel(), self.vertex_count)
         self.bonds.offset = _on(device, offset, wp.int32)
         self.bonds.slot = _on(device, slot, wp.int32)
 

@@ -14,6 +14,7 @@ import warp as wp
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.stiffness import (
     Lattice,
@@ -28,9 +29,10 @@ from warpflat.kernels.stiffness import (
     weigh_waves,
 )
 from warpflat.surface.cells import CellArrays, cells_of, creases_of, first_of_faces
+from warpflat.surface.half_edges import half_edges, half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
-from warpflat.surface.topology import half_edges, half_edges_of, order_by, rows_of, unfold_quad_diagonals
+from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 
 __all__ = [
     "SpringArrays",
@@ -201,22 +203,29 @@ def springs_of(
     position, lack, wave = np.ascontiguousarray(positions, dtype=np.float64), None, None
     aligned, shear_excess = False, 1.0
     if not is_quad.all():
-        triangles = rows_of(faces, ~is_quad)
-        given = [surface.vertices, position, triangles, rows_of(first, ~is_quad), wp.vec2d(*warp), _compliance(fabric)]
+        triangles = selected_rows(faces, ~is_quad)
+        given = [
+            surface.vertices,
+            position,
+            triangles,
+            selected_rows(first, ~is_quad),
+            wp.vec2d(*warp),
+            _compliance(fabric),
+        ]
         launch_each(weigh_triangles, len(triangles), given, [of_side])
     if is_quad.any():
-        quads = rows_of(faces, is_quad)
+        quads = selected_rows(faces, is_quad)
         diagonal, short, hold = np.empty(len(quads)), np.empty((len(quads), 2)), np.empty(len(quads))
         lattice, angle = _lattice(fabric, quads, position, warp)
         aligned = _off_threads(angle) <= _OFF_GRAIN
         shear_excess = lattice.shear / fabric.shear_stiffness
         # One number for all, where they are as on the body.
-        times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else rows_of(wider, is_quad)
+        times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else selected_rows(wider, is_quad)
         given = [
             surface.vertices,
             position,
             quads,
-            rows_of(first, is_quad),
+            selected_rows(first, is_quad),
             wp.array(times, dtype=wp.vec2d, device="cpu", copy=False),
             lattice,
         ]
@@ -343,9 +352,9 @@ def _numbers(faces: IntArray, count: int) -> IntArray:
 def _sorted_springs(edges: IntArray, faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray]:
     """Edges, then diagonals, around so many vertices: #V+1, where each vertex's begin; 2 #S each, the vertices at the far ends, and the
     springs' numbers."""
-    corner = rows_of(faces, faces[:, 3] >= 0)
+    corner = selected_rows(faces, faces[:, 3] >= 0)
     ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
-    end, offset = order_by(ends[:, ::-1].T.ravel(), count)
+    end, offset = counting_sort(ends[:, ::-1].T.ravel(), count)
     neighbor, spring = np.empty(ends.size, dtype=np.int32), np.empty(ends.size, dtype=np.int32)
     launch_each(list_springs, count, [offset, end, ends, len(ends)], [neighbor, spring])
     return offset, neighbor, spring

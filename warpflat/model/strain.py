@@ -23,8 +23,9 @@ from warpflat.kernels.strain import (
 )
 from warpflat.model.membrane import Model, cloth_of, plane_stress
 from warpflat.model.network import SpringNetwork
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.triangles import corner_triangles
 from warpflat.surface.untangle import signed_cell_areas
 
 __all__ = [

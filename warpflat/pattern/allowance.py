@@ -14,7 +14,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.pattern.curves import arc_lengths
+from warpflat.core.polyline import points_at_lengths, polyline_length
 from warpflat.pattern.pieces import FOLD_STRAIGHT
 
 if TYPE_CHECKING:
@@ -289,7 +289,7 @@ def _corner_parts(
             width, hem_width = side.width, follows.width
         # Beside a seam that is shorter than the hem is deep there is nothing to mirror.
         beside = (follows if hem == index else side).points
-        room = float(np.linalg.norm(np.diff(beside, axis=0), axis=1).sum())
+        room = polyline_length(beside)
         if width > 0 and 0 < hem_width <= room:
             far = index - 1 if hem == index else (after + 1) % len(sides)
             return _folded_hem(
@@ -496,8 +496,7 @@ def _half_plane(start: FloatArray, end: FloatArray, body: Polygon) -> Polygon:
 
 def _secant(line: FloatArray, length: float) -> FloatArray:
     """Unit vector from a line's first point to that at `length` [m] along it, or its last."""
-    arc = arc_lengths(line)
-    return _unit(np.array([np.interp(length, arc, line[:, k]) for k in (0, 1)]) - line[0])
+    return _unit(points_at_lengths(line, length) - line[0])
 
 
 def _between(a: FloatArray, b: FloatArray) -> float:

@@ -8,9 +8,10 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray
+from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length, segment_lengths, turning_angles
 from warpflat.pattern.spline_lengths import with_lengths
 
-__all__ = ["Curve", "arc_lengths", "chords", "fit_curve", "turning_angles"]
+__all__ = ["Curve", "chords", "fit_curve"]
 
 #: A vertex inside an edge that turns by more than this [rad] is a corner, not a sample of a curve.
 CORNER = np.radians(45.0)
@@ -59,7 +60,7 @@ class Curve:
     @property
     def length(self) -> float:
         """Length [m] along the curve, by its fine samples."""
-        return float(arc_lengths(self.sample(1e-6))[-1])
+        return polyline_length(self.sample(1e-6))
 
     @property
     def nodes(self) -> FloatArray:
@@ -73,18 +74,6 @@ class Curve:
     def reversed(self) -> Curve:
         """The same curve run the other way."""
         return Curve(bezier=self.bezier[::-1, ::-1], straight=self.straight[::-1])
-
-
-def arc_lengths(points: FloatArray) -> FloatArray:
-    """#P, the length [m] along a polyline up to each of its points."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-
-
-def turning_angles(points: FloatArray) -> FloatArray:
-    """#P - 2, the signed angle [rad] by which an open polyline turns at each inner point, to the left positive."""
-    step = np.diff(points, axis=0)
-    cross = step[:-1, 0] * step[1:, 1] - step[:-1, 1] * step[1:, 0]
-    return np.arctan2(cross, np.einsum("ij,ij->i", step[:-1], step[1:]))
 
 
 def fit_curve(
@@ -149,17 +138,14 @@ def _corners(points: FloatArray, tolerance: float) -> list[int]:
     arc = arc_lengths(points)
     corners = []
     for i in found:
-        near, far = (
-            np.array([np.interp(arc[i] + s * CORNER_REACH * tolerance, arc, points[:, k]) for k in (0, 1)])
-            for s in (-1, 1)
-        )
+        near, far = points_at_lengths(points, arc[i] + np.array([-1, 1]) * CORNER_REACH * tolerance)
         if abs(float(turning_angles(np.stack([near, points[i], far]))[0])) > sharp:
             corners.append(i)
     return corners
 
 
 def _distinct(points: FloatArray) -> IndexArray:
-    keep = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])
+    keep = np.concatenate([[True], segment_lengths(points) > 1e-9])
     return np.flatnonzero(keep) if keep.sum() > 1 else np.array([0, len(points) - 1])
 
 
@@ -179,7 +165,7 @@ def _lengths_inside(points: FloatArray, depth: float) -> FloatArray:
 
     Over a chord h an arc that turns by t is longer by h t^2 / 24, and by t for each metre that it runs farther outside.
     """
-    step, turn = np.linalg.norm(np.diff(points, axis=0), axis=1), np.abs(turning_angles(points))
+    step, turn = segment_lengths(points), np.abs(turning_angles(points))
     both = (np.concatenate([turn[:1], turn]) + np.concatenate([turn, turn[-1:]])) / 2
     longer = np.maximum(0.0, step * both**2 / 24 - depth * both)
     return np.concatenate([[0.0], np.cumsum(step + longer)])
@@ -208,7 +194,7 @@ def _fit_run(
         return line
     # Where a coarse border bends, a curve of the same length leaves its corners on one side and its chords on the other. What bends
     # along a zigzag is to be smoothed away.
-    step = np.linalg.norm(np.diff(points, axis=0), axis=1)
+    step = segment_lengths(points)
     bend = float((np.abs(turning_angles(points)) * np.maximum(step[:-1], step[1:])).max())
     if lengths is not None and tolerance > TOLERANCE and not strict:
         bend = 0.0
@@ -223,7 +209,7 @@ def _fit_run(
         stray = _stray(samples, points)
         if stray > room + bend / 6 or _stray(points, samples) > room + bend / 4:
             continue
-        off = max(off, abs(float(arc_lengths(samples)[-1] - arc[-1])))
+        off = max(off, abs(polyline_length(samples) - float(arc[-1])))
         score = max(stray / (room if strict else room + bend / 24), off / (LENGTH * slack))
         if len(bezier) < len(points) and score < worst:
             best, worst = curve, score

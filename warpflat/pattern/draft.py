@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import polyline_length, resample
 from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
-from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
+from warpflat.pattern.curves import TOLERANCE, Curve, fit_curve
 from warpflat.pattern.drafted import (
     DraftedCutout,
     DraftedDart,
@@ -112,7 +113,8 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         if hole.name in cutouts and cutouts[hole.name].width < hole.width
     ]
     for name, line in fisheyes.items():
-        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in eye_legs(line)))))
+        first, second = eye_legs(line)
+        apart = abs(polyline_length(first) - polyline_length(second))
         if apart > SEAM_TOLERANCE:
             notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
     drills = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts]
@@ -290,11 +292,7 @@ def _dart_lines(
 def _between(first: FloatArray, second: FloatArray) -> FloatArray:
     """The middle line of two lines with one start, by shares of their lengths."""
     shares = np.linspace(0.0, 1.0, MIDDLE)
-    sides = [
-        np.column_stack([np.interp(shares * arc[-1], arc, line[:, k]) for k in (0, 1)])
-        for line, arc in ((line, arc_lengths(line)) for line in (first, second))
-    ]
-    return np.asarray((sides[0] + sides[1]) / 2)
+    return (resample(first, shares) + resample(second, shares)) / 2
 
 
 def _line(edges: tuple[DraftedEdge, ...], name: str) -> FloatArray:

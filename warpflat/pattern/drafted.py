@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.pattern.curves import Curve, arc_lengths
+from warpflat.core.polyline import polyline_length
+from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
@@ -58,7 +59,7 @@ class DraftedEdge:
     @property
     def length(self) -> float:
         """Length [m] along the sewing line."""
-        return float(arc_lengths(self.line)[-1])
+        return polyline_length(self.line)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -9,7 +9,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
+from warpflat.core.polyline import polyline_length, resample
+from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import eye_legs, nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
 from warpflat.pattern.label import Label
@@ -206,13 +207,13 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
     drawn = {index: shapely.LineString(line) for index, (_, line, _) in enumerate(lines)}
     words = []
     for index, (name, line, border) in enumerate(lines):
-        arc, half = arc_lengths(line), text_width(name, NAME) / 2
-        if arc[-1] < 2 * half + (0.008 if border else 0.02):
+        length, half = polyline_length(line), text_width(name, NAME) / 2
+        if length < 2 * half + (0.008 if border else 0.02):
             continue
         others = shapely.union_all([*taken, *(other for key, other in drawn.items() if key != index)])
         clear, chosen = CLEAR, None
         for tried in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
-            if not half <= tried * arc[-1] <= arc[-1] - half:
+            if not half <= tried * length <= length - half:
                 continue
             there = _words_along(name, line, tried, half, inwards=border)
             distance = float(others.distance(_ground(there)))
@@ -238,8 +239,8 @@ def _ground(words: Words) -> Polygon:
 
 def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
     """A name beside a line, upright: above it, or to its left as the line runs, where a border has the piece."""
-    length = max(float(arc_lengths(line)[-1]), 1e-12)
-    near, far = _at_share(line, share - half / length), _at_share(line, share + half / length)
+    length = max(polyline_length(line), 1e-12)
+    near, far = resample(line, share - half / length), resample(line, share + half / length)
     along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
     left = np.array([-along[1], along[0]])
     # Upright, and steep ones read upwards.
@@ -247,7 +248,7 @@ def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwa
         along = -along
     aside = left if inwards else np.array([-along[1], along[0]])
     # Clear of the whole stretch, however it bends.
-    stretch = [_at_share(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
+    stretch = [resample(line, share + k * half / length) for k in (-1, -0.5, 0, 0.5, 1)]
     bulge = max(float((point - near) @ aside) for point in stretch)
     at = (near + far) / 2 + (bulge + NAME_GAP) * aside
     return Words(text=name, at=at, height=NAME, angle=float(np.arctan2(along[1], along[0])))
@@ -306,7 +307,7 @@ def _telling_edge(pieces: tuple[DraftedPiece, ...]) -> str:
     """The edge on which the sizes lie farthest apart: there a size can be read off its own line."""
 
     def spread(name: str) -> float:
-        middles = [_at_share(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
+        middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
         start, end = pieces[0].edge(name).line[[0, -1]]
         along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
         shift = middles[1] - middles[0]
@@ -326,12 +327,7 @@ def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[W
     ring = shapely.LinearRing(piece.cut_line)
     words = []
     for start in (0.08, 0.62):
-        at = _at_share(piece.edge(edge).line, start + 0.3 * (index + 0.5) / count)
+        at = resample(piece.edge(edge).line, start + 0.3 * (index + 0.5) / count)
         on_cut = np.asarray(ring.interpolate(ring.project(shapely.Point(at))).coords[0])
         words.append(Words(text=piece.size, at=on_cut, height=0.004, bold=True, tag=True))
     return words
-
-
-def _at_share(line: FloatArray, share: float) -> FloatArray:
-    arc = arc_lengths(line)
-    return np.array([np.interp(share * arc[-1], arc, line[:, k]) for k in (0, 1)])

@@ -7,7 +7,8 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, chords, fit_curve, turning_angles
+from warpflat.core.polyline import arc_lengths, turning_angles
+from warpflat.pattern.curves import TOLERANCE, Curve, chords, fit_curve
 from warpflat.pattern.pieces import SAME_POINT, Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE, worst_difference
 

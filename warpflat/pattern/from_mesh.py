@@ -10,9 +10,10 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import segment_lengths
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import Dart, Edge, Hole, Piece
-from warpflat.surface.topology import border_loops
+from warpflat.surface.connectivity import border_loops
 
 __all__ = ["line_labels", "piece_from_mesh"]
 
@@ -142,7 +143,7 @@ class _Walk:
     """
 
     def __init__(self, ring: FloatArray) -> None:
-        step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+        step = segment_lengths(ring, closed=True)
         self.ring, self.count = ring, len(ring)
         self.length = float(step.sum())
         self.window = min(WINDOW, self.length / 24)
@@ -241,7 +242,7 @@ def _dart_places(
 def _cracks(ring: FloatArray, corners: set[int], known: set[int]) -> list[tuple[int, int, int]]:
     """Sharp inward tips between two legs of equal length that end in the nearest corners."""
     turns = _turns(ring)
-    step = np.linalg.norm(np.roll(ring, -1, axis=0) - ring, axis=1)
+    step = segment_lengths(ring, closed=True)
     count = len(ring)
     found = []
     for tip in np.flatnonzero(turns < -TIP).tolist():

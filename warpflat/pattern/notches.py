@@ -7,8 +7,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.pattern.allowance import CutOutline, Wedge
-from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import worst_difference
@@ -223,7 +223,7 @@ class _Chain:
         span = float(arc[step + 1] - arc[step])
         at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
         # The direction over a few millimetres: that of a single short chord would jitter.
-        near, far = (np.array([np.interp(x, arc, line[:, k]) for k in (0, 1)]) for x in (length - 2e-3, length + 2e-3))
+        near, far = points_at_lengths(line, [length - 2e-3, length + 2e-3])
         tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
         inwards = np.array([-tangent[1], tangent[0]])
         return at, -inwards if self.side[index].reversed else inwards

@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import checked_label
+from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -66,7 +67,7 @@ class Edge:
         if self.kind not in EDGE_KINDS:
             raise InputError(f"edge {self.name!r}: unknown kind {self.kind!r}; {nearest(self.kind, EDGE_KINDS)}")
         points = _points(self.points, f"edge {self.name!r}", at_least=2)
-        if float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum()) < SAME_POINT:
+        if polyline_length(points) < SAME_POINT:
             raise InputError(f"edge {self.name!r} has no length; an edge runs between two different corners")
         if self.allowance is not None and not 0 <= self.allowance <= 0.5:
             raise InputError(f"edge {self.name!r}: allowance {self.allowance!r} m; it must be between 0 and 0.5 m")
@@ -82,7 +83,7 @@ class Edge:
     @property
     def length(self) -> float:
         """Length [m] along the points."""
-        return float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
+        return polyline_length(self.points)
 
 
 @dataclass(frozen=True, kw_only=True)

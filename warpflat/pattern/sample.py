@@ -11,6 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["sample_dress"]
@@ -152,7 +153,7 @@ def _sleeve(size: str, grow: float, cap: float) -> Piece:
     low, high = 0.10, 0.35
     for _ in range(60):
         width = (low + high) / 2
-        total = float(np.linalg.norm(np.diff(cap_line(width), axis=0), axis=1).sum())
+        total = polyline_length(cap_line(width))
         low, high = (width, high) if total < cap else (low, width)
     edges = [
         Edge(name="hem", points=_line((-wrist, 0), (wrist, 0)), kind="hem"),

@@ -172,7 +172,7 @@ def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, Float
 
 
 def _loops(comparison: Comparison, piece: str) -> list[IntArray]:
-    from warpflat.surface.topology import border_loops
+    from warpflat.surface.connectivity import border_loops
 
     return border_loops(comparison.results[comparison.fabrics[0]][piece].faces)
 

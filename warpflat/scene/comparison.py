@@ -11,8 +11,9 @@ import numpy as np
 
 from warpflat._version import __version__
 from warpflat.core.arrays import FloatArray
+from warpflat.core.polyline import polyline_length
 from warpflat.flattening.result import Flattening
-from warpflat.surface.topology import border_loops
+from warpflat.surface.connectivity import border_loops
 
 __all__ = ["Comparison", "outline"]
 
@@ -76,11 +77,11 @@ class Comparison:
         edges = {
             frozenset(edge) for loop in loops for edge in zip(loop.tolist(), np.roll(loop, -1).tolist(), strict=True)
         }
-        lengths = {"outline": sum(_length(result.positions[np.append(loop, loop[0])]) for loop in loops)}
+        lengths = {"outline": sum(polyline_length(result.positions[loop], closed=True) for loop in loops)}
         for name, line in result.network.surface.lines.items():
             row = line.tolist()
             if len(row) > 1 and all(frozenset(edge) in edges for edge in pairwise(row)):
-                lengths[name] = _length(result.positions[line])
+                lengths[name] = polyline_length(result.positions[line])
         return lengths
 
     def as_dict(self) -> dict[str, Any]:
@@ -100,10 +101,6 @@ class Comparison:
             "sewing": {fabric: dict(how) for fabric, how in self.sewing.items()},
             "distances_m": {piece: self.distances(piece) for piece in self.pieces},
         }
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
 
 
 def outline(result: Flattening, layout: FloatArray) -> list[FloatArray]:

@@ -81,9 +81,9 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
 
 def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:
     """See that something is left of the dart, or of the fish-eye with two tips inside, that the path opens into."""
+    from warpflat.surface.connectivity import border_loops
     from warpflat.surface.cut.dart_legs import check_tip_back
     from warpflat.surface.paths.edge_paths import path_length
-    from warpflat.surface.topology import border_loops
 
     border = {vertex for loop in border_loops(surface.faces) for vertex in loop.tolist()}
     inside = sum(vertex not in border for vertex in path[[0, -1]].tolist())

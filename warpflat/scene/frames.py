@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from warpflat.core.arrays import IntArray
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import half_edges
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_piece import CutPlan

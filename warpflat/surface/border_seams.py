@@ -15,8 +15,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths, project_on_segments
+from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import border_loops
 
 __all__ = ["NamedSeam", "SurfaceSeam", "surface_seams"]
 
@@ -118,7 +119,7 @@ def _sewn(surface: Surface, seam: NamedSeam, first: IntArray, second: IntArray) 
         raise InputError(
             f"{seam.sides[0]!r} and {seam.sides[1]!r} lie on each other the same way round, face to back; sides meet face to face"
         )
-    arcs = [_arc(points) for points in (one, other)]
+    arcs = [arc_lengths(points) for points in (one, other)]
     lengths = [float(arc[-1]) for arc in arcs]
     unlike = abs(lengths[0] - lengths[1]) / max(lengths)
     if not shared and unlike > (_AS_MANY if len(first) == len(second) else _ALIKE):
@@ -151,12 +152,4 @@ def _apart(one: FloatArray, other: FloatArray) -> float:
 
 
 def _strays(points: FloatArray, line: FloatArray) -> float:
-    start, span = line[:-1], np.diff(line, axis=0)
-    away = points[:, None] - start
-    share = (away * span).sum(axis=2) / np.maximum((span**2).sum(axis=1), np.finfo(np.float64).tiny)
-    foot = start + np.clip(share, 0.0, 1.0)[..., None] * span
-    return float(np.linalg.norm(points[:, None] - foot, axis=2).min(axis=1).max())
-
-
-def _arc(points: FloatArray) -> FloatArray:
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return float(project_on_segments(points[:, None], line[:-1], line[1:])[1].min(axis=1).max())

@@ -12,8 +12,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.unfold import add_areas
+from warpflat.surface.connectivity import border_of
 from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
-from warpflat.surface.topology import border_of, corner_triangles
+from warpflat.surface.triangles import corner_triangles
 from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
 
 __all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import nearest_on_polyline, segment_lengths
 from warpflat.kernels.unfold import measure_triangles
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import corner_triangles
+from warpflat.surface.triangles import corner_triangles
 
 __all__ = [
     "EnergyMap",
@@ -260,7 +261,7 @@ def integrate_along(surface: Surface, vertex_density: ArrayLike, line: ArrayLike
     if len(outside):
         raise InputError(f"line: vertex {int(vertices[outside[0]])} does not exist; valid: 0 to {len(density) - 1}")
     along = density[vertices]
-    step = np.linalg.norm(np.diff(surface.vertices[vertices], axis=0), axis=1)
+    step = segment_lengths(surface.vertices[vertices])
     length = float(step.sum())
     integral = float((0.5 * (along[:-1] + along[1:]) * step).sum())
     highest = int(np.argmax(along))
@@ -311,7 +312,7 @@ def _place(
     norm = np.linalg.norm(upwards)
     if upwards.shape != (3,) or not np.isfinite(norm) or norm <= 0:
         raise InputError(f"up is a direction, three finite numbers, not all zero, got {up!r}")
-    offsets = {name: _nearest_on_line(surface.vertices[line], here) - here for name, line in surface.lines.items()}
+    offsets = {name: nearest_on_polyline(here, surface.vertices[line]) - here for name, line in surface.lines.items()}
     marks = {name: _landmark(surface, name, place) for name, place in landmarks.items()}
     to_lines = _by_distance({name: float(np.linalg.norm(offset)) for name, offset in offsets.items()})
     to_marks = _by_distance({name: float(np.linalg.norm(mark - here)) for name, mark in marks.items()})
@@ -367,16 +368,6 @@ def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> FloatArray
     if position.shape != (3,) or not np.isfinite(position).all():
         raise InputError(f"landmark {name!r} is a vertex index or three finite numbers [m], got {place!r}")
     return position
-
-
-def _nearest_on_line(points: FloatArray, target: FloatArray) -> FloatArray:
-    if len(points) == 1:
-        return points[0]
-    along = np.diff(points, axis=0)
-    squared = np.einsum("ij,ij->i", along, along)
-    share = np.einsum("ij,ij->i", target - points[:-1], along) / np.where(squared > 0, squared, 1.0)
-    nearest = points[:-1] + np.clip(share, 0.0, 1.0)[:, None] * along
-    return nearest[int(np.argmin(np.linalg.norm(nearest - target, axis=1)))]
 
 
 @once_per_surface

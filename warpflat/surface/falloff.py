@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.topology import mesh_edges
+from warpflat.surface.half_edges import mesh_edges
 
 __all__ = ["falloff_weights"]
 

@@ -9,9 +9,10 @@ import warp as wp
 
 from warpflat.core.arrays import BoolArray, IntArray
 from warpflat.kernels.grid_lists import number_faces
+from warpflat.surface.connectivity import border_of
+from warpflat.surface.half_edges import half_edges_of, twins_of
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import RowByRow, row_by_row
-from warpflat.surface.topology import border_of, half_edges_of, twins_of
 
 __all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
 

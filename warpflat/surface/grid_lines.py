@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import IntArray
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.grid import lattice_of, rows_and_columns
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.topology import half_edges_of, join_labels
 
 __all__ = ["LineArrays", "join_lines", "lines_of"]
 

@@ -1,4 +1,4 @@
-"""Which vertex of a mesh is the mirror image of which: its connectivity walked from a line to both sides at once."""
+"""Mirror images of vertices, found by walking over the mesh from a line to both sides at once."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
-from warpflat.surface.topology import half_edges
+from warpflat.surface.half_edges import half_edges
 
 __all__ = ["mirror_partners"]
 
 
 def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> IntArray:
-    """#V, for each vertex its partner across a line; itself on the line, -1 for vertices that no face uses.
+    """Return #V, the mirror image of each vertex across a line; itself on the line, -1 for vertices that no face uses.
 
-    Only how faces hang together counts, not where they lie: a scan's grid has partners too, though the body leans.
+    Only the connectivity of the faces counts, not their positions: the grid on a scan has mirror images though the body leans.
 
     Args:
         faces: #F by 4, consistently wound, -1 in the last column of a triangle.
@@ -47,22 +47,28 @@ def mirror_partners(faces: IntArray, axis: IntArray, *, vertex_count: int) -> In
         start = here
         while not done[here]:
             done[here] = True
-            for vertex, image in ((he.head[here], he.tail[there]), (he.tail[here], he.head[there])):
-                if partner[vertex] not in (-1, image) or partner[image] not in (-1, vertex):
-                    raise InputError(_unlike(int(vertex)))
-                partner[vertex], partner[image] = image, vertex
-            beyond = (
-                at.get((int(he.head[here]), int(he.tail[here]))),
-                at.get((int(he.head[there]), int(he.tail[there]))),
-            )
-            if (beyond[0] is None) != (beyond[1] is None):
+            _pair(partner, int(he.head[here]), int(he.tail[there]))
+            _pair(partner, int(he.tail[here]), int(he.head[there]))
+            beyond, image = (at.get((int(he.head[h]), int(he.tail[h])), -1) for h in (here, there))
+            if (beyond < 0) != (image < 0):
                 raise InputError(_unlike(int(he.tail[here])))
-            if beyond[0] is not None and beyond[1] is not None and not done[beyond[0]]:
-                waiting.append((beyond[0], beyond[1]))
+            if beyond >= 0 and not done[beyond]:
+                waiting.append((beyond, image))
             here, there = int(he.next[here]), int(before[there])
         if here != start or he.tail[there] != partner[he.head[here]]:
             raise InputError(_unlike(int(he.tail[here])))
     return partner
+
+
+def _pair(partner: IntArray, vertex: int, image: int) -> None:
+    """Note two vertices as each other's mirror images.
+
+    Raises:
+        InputError: one of them has another image already.
+    """
+    if partner[vertex] not in (-1, image) or partner[image] not in (-1, vertex):
+        raise InputError(_unlike(vertex))
+    partner[vertex], partner[image] = image, vertex
 
 
 def _unlike(vertex: int) -> str:

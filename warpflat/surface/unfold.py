@@ -14,11 +14,12 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
+from warpflat.core.sorting import counting_sort
 from warpflat.kernels.unfold import average_normals, find_bends, find_creases
 from warpflat.kernels.unfold import lay_cells as lay_each
+from warpflat.surface.connectivity import coincident_vertices
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import order_by, places_of
 
 __all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
 
@@ -61,7 +62,7 @@ def quad_creases(
     launch_each(find_bends, len(faces), [vertices, faces], [normal, bent])
     if not bent.any():
         return crease
-    count, place = len(vertices), places_of(vertices, faces, border=border)
+    count, place = len(vertices), coincident_vertices(vertices, faces, border=border)
     if (place != np.arange(count)).any():
         faces, around = np.where(faces >= 0, place[faces], -1).astype(np.int32), None
     offset, corner = around or corners_around(faces, count)
@@ -74,10 +75,10 @@ def quad_creases(
 def corners_around(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
     """The faces' corners around each of so many vertices: #V+1, where each vertex's begin, and 4 times the face plus the corner."""
     if (faces[:, 3] >= 0).all():
-        corner, offset = order_by(faces.ravel(), count)
+        corner, offset = counting_sort(faces.ravel(), count)
         return offset, corner
     # The fourth corners of triangles are those of one vertex more, come after all others, and are left out.
-    corner, offset = order_by(np.where(faces >= 0, faces, np.int32(count)).ravel(), count + 1)
+    corner, offset = counting_sort(np.where(faces >= 0, faces, np.int32(count)).ravel(), count + 1)
     return offset[:-1], corner[: offset[count]]
 
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.kernels.strain import measure_flat_cells
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges_of
+from warpflat.surface.triangles import corner_triangles
 from warpflat.surface.unfold import corners_of
 from warpflat.surface.vectors import cross, norm, points_at
 

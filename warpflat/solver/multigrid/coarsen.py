@@ -44,7 +44,7 @@ from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface, tell
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = [
     "Coarser",

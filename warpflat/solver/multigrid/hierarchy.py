@@ -18,9 +18,9 @@ from warpflat.solver.multigrid.coarsen import Coarser, coarser, is_coarsest, res
 from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
 from warpflat.surface.cells import cells_of
 from warpflat.surface.grid import rows_and_columns
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, forget, is_large
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import half_edges_of
 from warpflat.surface.untangle import untangle
 
 __all__ = ["CoarseLevel", "device_levels", "let_go", "make_coarse_levels", "stay"]

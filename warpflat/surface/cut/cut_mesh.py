@@ -19,10 +19,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, IndexArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.surface.connectivity import components_of, join_labels
+from warpflat.surface.half_edges import HalfEdges, half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import HalfEdges, components_of, half_edges, join_labels
 
-__all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "faces_at", "glue"]
+__all__ = ["Cut", "CutKind", "Seam", "cut_along", "cut_along_many", "faces_at"]
 
 CutKind = Literal["dart", "slit", "split", "hole", "opening", "network"]
 
@@ -95,14 +96,6 @@ class Cut:
     def right(self) -> IntArray:
         """#P, the new vertices along the right side of a plain cut."""
         return self.seam.right
-
-    @property
-    def vertex_component(self) -> IntArray:
-        """#W, the connected piece of each new vertex; -1 for a vertex that no face uses."""
-        labels = np.full(len(self.vertex_origin), -1, dtype=np.int32)
-        used = self.faces >= 0
-        labels[self.faces[used]] = np.broadcast_to(self.face_component[:, None], self.faces.shape)[used]
-        return labels
 
 
 def cut_along(faces: IntArray, path: ArrayLike, *, vertex_count: int) -> Cut:
@@ -198,14 +191,6 @@ def _mesh_of(faces: IntArray) -> Surface:
     return Surface(
         vertices=nowhere, faces=faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
     )
-
-
-def glue(cut: Cut) -> IntArray:
-    """#F by 4, the faces before the cut, bit for bit: every copy of a vertex becomes the old vertex again."""
-    faces = cut.faces.copy()
-    used = faces >= 0
-    faces[used] = cut.vertex_origin[faces[used]]
-    return faces
 
 
 def _edge(chain: IntArray, index: int) -> str:

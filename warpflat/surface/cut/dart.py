@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.surface.cut.dart_legs import check_tip_back
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -25,7 +26,6 @@ __all__ = [
     "DrawnFishEye",
     "FishEyeMeasure",
     "dart_measure",
-    "draw_outline",
     "fish_eye_measure",
     "mouth_first",
     "shape_dart",
@@ -154,8 +154,8 @@ def dart_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> Dar
         angle=angle,
         left_leg=legs[0],
         right_leg=legs[1],
-        left_seam=_length(x[a]),
-        right_seam=_length(x[b]),
+        left_seam=polyline_length(x[a]),
+        right_seam=polyline_length(x[b]),
         intake=sum(legs) * float(np.sin(angle / 2)),
     )
 
@@ -234,7 +234,7 @@ def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float
 
 def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
     """A line with its first point moved to `end` and the next ones along with it, less and less; which ones moved."""
-    reach = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    reach = arc_lengths(points)
     fade = (
         np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
     )
@@ -242,32 +242,6 @@ def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArra
     falloff_weights = points + np.multiply.outer(fade, end - points[0])
     falloff_weights[0] = end
     return falloff_weights, fade > 0
-
-
-def draw_outline(
-    positions: ArrayLike, outline: ArrayLike, darts: Sequence[DrawnDart], *, folded: bool = False
-) -> FloatArray:
-    """The outline with cracks replaced by drawn darts.
-
-    Args:
-        positions: #P by 2, the layout [m].
-        outline: #O, the loop of border vertices, the first not repeated.
-        darts: shaped from these positions and this outline.
-        folded: true to run across each dart by its fold point, as the cloth is cut; false to run down one leg to the
-            tip and up the other, as the dart is drawn.
-
-    Returns:
-        #K by 2 [m], in the direction of `outline`, the first point not repeated.
-    """
-    x = np.array(positions, dtype=float)
-    loop = np.asarray(outline).tolist()
-    corner: dict[int, FloatArray] = {}
-    dropped: set[int] = set()
-    for dart in darts:
-        x[dart.moved] = dart.moved_to
-        corner[int(dart.left[-1])] = dart.fold_point if folded else dart.tip
-        dropped |= {int(v) for side in (dart.left, dart.right) for v in side[1:-1]}
-    return np.array([corner.get(v, x[v]) for v in loop if v not in dropped]).reshape(-1, 2)
 
 
 def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:
@@ -301,8 +275,8 @@ def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) ->
         station=station,
         first_angle=_angle(wide[1] - x[a[0]], wide[0] - x[a[0]]),
         last_angle=_angle(wide[0] - x[a[-1]], wide[1] - x[a[-1]]),
-        left_seam=_length(x[a]),
-        right_seam=_length(x[b]),
+        left_seam=polyline_length(x[a]),
+        right_seam=polyline_length(x[b]),
     )
 
 
@@ -417,7 +391,3 @@ def _unit(v: FloatArray) -> FloatArray:
     if length <= 0:
         raise InputError("the two legs of the dart point in opposite directions; it has no bisector")
     return v / length
-
-
-def _length(points: FloatArray) -> float:
-    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())

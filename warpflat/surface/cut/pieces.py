@@ -1,20 +1,22 @@
-"""A cut carried over to a whole surface: its vertices, its feature lines, and the pieces it falls into."""
+"""A surface after a cut: its vertices, its feature lines, and the pieces it falls into."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.surface.cut.cut_mesh import Cut, faces_at
+from warpflat.surface.half_edges import half_edges, sides_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import corner_triangles, half_edges, sides_of
+from warpflat.surface.triangles import corner_triangles
 
-__all__ = ["Piece", "apply_cut", "carry_lines", "split_pieces"]
+__all__ = ["Piece", "apply_cut", "lines_after_cut", "split_pieces"]
 
 _PART = re.compile(r"\.(left|right|\d+)(\.\d+)?$")
 
@@ -37,7 +39,7 @@ class Piece:
 
 
 def apply_cut(surface: Surface, cut: Cut) -> Surface:
-    """The surface with the cut's vertices doubled, still as one object, its feature lines carried along.
+    """Return the surface with the vertices along a cut doubled, still as one object, with its feature lines.
 
     Args:
         surface: the uncut surface.
@@ -48,17 +50,16 @@ def apply_cut(surface: Surface, cut: Cut) -> Surface:
         surface,
         vertices=surface.vertices[origin],
         faces=cut.faces,
-        lines=carry_lines(surface.lines, surface.faces, cut),
+        lines=lines_after_cut(surface.lines, surface.faces, cut),
         input_index=surface.input_index[origin],
     )
 
 
-def carry_lines(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) -> dict[str, IntArray]:
-    """Feature lines in the numbering of the cut mesh.
+def lines_after_cut(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) -> dict[str, IntArray]:
+    """Return feature lines in the numbering of the cut mesh.
 
-    What lies along the cut becomes two lines, NAME.left and NAME.right (of the line's own direction, seen from
-    outside). The rest keeps its name; where the cut parts it into several, they are NAME.1, NAME.2, ... in the line's
-    order.
+    The part along the cut becomes two lines, NAME.left and NAME.right (of the line's own direction, seen from outside).
+    The rest keeps its name; where the cut parts it into several, they are NAME.1, NAME.2, ... in the line's order.
 
     Args:
         lines: name to vertices of the uncut mesh, along its edges; a closed line repeats its first vertex.
@@ -69,57 +70,75 @@ def carry_lines(lines: Mapping[str, IntArray], faces: IntArray, cut: Cut) -> dic
     near = faces_at(faces, doubled)
     # Slots of the faces are the same before and after the cut, so the half-edges correspond one to one.
     old, new = (zip(*(end.tolist() for end in sides_of(of[near])), strict=True) for of in (faces, cut.faces))
-    ends = dict(zip(old, new, strict=True))
-    touched = set(doubled.tolist())
-    carried: dict[str, IntArray] = {}
+    new_side = dict(zip(old, new, strict=True))
+    on_cut = set(doubled.tolist())
+    renumbered: dict[str, IntArray] = {}
     taken = set(lines)
     for name, line in lines.items():
-        if len(line) > 1 and touched.isdisjoint(line.tolist()):
-            carried[name] = np.asarray(line, dtype=np.int32)
+        if len(line) > 1 and on_cut.isdisjoint(line.tolist()):
+            renumbered[name] = np.asarray(line, dtype=np.int32)
             continue
-        streams: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}
-        for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
-            left, backward = ends.get((a, b)), ends.get((b, a))
-            right = backward[::-1] if backward else None
-            if left is None and right is None:
-                if a in touched or b in touched:
-                    raise InputError(f"line {name!r} leaves the mesh between vertices {a} and {b}: they share no edge")
-                left = (a, b)
-            along = left is not None and right is not None and left != right
-            streams[""].append(None if along else left or right)
-            streams[".left"].append(left if along else None)
-            streams[".right"].append(right if along else None)
-        for suffix, stream in streams.items():
-            runs = _runs(stream)
+        for suffix, edges in _edges_by_side(name, line, new_side, on_cut).items():
+            runs = _runs(edges)
             for number, run in enumerate(runs, start=1):
                 label = name + suffix + (f".{number}" if len(runs) > 1 else "")
                 while label != name and label in taken:
                     label += "'"
                 taken.add(label)
-                carried[label] = run
-    return carried
+                renumbered[label] = run
+    return renumbered
 
 
-def _runs(stream: Sequence[tuple[int, int] | None]) -> list[IntArray]:
-    """The edges of a line as unbroken chains of vertices; a gap (None) or a doubled vertex ends a chain."""
+def _edges_by_side(
+    name: str, line: IntArray, new_side: Mapping[tuple[int, int], tuple[int, int]], on_cut: set[int]
+) -> dict[str, list[tuple[int, int] | None]]:
+    """Renumber a line edge by edge.
+
+    Args:
+        name: the line's, for messages.
+        line: its vertices before the cut.
+        new_side: the sides of faces near the cut, (tail, head) before it to (tail, head) after it.
+        on_cut: the vertices along the cut.
+
+    Returns:
+        By the suffix of the new name ("" off the cut, ".left" and ".right" along it) an entry for each edge: its ends after the
+        cut, or None where the edge has none under that name.
+    """
+    found: dict[str, list[tuple[int, int] | None]] = {"": [], ".left": [], ".right": []}
+    for a, b in pairwise(line.tolist()):
+        left, backward = new_side.get((a, b)), new_side.get((b, a))
+        right = backward[::-1] if backward else None
+        if left is None and right is None:
+            if a in on_cut or b in on_cut:
+                raise InputError(f"line {name!r} leaves the mesh between vertices {a} and {b}: they share no edge")
+            left = (a, b)
+        along = left is not None and right is not None and left != right
+        found[""].append(None if along else left or right)
+        found[".left"].append(left if along else None)
+        found[".right"].append(right if along else None)
+    return found
+
+
+def _runs(edges: Sequence[tuple[int, int] | None]) -> list[IntArray]:
+    """Join the edges of a line to unbroken chains of vertices; a gap (None) or a doubled vertex ends a chain."""
     chains: list[list[int]] = []
     previous: tuple[int, int] | None = None
-    for edge in stream:
+    for edge in edges:
         if edge is not None:
             if previous is not None and previous[1] == edge[0]:
                 chains[-1].append(edge[1])
             else:
                 chains.append(list(edge))
         previous = edge
-    if len(chains) > 1 and stream[0] is not None and stream[-1] is not None and chains[-1][-1] == chains[0][0]:
+    if len(chains) > 1 and edges[0] is not None and edges[-1] is not None and chains[-1][-1] == chains[0][0]:
         chains[0] = chains.pop()[:-1] + chains[0]
     return [np.array(chain, dtype=np.int32) for chain in chains]
 
 
 def split_pieces(surface: Surface, cut: Cut, *, names: Sequence[str] | None = None) -> tuple[Piece, ...]:
-    """One surface per connected piece of the cut mesh, in the order of their first faces.
+    """Return one surface per connected piece of the cut mesh, in the order of their first faces.
 
-    A line that a piece has one part of goes by its plain name there again.
+    Where a piece has only one part of a line, the part gets the line's plain name back.
 
     Args:
         surface: the uncut surface.

@@ -1,4 +1,4 @@
-"""A few triangles of a large mesh, divided vertex by vertex until given points and lines are part of them."""
+"""Local refinement: a few triangles of a large mesh are divided until given points and paths are vertices and edges."""
 
 from __future__ import annotations
 
@@ -30,7 +30,8 @@ class Refinement:
     """
 
     def __init__(self, vertices: FloatArray, triangles: IntArray, around: Iterable[int], snap: float) -> None:
-        """
+        """Open the triangles around some vertices.
+
         Args:
             vertices: #V by 3, positions [m].
             triangles: #T by 3, consistently wound.
@@ -52,14 +53,14 @@ class Refinement:
         self._drawn: set[tuple[int, int]] = set()
         self._next_id = len(triangles)
 
-    def draw(self, places: Sequence[Place], *, closed: bool) -> list[int]:
+    def insert_path(self, places: Sequence[Place], *, closed: bool) -> list[int]:
         """Divide triangles until the places are vertices and each is joined to the next by edges.
 
         Returns:
-            The vertices along the way; a closed way repeats its first.
+            The vertices along the path; a closed one repeats its first.
 
         Raises:
-            InputError: if the way crosses itself.
+            InputError: if the path crosses itself.
         """
         chain = [self._vertex_at(places[0])]
         for place in places[1:]:
@@ -73,29 +74,29 @@ class Refinement:
         return chain
 
     def improve(self) -> None:
-        """Turn diagonals inside base triangles where that widens the smallest angle; what was drawn stays."""
+        """Flip diagonals inside base triangles where that widens the smallest angle; edges of inserted paths stay."""
         for base, children in self._children.items():
             for _ in range(3 * len(children)):
-                turned = [self._turn(edge, base) for t in list(children) for edge in _rim(self._corner[t])]
-                if not any(turned):
+                flipped = [self._flip(edge, base) for t in list(children) for edge in _rim(self._corner[t])]
+                if not any(flipped):
                     break
 
     def parts(self) -> dict[int, list[_Triangle]]:
-        """For each base triangle that was open to it, the triangles it now consists of."""
+        """Return, for each base triangle that may be divided, the triangles it now consists of."""
         return {base: [self._corner[t] for t in children] for base, children in self._children.items()}
 
     def place(self, vertex: int) -> Place:
-        """The place of an old or new vertex on the undivided mesh."""
+        """Return the place of an old or new vertex on the undivided mesh."""
         old = len(self._vertices)
         return {vertex: 1.0} if vertex < old else self.new_places[vertex - old]
 
-    def between(self, a: int, b: int) -> list[int]:
-        """The new vertices on an edge of the undivided mesh, in order from a to b."""
+    def vertices_between(self, a: int, b: int) -> list[int]:
+        """Return the new vertices on an edge of the undivided mesh, in order from a to b."""
         inside = [vertex for _, vertex in self._on_edge.get((min(a, b), max(a, b)), [])]
         return inside if a < b else inside[::-1]
 
-    def beside(self, a: int, b: int) -> list[int]:
-        """The base triangles on both sides of an edge; one on the border."""
+    def triangles_beside(self, a: int, b: int) -> list[int]:
+        """Return the base triangles on both sides of an edge; one on the border."""
         found = (self._half.get((a, b)), self._half.get((b, a)))
         return [self._base[t] for t in found if t is not None]
 
@@ -129,15 +130,19 @@ class Refinement:
         return vertex
 
     def _vertex_inside(self, place: Place) -> int:
-        """A vertex in the interior of a base triangle, snapped to the lines already inside it."""
+        """Return a vertex at a place inside a base triangle; near vertices and edges already there the place is moved onto them."""
         base = self._base_of[frozenset(place)]
         point = self._flat(place, base)
         best: tuple[float, int, list[float]] = (-math.inf, -1, [])
         for t in self._children[base]:
             a, b, c = (self._flat(self.place(v), base) for v in self._corner[t])
-            whole = _turn_of(a, b, c)
+            whole = _twice_area(a, b, c)
             if whole > 0:
-                shares = [_turn_of(point, b, c) / whole, _turn_of(a, point, c) / whole, _turn_of(a, b, point) / whole]
+                shares = [
+                    _twice_area(point, b, c) / whole,
+                    _twice_area(a, point, c) / whole,
+                    _twice_area(a, b, point) / whole,
+                ]
                 best = max(best, (min(shares), t, shares))
         _, t, shares = best
         corner = self._corner[t]
@@ -172,7 +177,7 @@ class Refinement:
                 self._replace(t, [(tail, x, apex), (x, head, apex)])
 
     def _replace(self, triangle: int, parts: Sequence[_Triangle]) -> None:
-        """Put parts in the place of a triangle; the first takes over its number."""
+        """Replace a triangle by its parts, of which the first takes over its number."""
         base = self._base[triangle]
         for edge in _rim(self._corner[triangle]):
             self._half.pop(edge, None)
@@ -186,7 +191,7 @@ class Refinement:
             self._half.update(dict.fromkeys(_rim(part), t))
 
     def _extend(self, chain: list[int], goal: int) -> None:
-        """Lead the chain along edges to a vertex of the same base triangle, dividing what lies in between."""
+        """Extend the chain along edges to a vertex of the same base triangle, dividing the triangles in between."""
         seen = len(chain)
         while chain[-1] != goal:
             here = chain[-1]
@@ -205,12 +210,12 @@ class Refinement:
                 raise _crosses(self.place(here))
 
     def _along_edge(self, here: int, goal: int, low: int, high: int) -> list[int]:
-        row = [low, *self.between(low, high), high]
+        row = [low, *self.vertices_between(low, high), high]
         i, j = row.index(here), row.index(goal)
         return row[i + 1 : j + 1] if i < j else row[j:i][::-1]
 
     def _towards(self, here: int, goal: int, ends: Iterable[int]) -> int:
-        """The next vertex on the straight way inside one base triangle; the edge that is in the way is split."""
+        """Return the next vertex on the straight path inside one base triangle, splitting the edge that it crosses."""
         inside = set(ends)
         for base in {self._base[t] for v in [here] for t in self._around(v)}:
             if not inside <= set(self.triangles[base].tolist()):
@@ -221,8 +226,8 @@ class Refinement:
                     continue
                 slot = self._corner[t].index(here)
                 u, v = self._corner[t][(slot + 1) % 3], self._corner[t][(slot + 2) % 3]
-                right = -_turn_of(p, q, self._flat(self.place(u), base))
-                left = _turn_of(p, q, self._flat(self.place(v), base))
+                right = -_twice_area(p, q, self._flat(self.place(u), base))
+                left = _twice_area(p, q, self._flat(self.place(v), base))
                 if right < 0 or left < 0 or right + left <= 0:
                     continue
                 share = right / (right + left)
@@ -235,23 +240,18 @@ class Refinement:
         return [t for t, corner in self._corner.items() if vertex in corner]
 
     def _flat(self, place: Place, base: int) -> tuple[float, float]:
-        """Coordinates in the plane of a base triangle: its corners are (0, 0), (1, 0) and (0, 1)."""
+        """Return coordinates in the plane of a base triangle, whose corners are (0, 0), (1, 0) and (0, 1)."""
         _, b, c = self.triangles[base].tolist()
         return place.get(b, 0.0), place.get(c, 0.0)
 
-    def _turn(self, edge: tuple[int, int], base: int) -> bool:
+    def _flip(self, edge: tuple[int, int], base: int) -> bool:
         """Replace a diagonal by the other one of its two triangles if that widens their smallest angle."""
-        u, v = edge
-        one, two = self._half.get((u, v)), self._half.get((v, u))
+        one, two = self._half.get(edge), self._half.get(edge[::-1])
         if one is None or two is None or self._base[one] != base or self._base[two] != base or edge in self._drawn:
             return False
-        left = next(c for c in self._corner[one] if c not in edge)
-        right = next(c for c in self._corner[two] if c not in edge)
-        parts = [(left, u, right), (right, v, left)]
-        for part in parts:
-            a, b, c = (self._flat(self.place(w), base) for w in part)
-            if _turn_of(a, b, c) <= 1e-9:
-                return False
+        parts = self._other_diagonal(edge, one, two)
+        if any(_twice_area(*(self._flat(self.place(v), base) for v in part)) <= 1e-9 for part in parts):
+            return False
         before = min(self._smallest_angle(self._corner[one]), self._smallest_angle(self._corner[two]))
         if min(self._smallest_angle(part) for part in parts) <= before + 1e-6:
             return False
@@ -262,6 +262,13 @@ class Refinement:
             self._corner[t] = part
             self._half.update(dict.fromkeys(_rim(part), t))
         return True
+
+    def _other_diagonal(self, edge: tuple[int, int], one: int, two: int) -> tuple[_Triangle, _Triangle]:
+        """Return the two triangles on both sides of an edge as they are once the edge is flipped."""
+        u, v = edge
+        left = next(c for c in self._corner[one] if c not in edge)
+        right = next(c for c in self._corner[two] if c not in edge)
+        return (left, u, right), (right, v, left)
 
     def _smallest_angle(self, corner: _Triangle) -> float:
         sides = sorted(math.dist(self._position(a), self._position(b)) for a, b in _rim(corner))
@@ -280,8 +287,8 @@ def _rim(corner: _Triangle) -> tuple[tuple[int, int], tuple[int, int], tuple[int
     return (a, b), (b, c), (c, a)
 
 
-def _turn_of(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
-    """Twice the area of a triangle in the plane, positive if it turns left."""
+def _twice_area(a: tuple[float, float], b: tuple[float, float], c: tuple[float, float]) -> float:
+    """Return twice the signed area of a triangle in the plane, positive if it is counter-clockwise."""
     return (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 
 

@@ -10,9 +10,9 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.surface.cut.refine import Refinement
+from warpflat.surface.half_edges import border_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.trace import Place, SurfacePath, describe_place, path_triangles
-from warpflat.surface.topology import border_edges
 
 __all__ = ["SplitSurface", "split_faces_along"]
 
@@ -60,31 +60,31 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
     if not 0.0 <= snap < 0.5:
         raise InputError(f"snap is a share of an edge's length, from 0 to below 0.5, got {snap:g}")
     triangles, face_of = path_triangles(surface)
-    places = _snapped(surface, path, max(snap, _ROUNDING))
+    places = _snap_places(surface, path, max(snap, _ROUNDING))
     refined = Refinement(surface.vertices, triangles, {v for place in places for v in place}, max(snap, _ROUNDING))
-    chain = refined.draw(places, closed=path.closed)
+    chain = refined.insert_path(places, closed=path.closed)
     refined.improve()
     return _result(surface, refined, face_of, np.array(chain, dtype=np.int32))
 
 
-def _snapped(surface: Surface, path: SurfacePath, snap: float) -> list[Place]:
-    """The places of a path, those near a vertex or edge moved onto it, and the detours that this closes taken out."""
+def _snap_places(surface: Surface, path: SurfacePath, snap: float) -> list[Place]:
+    """Move the places of a path that are near a vertex or edge onto it, and take out the detours that this closes."""
     edges = border_edges(surface.faces)
     border: set[tuple[int, ...]] = {tuple(sorted(edge)) for edge in edges.tolist()}
     border |= {(v,) for v in edges.ravel().tolist()}
     places: list[Place] = []
     points: list[int] = []
     last = len(path.points) - 1
-    for index, (support, weights) in enumerate(zip(path.support.tolist(), path.weights.tolist(), strict=True)):
-        exact: Place = {v: w for v, w in zip(support, weights, strict=True) if v >= 0 and w > 0}
+    for index in range(len(path.points)):
+        exact = path.place(index)
         free = _without_small(exact, snap, set())
-        place = free if index in (0, last) and not path.closed else _without_small(exact, snap, border)
+        is_end = index in (0, last) and not path.closed
+        place = free if is_end else _without_small(exact, snap, border)
         if places and free == places[-1]:
             # Beside a border vertex that the path has reached already, moving onto it parts nothing.
             continue
-        if index == last and not path.closed:
-            while len(places) > 1 and _without_small(places[-1], snap, set()) == place:
-                del places[-1], points[-1]
+        while is_end and index and len(places) > 1 and _without_small(places[-1], snap, set()) == place:
+            del places[-1], points[-1]
         if place not in places:
             places.append(place)
             points.append(index)
@@ -92,14 +92,23 @@ def _snapped(surface: Surface, path: SurfacePath, snap: float) -> list[Place]:
         back = places.index(place)
         if path.closed and back == 0 and index > len(path.points) / 2:
             continue
-        detour = path.points[points[back] : index + 1]
-        longest = max(_edge_length(surface, path.support[i]) for i in range(points[back], index + 1))
-        if np.linalg.norm(detour - detour[0], axis=1).max() > longest:
-            raise InputError(f"the path crosses itself at {describe_place(place)}; draw it so that it does not")
+        _check_detour(surface, path, points[back], index, place)
         del places[back + 1 :], points[back + 1 :]
     if len(places) < (3 if path.closed else 2):
         raise InputError(f"the path at {describe_place(places[0])} is too short: it lies within one snapping distance")
     return places
+
+
+def _check_detour(surface: Surface, path: SurfacePath, first: int, last: int, place: Place) -> None:
+    """See that a path which comes back to a place has stayed within an edge's length of it in between.
+
+    Raises:
+        InputError: it crosses itself there.
+    """
+    detour = path.points[first : last + 1]
+    longest = max(_edge_length(surface, path.support[i]) for i in range(first, last + 1))
+    if np.linalg.norm(detour - detour[0], axis=1).max() > longest:
+        raise InputError(f"the path crosses itself at {describe_place(place)}; draw it so that it does not")
 
 
 def _edge_length(surface: Surface, support: IntArray) -> float:
@@ -108,7 +117,7 @@ def _edge_length(surface: Surface, support: IntArray) -> float:
 
 
 def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> Place:
-    """The place moved off the vertices that have a small share in it, but not from the inside onto the border."""
+    """Return the place moved off the vertices of small weight, but not from the inside onto the border."""
     while len(place) > 1:
         least = min(place, key=lambda v: place[v])
         rest = {v: w / (1.0 - place[least]) for v, w in place.items() if v != least}
@@ -120,6 +129,7 @@ def _without_small(place: Place, snap: float, border: set[tuple[int, ...]]) -> P
 
 
 def _result(surface: Surface, refined: Refinement, face_of: IntArray, chain: IntArray) -> SplitSurface:
+    """Put the divided faces, the lines through them and the maps back to the old surface together."""
     old = len(surface.vertices)
     count = old + len(refined.new_places)
     support = np.full((count, 3), -1, dtype=np.int32)
@@ -134,7 +144,7 @@ def _result(surface: Surface, refined: Refinement, face_of: IntArray, chain: Int
     parts = refined.parts()
     bases = [base for base, children in parts.items() if len(children) > 1]
     for a, b in pairwise(chain.tolist()):
-        beside = refined.beside(a, b)
+        beside = refined.triangles_beside(a, b)
         if len(beside) == 2 and face_of[beside[0]] == face_of[beside[1]]:
             # Inside one face: a part's own edge, or the diagonal of a quad that nothing else divides.
             bases += beside
@@ -154,7 +164,7 @@ def _result(surface: Surface, refined: Refinement, face_of: IntArray, chain: Int
         surface,
         vertices=np.concatenate([surface.vertices, added]),
         faces=np.ascontiguousarray(faces[order]),
-        lines={name: _through(line, refined) for name, line in surface.lines.items()},
+        lines={name: _refined_line(line, refined) for name, line in surface.lines.items()},
         input_vertices=np.concatenate([surface.input_vertices, added]),
         input_index=np.concatenate(
             [surface.input_index, len(surface.input_vertices) + np.arange(len(added), dtype=np.int32)]
@@ -165,9 +175,9 @@ def _result(surface: Surface, refined: Refinement, face_of: IntArray, chain: Int
     )
 
 
-def _through(line: IntArray, refined: Refinement) -> IntArray:
-    """A feature line with the new vertices on its edges put in."""
+def _refined_line(line: IntArray, refined: Refinement) -> IntArray:
+    """Return a feature line with the new vertices on its edges inserted."""
     vertices = line[:1].tolist()
     for a, b in zip(line[:-1].tolist(), line[1:].tolist(), strict=True):
-        vertices += [*refined.between(a, b), b]
+        vertices += [*refined.vertices_between(a, b), b]
     return np.array(vertices, dtype=np.int32)

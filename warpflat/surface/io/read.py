@@ -1,14 +1,11 @@
-"""Surfaces from files: the format by the suffix, the unit by the file or by word, then through the one door."""
+"""Surfaces from mesh files, of a format by their suffix and in a unit that the file or the user gives."""
 
 from __future__ import annotations
 
-import logging
-import warnings
-from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from os import PathLike
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +13,11 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
 from warpflat.core.file_names import checked_name, fitted_name, plain_label
-from warpflat.core.input_files import listening_to_reads, note_read, noting_resolver
+from warpflat.core.input_files import listening_to_reads, note_read
 from warpflat.core.text import shown
-from warpflat.surface.io.read_checks import check_ply, check_stl
 from warpflat.surface.io.read_obj import read_obj
 from warpflat.surface.io.read_off import read_off
+from warpflat.surface.io.read_trimesh import GLTF, read_with_trimesh
 from warpflat.surface.io.read_usd import read_usd
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_from_curve, with_lines
@@ -33,8 +30,7 @@ __all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
 METRES_PER_UNIT = {"m": 1.0, "cm": 0.01, "mm": 0.001, "in": 0.0254, "ft": 0.3048}
 
 _USD = (".usd", ".usda", ".usdc", ".usdz")
-_METRES = (".glb", ".gltf")
-SUFFIXES = (".glb", ".gltf", ".obj", ".off", ".ply", ".stl", *_USD)
+SUFFIXES = (*GLTF, ".obj", ".off", ".ply", ".stl", *_USD)
 
 # A piece of a garment lies between these extents [m]; a usual one between the other two.
 _POSSIBLE = (3e-3, 20.0)
@@ -43,7 +39,7 @@ _USUAL = (0.02, 5.0)
 
 @dataclass(kw_only=True)
 class _Raw:
-    """What any format comes down to. `scale` is metres per unit, None where the file does not say."""
+    """A mesh as any format gives it; `scale` is metres per unit, None where the file does not say."""
 
     vertices: FloatArray
     polygons: NDArray[np.int64]
@@ -64,7 +60,7 @@ def read_surface(
     prim: str | None = None,
     weld: bool | None = None,
 ) -> Surface:
-    """Read, mend and check a surface.
+    """Read, repair and check a surface.
 
     OBJ, OFF and USD keep their quads; PLY, STL, GLB and glTF are read with trimesh, which cuts polygons into
     triangles. GLB and glTF are in metres and Y up by their standard, USD says its unit and its up axis (Z up is turned
@@ -75,11 +71,11 @@ def read_surface(
         path: the file.
         units: "m", "cm", "mm", "in" or "ft". Needed for OBJ, PLY, STL and OFF, which carry none; for the others it
             overrides what the file says.
-        component: which connected part to take if there are several: "largest", or its number, largest first from 0.
-        name: what to call the piece (see :func:`warpflat.make_surface`); by default the file's stem, or the USD prim's or
+        component: the connected part to take if there are several: "largest", or its number, largest first from 0.
+        name: of the piece (see :func:`warpflat.make_surface`); by default the file's stem, or the USD prim's or
             GLB node's name, with "_" where no file can bear it.
-        prim: which mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
-        weld: whether vertices at the same place are one; by default judged by format and mesh (see
+        prim: the mesh of a USD stage (a prim path or name) or of a GLB scene (a node's name) to take.
+        weld: true to join vertices at the same place; by default the format and the mesh decide (see
             :func:`warpflat.make_surface`).
 
     Raises:
@@ -92,21 +88,16 @@ def read_surface(
     try:
         if name:
             checked_name(name)
-        if units is not None and units not in METRES_PER_UNIT:
-            raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
-        _check_file(file)
         with listening_to_reads(sources.append):
-            raw = _read(file, units, prim)
-        if raw.scale is None:
-            raise InputError(_ask_for_units(raw))
+            raw, scale = _read_with_unit(file, units, prim)
     except InputError as error:
         raise InputError(f"{file}: {error}") from error
     except OSError as error:
         raise InputError(f"{file}: cannot be read: {error.strerror or error}") from error
     if component is None:
-        _refuse_stray_vertex(raw, file)
+        _refuse_stray_vertex(raw, scale, file)
     surface = make_surface(
-        raw.vertices * raw.scale,
+        raw.vertices * scale,
         raw.polygons,
         name=name or fitted_name(raw.name or file.stem),
         lines={plain_label(key): chain for key, chain in raw.chains.items()},
@@ -115,8 +106,8 @@ def read_surface(
         split_corners=raw.split_corners,
         source=str(file),
     )
-    _check_size(surface, file, raw.scale)
-    surface = _snap_curves(surface, {plain_label(key): curve * raw.scale for key, curve in raw.curves.items()})
+    _check_size(surface, file, scale)
+    surface = _snap_curves(surface, {plain_label(key): curve * scale for key, curve in raw.curves.items()})
     return replace(surface, notes=(*raw.notes, *surface.notes), sources=tuple(dict.fromkeys(sources)))
 
 
@@ -138,6 +129,22 @@ def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
         raise InputError(f"{path}: {error}") from error
     except OSError as error:
         raise InputError(f"{path}: cannot be read: {error.strerror or error}") from error
+
+
+def _read_with_unit(file: Path, units: str | None, prim: str | None) -> tuple[_Raw, float]:
+    """Read a mesh file, and return the metres per unit beside it.
+
+    Raises:
+        InputError: without the file's name: unknown or missing units, or a file that is none of a mesh.
+        OSError: it cannot be opened.
+    """
+    if units is not None and units not in METRES_PER_UNIT:
+        raise InputError(f"unknown units {units!r}; {nearest(str(units), METRES_PER_UNIT)}")
+    _check_file(file)
+    raw = _read(file, units, prim)
+    if raw.scale is None:
+        raise InputError(_ask_for_units(raw))
+    return raw, raw.scale
 
 
 def _check_file(file: Path) -> None:
@@ -166,14 +173,17 @@ def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
             curves=mesh.curves,
             notes=mesh.notes,
         )
-    if prim is not None and suffix not in _METRES:
+    if prim is not None and suffix not in GLTF:
         raise InputError(f"prim = {prim!r} only means something in a USD or GLB file; use component to choose a part")
     if suffix == ".obj":
         return _from_obj(file, scale)
     if suffix == ".off":
         vertices, polygons = read_off(file)
         return _Raw(vertices=vertices, polygons=polygons, scale=scale)
-    return _from_trimesh(file, scale, prim)
+    vertices, triangles, split_corners = read_with_trimesh(file, node=prim)
+    if scale is None and suffix in GLTF:
+        scale = 1.0
+    return _Raw(vertices=vertices, polygons=triangles, scale=scale, split_corners=split_corners)
 
 
 def _from_obj(file: Path, scale: float | None) -> _Raw:
@@ -195,7 +205,7 @@ def _from_obj(file: Path, scale: float | None) -> _Raw:
 
 
 def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
-    """The sides of all polygons, both ways, each as one number: tail times the count of vertices plus head."""
+    """Return the sides of all polygons in both directions, each as one number: tail times the number of vertices plus head."""
     size = (polygons >= 0).sum(axis=1)
     column = np.arange(polygons.shape[1])
     follow = np.where(column[None, :] + 1 < size[:, None], column[None, :] + 1, 0)
@@ -206,80 +216,17 @@ def _directed_edges(polygons: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.unique(np.concatenate([a * stride + b, b * stride + a]))
 
 
-def _from_trimesh(file: Path, scale: float | None, prim: str | None) -> _Raw:
-    suffix = file.suffix.lower()
-    scene = _trimesh_scene(file)
-    meshes = list(_instances(scene))
-    if prim is not None:
-        names = [node for node, _, _ in meshes]
-        meshes = [item for item in meshes if item[0] == prim]
-        if not meshes:
-            raise InputError(f"there is no mesh node {prim!r}; {nearest(prim, names)}")
-    if not any(len(faces) for _, _, faces in meshes):
-        raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
-    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)])
-    textured = any(
-        getattr(m.visual, "kind", None) == "texture" for m in scene.geometry.values() if hasattr(m, "visual")
-    )
-    return _Raw(
-        vertices=np.concatenate([vertices for _, vertices, _ in meshes]),
-        polygons=np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
-        scale=1.0 if scale is None and suffix in _METRES else scale,
-        split_corners=suffix in (".stl", *_METRES) or (suffix == ".ply" and textured),
-    )
+def _refuse_stray_vertex(raw: _Raw, scale: float, file: Path) -> None:
+    """Name a vertex far from all others, which would otherwise show as a piece too large, or as slivers.
 
-
-def _trimesh_scene(file: Path) -> Any:
-    """The file as trimesh reads it, which says nothing meanwhile."""
-    import trimesh
-
-    suffix = file.suffix.lower()
-    if suffix == ".ply":
-        check_ply(file)
-    elif suffix == ".stl":
-        check_stl(file)
-    options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
-    # What it logs goes nowhere, but to the handlers of a program that has its own.
-    logging.getLogger("trimesh").addHandler(logging.NullHandler())
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore")
-            return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
-    except InputError:
-        raise
-    # Whatever a parser trips over in somebody's file is that file's fault, in whatever way it shows.
-    except Exception as error:
-        raise InputError(
-            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
-            "vertices and faces alone"
-        ) from error
-
-
-def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:
-    """The meshes of a trimesh scene: node, world positions, triangles."""
-    import trimesh
-
-    for node in scene.graph.nodes_geometry:
-        transform, geometry = scene.graph[node]
-        mesh = scene.geometry[geometry]
-        if not isinstance(mesh, trimesh.Trimesh):
-            continue
-        vertices = np.asarray(mesh.vertices, dtype=np.float64)
-        matrix = np.asarray(transform, dtype=np.float64)
-        if not np.array_equal(matrix, np.eye(4)):
-            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
-        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
-        yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
-
-
-def _refuse_stray_vertex(raw: _Raw, file: Path) -> None:
-    """A vertex far from all others is told as such: as a part of the whole it makes a piece too large, or slivers."""
-    assert raw.scale is not None
+    Raises:
+        InputError: there is one.
+    """
     used = np.unique(raw.polygons[raw.polygons >= 0])
     used = used[used < len(raw.vertices)]
     points = raw.vertices[used]
     # What is no number, or out of all bounds, is refused with the rest of what no mesh has.
-    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * raw.scale > _POSSIBLE[1]:
+    if len(points) and np.abs(points).max() < 1e20 and float(np.ptp(points, axis=0).max()) * scale > _POSSIBLE[1]:
         stray = stray_vertex(points)
         if stray is not None:
             raise InputError(f"{file}: {stray_words(int(used[stray]), points[stray])}")
@@ -314,7 +261,7 @@ def _check_size(surface: Surface, file: Path, scale: float) -> None:
 
 
 def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:
-    """Curves as feature lines; those that do not lie on the piece are left out with a note."""
+    """Add curves as feature lines; a curve that does not lie on the piece is left out with a note."""
     if not curves:
         return surface
     from scipy.spatial import cKDTree

@@ -31,12 +31,12 @@ UNREADABLE = "not a readable USD file: damaged, cut short, or with values of ano
 
 @dataclass(kw_only=True)
 class UsdMesh:
-    """What was read of a stage.
+    """A mesh of a stage, with its curves.
 
     Attributes:
-        name: the prim's name.
+        name: of the prim.
         vertices: #V by 3 [m], Y up.
-        sizes: #F, how many corners each face has.
+        sizes: #F, the number of corners of each face.
         corners: the vertex indices of all faces' corners, one face after the other, wound as USD's right-handed faces are.
         curves: linear BasisCurves beside or below the mesh, or in the group MESH_lines beside it (as in a film of ours), by
             name, #P by 3 [m]; a periodic one repeats its first point.
@@ -73,7 +73,7 @@ def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -
     except InputError as error:
         warned = _warned(warnings)
         raise InputError(f"{error} (USD warns: {warned})" if warned else str(error)) from error
-    # Whatever USD trips over in somebody's file is that file's fault, in whatever way it shows.
+    # Any error of USD is the file's fault, of whatever type it is.
     except Exception as error:
         raise InputError(UNREADABLE) from error
     if warned := _warned(warnings):
@@ -82,8 +82,8 @@ def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -
 
 
 def answer() -> None:
-    """Read what standard input asks for, and write the mesh, or the words of an error, to standard output."""
-    # Whatever else the library prints goes where nobody reads it.
+    """Read the file named on standard input, and write its mesh, or the words of an error, to standard output."""
+    # Other output of the library must not mix with the mesh.
     out = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
     path, prim, metres_per_unit = pickle.load(sys.stdin.buffer)
@@ -117,7 +117,7 @@ def _limit(size: int) -> None:
 
 
 def _warned(warnings: Any) -> str:
-    """The first of USD's warnings in one line, and how many more there were."""
+    """Return the first of USD's warnings in one line, and the number of the others."""
     texts = [" ".join(str(item.commentary).split()) for item in warnings.TakeUncoalescedDiagnostics()]
     if not texts:
         return ""
@@ -167,7 +167,7 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
 
 
 def _value(attribute: Any) -> Any:
-    """An attribute's default, or its first time sample."""
+    """Return an attribute's default, or its first time sample."""
     from pxr import Usd
 
     value = attribute.Get()
@@ -194,34 +194,41 @@ def _choose(stage: Any, prim: str | None) -> Any:
 
 
 def _faces(mesh: Any) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """How many corners each face has, and the vertices of all corners, without the faces that are holes."""
+    """Return the number of corners of each face and the vertices of all corners, without the faces that are holes."""
     counts, flat = _value(mesh.GetFaceVertexCountsAttr()), _value(mesh.GetFaceVertexIndicesAttr())
     points = _value(mesh.GetPointsAttr())
     at = mesh.GetPath()
     if points is None or len(points) == 0 or counts is None or flat is None or len(counts) == 0:
         raise InputError(f"mesh {at} has no faces")
     sizes, corners = np.asarray(counts, dtype=np.int64), np.asarray(flat, dtype=np.int64)
-    if sizes.sum() != len(corners) or sizes.min() < 0:
-        raise InputError(
-            f"mesh {at} is broken: its face sizes add up to {sizes.sum()}, but it lists {len(corners)} corners"
-        )
-    if len(corners) and (corners.min() < 0 or corners.max() >= len(points)):
-        raise InputError(f"mesh {at} is broken: its faces refer to vertices beyond its {len(points):,} points")
-    short = np.flatnonzero(sizes < 3)
-    if len(short):
-        raise InputError(f"mesh {at}: face {short[0]} has {sizes[short[0]]} corners; a face needs at least 3")
-    kept = np.ones(len(sizes), dtype=bool)
     holes = np.asarray(_value(mesh.GetHoleIndicesAttr()) or [], dtype=np.int64)
-    if len(holes) and (holes.min() < 0 or holes.max() >= len(sizes)):
-        raise InputError(f"mesh {at} is broken: its holes refer to faces beyond its {len(sizes):,} faces")
+    _check_faces(at, sizes, corners, len(points), holes)
+    kept = np.ones(len(sizes), dtype=bool)
     kept[holes] = False
     if not kept.any():
         raise InputError(f"mesh {at} has no faces: all are holes")
     return sizes[kept], corners[np.repeat(kept, sizes)]
 
 
+def _check_faces(
+    at: Any, sizes: NDArray[np.int64], corners: NDArray[np.int64], points: int, holes: NDArray[np.int64]
+) -> None:
+    """See that the face sizes, corners and holes of the mesh at a prim path agree with each other and with the number of points."""
+    if sizes.sum() != len(corners) or sizes.min() < 0:
+        raise InputError(
+            f"mesh {at} is broken: its face sizes add up to {sizes.sum()}, but it lists {len(corners)} corners"
+        )
+    if len(corners) and (corners.min() < 0 or corners.max() >= points):
+        raise InputError(f"mesh {at} is broken: its faces refer to vertices beyond its {points:,} points")
+    short = np.flatnonzero(sizes < 3)
+    if len(short):
+        raise InputError(f"mesh {at}: face {short[0]} has {sizes[short[0]]} corners; a face needs at least 3")
+    if len(holes) and (holes.min() < 0 or holes.max() >= len(sizes)):
+        raise InputError(f"mesh {at} is broken: its holes refer to faces beyond its {len(sizes):,} faces")
+
+
 def _turned(sizes: NDArray[np.int64], corners: NDArray[np.int64]) -> NDArray[np.int64]:
-    """Faces wound the other way, from the same first corner."""
+    """Return the corners of faces wound the other way, from the same first corner."""
     start = np.repeat(np.cumsum(sizes) - sizes, sizes)
     size = np.repeat(sizes, sizes)
     place = np.arange(len(corners)) - start

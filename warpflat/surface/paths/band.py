@@ -8,10 +8,12 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.surface.connectivity import border_loops
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, path_length
 from warpflat.surface.paths.geodesic import distance_from
-from warpflat.surface.topology import border_loops, corner_triangles, half_edges_of
+from warpflat.surface.triangles import corner_triangles
 
 __all__ = ["line_along_band"]
 

@@ -9,9 +9,12 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
+from warpflat.surface.connectivity import border_loops
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import as_vertex
-from warpflat.surface.topology import border_loops, half_edges_of, triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = ["SIDES", "line_on_border", "viewing_frame"]
 
@@ -149,8 +152,7 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
 def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int) -> int:
     """The position in the loop where the border turns most, not far from one: where a side curls a little out of sight, the outermost
     point that is seen lies beside the corner."""
-    points = surface.vertices[np.append(loop, loop[0])]
-    station = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    station = arc_lengths(surface.vertices[loop], closed=True)
     way = np.abs(station[:-1] - station[place])
     near = np.minimum(way, station[-1] - way) < _NEAR * station[-1]
     return int(np.argmax(np.where(near, turn, -np.inf)))
@@ -175,7 +177,7 @@ def _named(surface: Surface, loop: IntArray, at: IndexArray, side: str) -> dict[
     middle = np.empty((4, 3))
     for k in range(4):
         points = surface.vertices[_between(loop, int(at[k]), int(at[(k + 1) % 4]))]
-        length = np.linalg.norm(np.diff(points, axis=0), axis=1)
+        length = segment_lengths(points)
         middle[k] = np.average(0.5 * (points[1:] + points[:-1]), axis=0, weights=length)
     size = float(np.linalg.norm(np.ptp(surface.vertices[loop], axis=0)))
     for right, up in (_standing(surface), viewing_frame(surface)[:2]):
@@ -240,6 +242,6 @@ def _stretch(
     i, j = int(np.flatnonzero(loop == a)[0]), int(np.flatnonzero(loop == b)[0])
     along, back = _between(loop, i, j), _between(loop, j, i)[::-1].copy()
     if direction == "shortest":
-        length = [np.linalg.norm(np.diff(surface.vertices[way], axis=0), axis=1).sum() for way in (along, back)]
+        length = [polyline_length(surface.vertices[way]) for way in (along, back)]
         direction = "with" if length[0] <= length[1] else "against"
     return along if direction == "with" else back

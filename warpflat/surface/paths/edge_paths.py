@@ -10,13 +10,14 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.surface.half_edges import half_edges_of, mesh_edges
 from warpflat.surface.mesh import Surface, once_per_surface
-from warpflat.surface.topology import half_edges_of, mesh_edges
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix
 
-__all__ = ["EdgeGraph", "are_joined", "as_vertex", "chain_positions", "path_length"]
+__all__ = ["EdgeGraph", "are_joined", "as_vertex", "path_length"]
 
 # A point given by coordinates must lie this close to the piece: as a share of its diagonal, or in edge lengths.
 _NEAR_SHARE = 0.1
@@ -24,7 +25,7 @@ _NEAR_EDGES = 2.0
 
 
 def are_joined(edges: IntArray, a: ArrayLike, b: ArrayLike) -> BoolArray:
-    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`topology.mesh_edges`)."""
+    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`mesh_edges`)."""
     low, high = np.minimum(a, b), np.maximum(a, b)
     begin, end = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
     joined = np.zeros(np.shape(low), dtype=bool)
@@ -141,12 +142,6 @@ def _by_index(surface: Surface, place: object, as_read: bool) -> int:
     return int(at[0])
 
 
-def chain_positions(points: FloatArray) -> FloatArray:
-    """#P, the arc length [m] at each point of a polyline."""
-    return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-
-
 def path_length(surface: Surface, paths: Sequence[ArrayLike]) -> float:
-    """Length of paths together [m]."""
-    steps = [np.diff(surface.vertices[np.asarray(path)], axis=0) for path in paths]
-    return float(sum(np.linalg.norm(step, axis=1).sum() for step in steps))
+    """The length of paths along edges (each a row of vertices), summed [m]."""
+    return float(sum(polyline_length(surface.vertices[np.asarray(path)]) for path in paths))

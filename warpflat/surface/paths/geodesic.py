@@ -20,11 +20,14 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
+from warpflat.core.polyline import arc_lengths
+from warpflat.core.sorting import counting_sort
 from warpflat.kernels.geodesic import CROWD, carry_along, find_ways, go_around, see_sides
+from warpflat.surface.connectivity import border_of, components
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
-from warpflat.surface.paths.edge_paths import chain_positions
 from warpflat.surface.paths.lines import line_from_curve
-from warpflat.surface.topology import border_of, components, half_edges_of, order_by, triangulate, unfold_quad_diagonals
+from warpflat.surface.triangles import triangulate, unfold_quad_diagonals
 from warpflat.surface.vectors import cross, dot, norm, points_at
 
 __all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
@@ -81,7 +84,7 @@ def signed_distance_and_station(
     before = 0
     if extend:
         path, before = extend_to_border(surface, path)
-    station = chain_positions(surface.vertices[path])
+    station = arc_lengths(surface.vertices[path])
     station -= station[before]
     triangles = _short_triangles(surface)
     ways = _Ways(surface, triangles, path.astype(np.int64))
@@ -126,7 +129,7 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
     import potpourri3d
 
     points = surface.vertices[path]
-    length = chain_positions(points)
+    length = arc_lengths(points)
     # A path along edges wanders: its direction is that of its last fifth.
     back = int(np.searchsorted(length, 0.8 * length[-1]))
     direction = points[-1] - points[min(back, len(path) - 2)]
@@ -175,7 +178,7 @@ class _Ways:
         self._on_line = np.zeros(len(order), dtype=np.int32)
         self._on_line[self._rank[line]] = 1
         corner = self._rank[triangles]
-        slot, offset = order_by(corner.ravel(), len(order))
+        slot, offset = counting_sort(corner.ravel(), len(order))
         ends, seen = np.empty((corner.size, 2), dtype=np.int32), np.empty((corner.size, 3))
         launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
         waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
@@ -212,7 +215,7 @@ class _Ways:
         # Strongly connected components come numbered in such an order, of which nothing but the number of rounds depends.
         parts, label = connected_components(graph, connection="strong")
         straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
-        return order_by(label, parts)[0], straight
+        return counting_sort(label, parts)[0], straight
 
     def _carry(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
         """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
@@ -278,7 +281,7 @@ def _directions_at_line(
     side = np.concatenate([np.zeros(len(path)), np.bincount(number, right * far, minlength=len(beside))])
     nearest = np.arange(len(known))
     nearest[len(path) + number] = at
-    station = chain_positions(surface.vertices[path])[nearest]
+    station = arc_lengths(surface.vertices[path])[nearest]
     about_ends = []
     for end, up in ((0, 1.0), (len(path) - 1, -1.0)):
         about_end = np.column_stack([side, station - station[end]])
@@ -304,7 +307,7 @@ def _around(
     near = triangles[(place[triangles] >= 0).any(axis=1)]
     corner = np.concatenate([np.roll(near, -shift, axis=1) for shift in range(3)])
     corner = corner[place[corner[:, 0]] >= 0]
-    order, offset = order_by(place[corner[:, 0]], len(path))
+    order, offset = counting_sort(place[corner[:, 0]], len(path))
     corner = corner[order]
     u, v = (points_at(vertices, corner[:, k]) - points_at(vertices, corner[:, 0]) for k in (1, 2))
     angle = np.arctan2(norm(cross(u, v)), dot(u, v))

@@ -15,11 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import checked_label
+from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
 from warpflat.core.text import shown
+from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, are_joined, as_vertex, path_in
 from warpflat.surface.row_by_row import row_by_row
-from warpflat.surface.topology import half_edges_of
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 
@@ -170,11 +171,11 @@ def _longest_section(
         while chain[-1] in follow:
             chain.append(follow.pop(chain[-1]))
         closed = chain[0] == chain[-1] and seed not in starts
-        length = float(np.linalg.norm(np.diff(place[chain], axis=0), axis=1).sum())
+        length = polyline_length(place[chain])
         if length > best[0]:
             best = (length, chain, closed)
     chain = best[1]
-    station = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(place[chain], axis=0), axis=1))])
+    station = arc_lengths(place[chain])
     return np.array(chain, dtype=np.int64), station, best[2]
 
 
@@ -268,7 +269,7 @@ def _along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, en
             return []
         out = _along(surface, graph, curve[: middle + 1], start, int(via), edge)
         return out + _along(surface, graph, curve[middle:], int(via), end, edge)
-    steps = np.maximum(np.ceil(np.linalg.norm(np.diff(curve, axis=0), axis=1) / (0.25 * edge)).astype(int), 1)
+    steps = np.maximum(np.ceil(segment_lengths(curve) / (0.25 * edge)).astype(int), 1)
     fine = [np.linspace(p, q, n, endpoint=False) for p, q, n in zip(curve[:-1], curve[1:], steps, strict=True)]
     off, _ = cKDTree(np.concatenate([*fine, curve[-1:]])).query(surface.vertices[graph.edges].mean(axis=1))
     weight = graph.length * (1 + _FOLLOW * (off / edge) ** 2)

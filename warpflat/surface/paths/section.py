@@ -1,12 +1,15 @@
-"""Plane sections of a surface: a straight cut as a pattern maker rules it, level, upright or slanted."""
+"""Plane sections of a surface: straight cuts, level, upright or slanted."""
 
 from __future__ import annotations
+
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import project_on_segments
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.trace import (
     Place,
@@ -23,7 +26,7 @@ __all__ = ["plane_path", "plane_section"]
 
 
 def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> SurfacePath:
-    """Where a plane meets the surface, from border to border or all round: of several such curves the nearest to the point.
+    """Return the curve in which a plane meets the surface, from border to border or closed; of several the nearest to the point.
 
     Args:
         surface: the surface.
@@ -50,7 +53,7 @@ def plane_section(surface: Surface, point: ArrayLike, normal: ArrayLike) -> Surf
 def plane_path(
     surface: Surface, point: ArrayLike | int, normal: ArrayLike, *, towards: ArrayLike | None = None
 ) -> SurfacePath:
-    """Where a plane through a point meets the surface: of all such curves the one that holds the point.
+    """Return the curve through a point in which a plane through that point meets the surface.
 
     Args:
         surface: the surface.
@@ -84,7 +87,7 @@ def plane_path(
 def _nearest_curve(
     surface: Surface, origin: FloatArray, axis: FloatArray, triangles: IntArray
 ) -> tuple[float, list[Place], bool] | None:
-    """Of the curves in which a plane meets the surface the nearest to its origin: how far [m], its places, whether it is closed."""
+    """Return the nearest to the plane's origin of the curves in which it meets the surface: distance [m], places, whether closed."""
     height = (surface.vertices - origin) @ axis
     # A vertex in the plane counts as above it: each triangle is then crossed in two of its edges or in none. Heights of
     # rounding size must be exactly 0, or the curve would pass by a vertex instead of through it.
@@ -110,7 +113,7 @@ def _direction(value: ArrayLike, what: str) -> FloatArray:
 
 
 def _crossing(edge: tuple[int, int], height: FloatArray) -> Place:
-    """Where the plane crosses an edge whose ends lie above (or in) and below it."""
+    """Return the place at which the plane crosses an edge, whose first end lies above it (or in it) and whose second below."""
     a, b = edge
     share = float(height[a] / (height[a] - height[b]))
     if share <= 0.0:
@@ -119,47 +122,57 @@ def _crossing(edge: tuple[int, int], height: FloatArray) -> Place:
 
 
 def _chains(triangles: IntArray, above: BoolArray) -> list[tuple[list[tuple[int, int]], bool]]:
-    """The crossed edges, each as (upper, lower) vertex, in rows from border to border or round; true where closed."""
+    """Join the edges that a plane crosses to chains.
+
+    Args:
+        triangles: #T by 3.
+        above: #V, true for vertices above the plane.
+
+    Returns:
+        Chains of edges, each as (upper, lower) vertex, from border to border or around; true for those that run around.
+    """
     crossed = triangles[above[triangles].any(axis=1) & ~above[triangles].all(axis=1)]
-    beside: dict[tuple[int, int], list[int]] = {}
-    rims: list[list[tuple[int, int]]] = []
+    # The two crossed edges of each triangle, and the triangles at each crossed edge.
+    edges_of: list[list[tuple[int, int]]] = []
+    triangles_at: dict[tuple[int, int], list[int]] = {}
     for index, (a, b, c) in enumerate(crossed.tolist()):
-        rim = [(u, v) if above[u] else (v, u) for u, v in ((a, b), (b, c), (c, a)) if above[u] != above[v]]
-        rims.append(rim)
-        for edge in rim:
-            beside.setdefault(edge, []).append(index)
+        pair = [(u, v) if above[u] else (v, u) for u, v in ((a, b), (b, c), (c, a)) if above[u] != above[v]]
+        edges_of.append(pair)
+        for edge in pair:
+            triangles_at.setdefault(edge, []).append(index)
     chains = []
-    left = set(beside)
-    ends = [edge for edge, found in beside.items() if len(found) == 1]
-    for seed in [*ends, *beside]:
-        if seed not in left:
-            continue
-        chain, here, came = [seed], seed, -1
-        left.discard(seed)
-        closed = len(beside[seed]) > 1
-        while True:
-            onward = [t for t in beside[here] if t != came]
-            if not onward:
-                break
-            came = onward[0]
-            here = next(edge for edge in rims[came] if edge != here)
-            if here not in left:
-                break
-            left.discard(here)
-            chain.append(here)
-        chains.append((chain, closed))
+    left = set(triangles_at)
+    ends = [edge for edge, found in triangles_at.items() if len(found) == 1]
+    for seed in [*ends, *triangles_at]:
+        if seed in left:
+            chains.append((_chain_from(seed, edges_of, triangles_at, left), len(triangles_at[seed]) > 1))
     return chains
 
 
+def _chain_from(
+    seed: tuple[int, int],
+    edges_of: list[list[tuple[int, int]]],
+    triangles_at: Mapping[tuple[int, int], list[int]],
+    left: set[tuple[int, int]],
+) -> list[tuple[int, int]]:
+    """Follow the crossed edges from one of them, triangle by triangle, and remove them from those `left`."""
+    chain, here, came = [seed], seed, -1
+    left.discard(seed)
+    while onward := [t for t in triangles_at[here] if t != came]:
+        came = onward[0]
+        here = next(edge for edge in edges_of[came] if edge != here)
+        if here not in left:
+            break
+        left.discard(here)
+        chain.append(here)
+    return chain
+
+
 def _distances(surface: Surface, places: list[Place], closed: bool, origin: FloatArray) -> FloatArray:
-    """Distance [m] from a point to each segment of a row of places."""
+    """Return the distance [m] from a point to each segment of a row of places."""
     points = make_path(surface, places).points
     ends = np.roll(points, -1, axis=0) if closed else points[1:]
-    tail = points[: len(ends)]
-    along = ends - tail
-    squared = np.einsum("ij,ij->i", along, along)
-    share = np.clip(np.einsum("ij,ij->i", origin - tail, along) / np.where(squared > 0, squared, 1.0), 0.0, 1.0)
-    return np.linalg.norm(tail + share[:, None] * along - origin, axis=1)
+    return project_on_segments(origin, points[: len(ends)], ends)[1]
 
 
 def _inwards(
@@ -170,7 +183,7 @@ def _inwards(
     towards: FloatArray,
     triangles: IntArray,
 ) -> list[Place]:
-    """The half of an open row of places that leaves `start` in a direction, turned round so that it ends at `start`."""
+    """Return the half of an open row of places that leaves `start` in a direction, reversed, so that it ends at `start`."""
     segment = int(np.argmin(_distances(surface, places, False, origin)))
     points = make_path(surface, places).points
     # A start on a vertex or edge is itself one of the places, up to rounding.

@@ -17,8 +17,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length, project_on_segments
 from warpflat.surface.mesh import Surface
-from warpflat.surface.topology import triangulate
+from warpflat.surface.triangles import triangulate
 
 __all__ = [
     "Place",
@@ -60,8 +61,12 @@ class SurfacePath:
     @property
     def length(self) -> float:
         """Length [m]."""
-        points = np.concatenate([self.points, self.points[:1]]) if self.closed else self.points
-        return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
+        return polyline_length(self.points, closed=self.closed)
+
+    def place(self, index: int) -> Place:
+        """Return the place of a point, as its weights by vertex."""
+        support, weights = self.support[index].tolist(), self.weights[index].tolist()
+        return {v: w for v, w in zip(support, weights, strict=True) if v >= 0 and w > 0}
 
 
 def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
@@ -316,14 +321,11 @@ def _nearest_on_rim(
     """The nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
     around = star.triangles[star.sharing(list(here))]
     edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
-    tail, along = positions[edges[:, 0]], positions[edges[:, 1]] - positions[edges[:, 0]]
-    squared = np.einsum("ij,ij->i", along, along)
-    share = np.einsum("ij,ij->i", target - tail, along) / np.where(squared > 0, squared, 1.0)
-    share = np.clip(share, 0.0, 1.0)
-    distance = np.linalg.norm(tail + share[:, None] * along - target, axis=1)
+    starts, ends = positions[edges[:, 0]], positions[edges[:, 1]]
+    share, distance = project_on_segments(target, starts, ends)
     best = int(np.argmin(distance))
     place = _tidy(edges[best].tolist(), [1.0 - share[best], share[best]])
-    return place, float(distance[best]), float(np.sqrt(squared.max()))
+    return place, float(distance[best]), float(np.linalg.norm(ends - starts, axis=1).max())
 
 
 def describe_place(place: Place) -> str:

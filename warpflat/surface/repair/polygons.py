@@ -45,6 +45,11 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
         if not np.issubdtype(polygons.dtype, np.integer):
             raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
         return polygons.astype(np.int64)
+    return filled_up(*_from_lists(polygons))
+
+
+def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    """Return the corners of polygons, one polygon after the other, and #F, the number of corners of each."""
     try:
         rows: list[Any] = list(polygons)  # type: ignore[arg-type]
         count = np.fromiter((len(row) for row in rows), dtype=np.int64, count=len(rows))
@@ -62,7 +67,7 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
     short = np.flatnonzero(count < 3)
     if len(short):
         raise InputError(f"face {short[0]} has {count[short[0]]} corners; a face needs at least 3")
-    return filled_up(flat, count)
+    return flat, count
 
 
 def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:

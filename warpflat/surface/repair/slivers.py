@@ -16,7 +16,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.topology import half_edges
+from warpflat.surface.half_edges import half_edges
 
 __all__ = ["degenerate_faces", "merge_degenerate_faces"]
 
@@ -26,13 +26,13 @@ _SHORT = 3.0
 # The last resort: a degenerate face whose shortest edge is below this share of its surroundings loses that edge, if an
 # end of it is neither on the border nor on a feature line.
 _LAST_RESORT = 0.1
-# A mesh with so many degenerate faces, as a number and as a share of all, is none of cloth: merging them would take minutes.
+# A mesh with more degenerate faces than this number and this share of all is not merged: it would take minutes.
 _TOO_MANY, _TOO_LARGE_A_SHARE = 200, 0.25
 _MOST_ROUNDS = 20
 
 
 def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
-    """#V, the mean length [m] of the edges at each vertex."""
+    """Return #V, the mean length [m] of the edges at each vertex."""
     edges = half_edges(faces).edges
     length = np.linalg.norm(vertices[edges[:, 0]] - vertices[edges[:, 1]], axis=1)
     total = np.bincount(edges.ravel(), weights=np.repeat(length, 2), minlength=len(vertices))
@@ -41,7 +41,7 @@ def _vertex_scale(vertices: FloatArray, faces: IntArray) -> FloatArray:
 
 
 def _width(points: FloatArray) -> FloatArray:
-    """The least width [m] of faces given as (..., 3 or 4, 3): a triangle's altitude; a quad's also by its edges."""
+    """Return the least width [m] of faces given as ... by 3 or 4 by 3 (see :func:`degenerate_faces`)."""
     sides = np.linalg.norm(np.roll(points, -1, axis=-2) - points, axis=-1)
     if points.shape[-2] == 3:
         area2 = np.linalg.norm(
@@ -57,7 +57,7 @@ def _width(points: FloatArray) -> FloatArray:
 
 
 def degenerate_faces(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IntArray:
-    """The faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
+    """Return the faces whose least width is at most `tolerance` times the mean length of the edges at their corners.
 
     The width of a triangle is its smallest altitude; of a quad, its shortest edge or its area over its longer diagonal.
     """
@@ -77,7 +77,7 @@ def merge_degenerate_faces(
     lines: dict[str, list[int]],
     tolerance: float = 1e-3,
 ) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray, IntArray]:
-    """Merge away what :func:`degenerate_faces` finds.
+    """Merge degenerate faces into their neighbours (see :func:`degenerate_faces`).
 
     Args:
         vertices: #V by 3, positions [m]; none is moved, some may no longer be used afterwards.
@@ -114,7 +114,7 @@ def _merge_once(
     found: IntArray,
     tolerance: float,
 ) -> tuple[IntArray, IntArray, dict[str, list[int]], IntArray]:
-    """One round, with the scale as it stands: faces, the face of each before, lines, and the faces that remain."""
+    """Run one round with fixed edge lengths around: faces, the face that each was before, lines, and the degenerate faces that remain."""
     patch = _Patch(vertices, faces, lines, tolerance)
     waiting = sorted(found.tolist(), key=patch.width)
     # Edges only get shorter and fewer, so this ends; the limit is for what rounding may do to that.
@@ -123,7 +123,7 @@ def _merge_once(
     while waiting and progress and steps_left > 0:
         progress = False
         for face in waiting:
-            if patch.is_degenerate(face) and patch.mend(face):
+            if patch.is_degenerate(face) and patch.remove_degenerate(face):
                 progress = True
                 steps_left -= 1
         waiting = sorted((f for f in patch.touched | set(waiting) if patch.is_degenerate(f)), key=patch.width)
@@ -133,7 +133,14 @@ def _merge_once(
 
 
 class _Patch:
-    """A mesh that changes in few places: only faces near a change leave the arrays."""
+    """A mesh that changes in few places: changed faces are kept beside the arrays.
+
+    Attributes:
+        scale: #V, mean length of the edges at each vertex before the changes [m].
+        changed: the corners of each changed face; None for one that is gone.
+        origin: the face that each new face comes from.
+        touched: faces changed since it was last cleared.
+    """
 
     def __init__(self, vertices: FloatArray, faces: IntArray, lines: dict[str, list[int]], tolerance: float) -> None:
         self.vertices = vertices
@@ -152,20 +159,20 @@ class _Patch:
         self._around: dict[int, set[int]] = {}
 
     def corners(self, face: int) -> tuple[int, ...]:
-        """The vertices of a face that is still there, else ()."""
+        """Return the vertices of a face, or () if it is gone."""
         if face in self.changed:
             return self.changed[face] or ()
         row = self.faces[face].tolist()
         return tuple(row if row[3] >= 0 else row[:3])
 
     def around(self, vertex: int) -> set[int]:
-        """The faces at a vertex."""
+        """Return the faces at a vertex."""
         if vertex not in self._around:
             self._around[vertex] = set(self._face_of[self._start[vertex] : self._start[vertex + 1]].tolist())
         return self._around[vertex]
 
     def neighbours(self, vertex: int) -> dict[int, int]:
-        """The vertices joined to `vertex` by an edge, and how many faces lie at that edge."""
+        """Return the vertices joined to `vertex` by an edge, and the number of faces at each of these edges."""
         count: dict[int, int] = {}
         for face in self.around(vertex):
             ring = self.corners(face)
@@ -193,15 +200,15 @@ class _Patch:
         ring = self.corners(face)
         return bool(ring) and self.is_narrow(ring)
 
-    def put(self, face: int | None, ring: tuple[int, ...] | None, origin: int = -1) -> None:
-        """Replace a face (None: a new one) by the corners `ring` (None: by nothing)."""
+    def replace_face(self, face: int | None, ring: tuple[int, ...] | None, origin: int = -1) -> None:
+        """Give a face (None: a new one, part of `origin`) the corners `ring` (None: remove it)."""
         if face is None:
             face = self.next_face
             self.next_face += 1
             self.origin[face] = self.origin.get(origin, origin)
         for vertex in self.corners(face) if face in self.changed or face < len(self.faces) else ():
             self.around(vertex).discard(face)
-        # Collected before the face changes: a vertex asked for the first time reads the arrays.
+        # Collected before the face changes: a vertex that is asked for the first time is looked up in the arrays.
         places = [self.around(vertex) for vertex in ring or ()]
         self.changed[face] = ring
         for place in places:
@@ -209,8 +216,8 @@ class _Patch:
         if ring:
             self.touched.add(face)
 
-    def mend(self, face: int) -> bool:
-        """One step that rids the mesh of a degenerate face; false if there is none."""
+    def remove_degenerate(self, face: int) -> bool:
+        """Take one step that rids the mesh of a degenerate face; return false if there is none."""
         ring = self.corners(face)
         points = self.vertices[list(ring)]
         length = np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)
@@ -222,10 +229,14 @@ class _Patch:
         if len(ring) == 4:
             at = 0 if np.linalg.norm(points[2] - points[0]) <= np.linalg.norm(points[3] - points[1]) else 1
             turned = ring[at:] + ring[:at]
-            self.put(face, turned[:3])
-            self.put(None, (turned[0], turned[2], turned[3]), origin=face)
+            self.replace_face(face, turned[:3])
+            self.replace_face(None, (turned[0], turned[2], turned[3]), origin=face)
             return True
-        if self.fan(face, long) or self.join_caps(face, long, around) or self.fan_beside(face, long):
+        if (
+            self.remove_cap(face, long)
+            or self.remove_cap_pair(face, long, around)
+            or self.remove_cap_beside(face, long)
+        ):
             return True
         return bool(length[short] <= _LAST_RESORT * around) and self.collapse(*ends, anywhere=False)
 
@@ -246,25 +257,40 @@ class _Patch:
         return False
 
     def _consecutive(self, gone: int, kept: int) -> bool:
-        """Whether every line through `gone` also runs through `kept` next to it."""
+        """Return whether every line through `gone` also runs through `kept` next to it."""
         pairs = {gone, kept}
         return all(gone not in line or any({x, y} == pairs for x, y in pairwise(line)) for line in self.lines.values())
 
     def _collapse(self, gone: int, kept: int) -> bool:
-        of_gone, of_kept = self.neighbours(gone), self.neighbours(kept)
-        both = self.around(gone) & self.around(kept)
+        """Merge the vertex `gone` into `kept`; false, and nothing is changed, where that would spoil the surface."""
+        new = self._faces_after_collapse(gone, kept) if self._may_collapse(gone, kept) else None
+        if new is None:
+            return False
+        for face, ring in new.items():
+            self.replace_face(face, ring)
+        for name, line in self.lines.items():
+            moved = [kept if v == gone else v for v in line]
+            self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
+        return True
+
+    def _may_collapse(self, gone: int, kept: int) -> bool:
+        """Whether the surface stays manifold, with the same border, when the edge between two vertices is collapsed."""
         apexes = set()
-        for face in both:
+        for face in self.around(gone) & self.around(kept):
             ring = self.corners(face)
             if (ring.index(gone) - ring.index(kept)) % len(ring) not in (1, len(ring) - 1):
                 return False
             if len(ring) == 3:
                 apexes |= set(ring) - {gone, kept}
         # The link condition: else the collapse would glue parts of the surface that are apart.
+        of_gone, of_kept = self.neighbours(gone), self.neighbours(kept)
         if set(of_gone) & set(of_kept) != apexes or any(of_gone[x] + of_kept[x] < 3 for x in apexes):
             return False
-        if self.on_border(gone) and not self.on_border(kept):
-            return False
+        return self.on_border(kept) or not self.on_border(gone)
+
+    def _faces_after_collapse(self, gone: int, kept: int) -> dict[int, tuple[int, ...] | None] | None:
+        """The new corners of the faces at `gone` (None: the face vanishes); None if one of them would be degenerate or turn over."""
+        both = self.around(gone) & self.around(kept)
         new: dict[int, tuple[int, ...] | None] = {}
         for face in self.around(gone):
             ring = self.corners(face)
@@ -273,55 +299,54 @@ class _Patch:
             else:
                 new[face] = tuple(kept if v == gone else v for v in ring)
             if new[face] is not None and not self._acceptable(ring, new[face] or ()):
-                return False
-        if all(ring is None for ring in new.values()) and len(self.around(kept)) == len(both):
-            return False
-        for face, changed in new.items():
-            self.put(face, changed)
-        for name, line in self.lines.items():
-            moved = [kept if v == gone else v for v in line]
-            self.lines[name] = [v for i, v in enumerate(moved) if i == 0 or v != moved[i - 1]]
-        return True
+                return None
+        nothing_left = all(ring is None for ring in new.values()) and len(self.around(kept)) == len(both)
+        return None if nothing_left else new
 
     def _acceptable(self, old: tuple[int, ...], new: tuple[int, ...]) -> bool:
-        """Whether a face may become another: not degenerate (or less than it was) and not turned over."""
+        """Return whether a face may get new corners: it is not degenerate then (or less than before) and not turned over."""
         if self.is_narrow(old):
             return len(new) == len(old) and bool(_width(self.vertices[list(new)]) >= _width(self.vertices[list(old)]))
         return not self.is_narrow(new) and float(self.normal(old) @ self.normal(new)) > 0
 
-    def fan(self, face: int, side: int, *, check: bool = True) -> bool:
-        """Take away a cap: the neighbour across its longest edge (the one from corner `side`) is fanned out instead."""
+    def remove_cap(self, face: int, side: int, *, check: bool = True) -> bool:
+        """Remove a cap: the neighbour across its longest edge (the one from corner `side`) becomes a fan around its far corner."""
         ring = self.corners(face)
         p, q, c = ring[side], ring[(side + 1) % 3], ring[(side + 2) % 3]
-        bent = [line for line in self.lines.values() if any({x, y} == {p, q} for x, y in pairwise(line))]
-        if any(c in line for line in bent):
+        along = [line for line in self.lines.values() if any({x, y} == {p, q} for x, y in pairwise(line))]
+        if any(c in line for line in along):
             return False
         beside = self._across(face, p, q)
         if beside is None:
             if self.on_border(c):
                 return False
-            self.put(face, None)
-        else:
-            far = self.corners(beside)
-            at = far.index(p)
-            chain = far[at:] + far[:at]
-            if c in far or any(v in self.neighbours(c) for v in chain[1:-1]):
-                return False
-            new = [(c, x, y) for x, y in pairwise(chain)]
-            if check and not self._all_face_alike(new, chain, c):
-                return False
-            self.put(face, None)
-            self.put(beside, new[0])
-            for triangle in new[1:]:
-                self.put(None, triangle, origin=beside)
-        for line in bent:
+            self.replace_face(face, None)
+        elif not self._fan_out(face, beside, p, c, check=check):
+            return False
+        for line in along:
             for i in range(len(line) - 1, 0, -1):
                 if {line[i - 1], line[i]} == {p, q}:
                     line.insert(i, c)
         return True
 
-    def fan_beside(self, face: int, side: int) -> bool:
-        """Take away the cap across this side of a face, narrow itself or almost, whose own longest edge is another one."""
+    def _fan_out(self, cap: int, beside: int, p: int, c: int, *, check: bool) -> bool:
+        """Replace a cap and the face across its longest edge, which begins at p, by a fan of triangles around the cap's corner c."""
+        far = self.corners(beside)
+        at = far.index(p)
+        chain = far[at:] + far[:at]
+        if c in far or any(v in self.neighbours(c) for v in chain[1:-1]):
+            return False
+        new = [(c, x, y) for x, y in pairwise(chain)]
+        if check and not self._all_face_alike(new, chain, c):
+            return False
+        self.replace_face(cap, None)
+        self.replace_face(beside, new[0])
+        for triangle in new[1:]:
+            self.replace_face(None, triangle, origin=beside)
+        return True
+
+    def remove_cap_beside(self, face: int, side: int) -> bool:
+        """Remove the cap across a side of a face, which is narrow or almost so, and whose longest edge is another one."""
         ring = self.corners(face)
         beside = self._across(face, ring[side], ring[(side + 1) % 3])
         far = self.corners(beside) if beside is not None else ()
@@ -329,10 +354,10 @@ class _Patch:
             return False
         points = self.vertices[list(far)]
         long = int(np.argmax(np.linalg.norm(np.roll(points, -1, axis=0) - points, axis=1)))
-        return not {far[long], far[(long + 1) % 3]} <= set(ring) and self.fan(beside, long)
+        return not {far[long], far[(long + 1) % 3]} <= set(ring) and self.remove_cap(beside, long)
 
-    def join_caps(self, face: int, side: int, around: float) -> bool:
-        """Take away two caps back to back, whose corners lie at almost the same place on their common longest edge."""
+    def remove_cap_pair(self, face: int, side: int, around: float) -> bool:
+        """Remove two caps back to back, whose corners lie at almost the same place on their common longest edge."""
         ring = self.corners(face)
         p, q, c = ring[side], ring[(side + 1) % 3], ring[(side + 2) % 3]
         beside = self._across(face, p, q)
@@ -342,16 +367,16 @@ class _Patch:
         if np.linalg.norm(self.vertices[c] - self.vertices[d]) > _SHORT * self.tolerance * around:
             return False
         before = copy.deepcopy((self.changed, self.origin, self._around, self.lines, self.touched, self.next_face))
-        if self.fan(face, side, check=False) and self.collapse(c, d, anywhere=True):
+        if self.remove_cap(face, side, check=False) and self.collapse(c, d, anywhere=True):
             return True
         self.changed, self.origin, self._around, self.lines, self.touched, self.next_face = before
         return False
 
     def _all_face_alike(self, new: Sequence[tuple[int, ...]], chain: tuple[int, ...], c: int) -> bool:
-        """Whether the triangles from c that take the place of the face `chain` have an area and face to its side.
+        """Return whether the triangles from c that replace the face `chain` have an area and face to its side.
 
         Where that face is narrow itself or almost, they may be narrow too, if the edge that is given up, from the
-        first to the last of `chain`, is longer than the new ones: so this comes to an end, at a face that is not.
+        first to the last of `chain`, is longer than the new ones. So the process ends, at a face that is not narrow.
         """
         thin = self.is_narrow(chain, _SHORT)
         if thin:
@@ -365,7 +390,7 @@ class _Patch:
         return all(thin if self.is_narrow(t) else float(self.normal(t) @ facing) > 0 for t in new)
 
     def _across(self, face: int, p: int, q: int) -> int | None:
-        """The face beside `face` at its side p-q."""
+        """Return the face beside `face` at its side p-q."""
         return next((f for f in self.around(p) & self.around(q) if f != face and self._has_edge(f, q, p)), None)
 
     def _has_edge(self, face: int, a: int, b: int) -> bool:
@@ -373,7 +398,7 @@ class _Patch:
         return ring[(ring.index(a) + 1) % len(ring)] == b
 
     def result(self) -> tuple[IntArray, IntArray]:
-        """All faces in the order of the faces they come from, and those."""
+        """Return all faces, in the order of the faces they come from, and these."""
         total = self.next_face
         faces = np.full((total, 4), -1, dtype=np.int32)
         faces[: len(self.faces)] = self.faces

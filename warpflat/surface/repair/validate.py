@@ -19,6 +19,8 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import checked_label, checked_name
 from warpflat.core.text import counted, shown
+from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
+from warpflat.surface.half_edges import half_edges, mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.polygons import (
     distinct_corners,
@@ -29,15 +31,6 @@ from warpflat.surface.repair.polygons import (
 )
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
-from warpflat.surface.topology import (
-    border_loops,
-    components,
-    corner_fans,
-    euler_characteristic,
-    half_edges,
-    mesh_edges,
-    orient,
-)
 
 __all__ = ["checked_positions", "make_surface"]
 

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.surface.connectivity import components, euler_characteristic
+from warpflat.surface.half_edges import half_edges
 from warpflat.surface.repair.polygons import distinct_corners
-from warpflat.surface.topology import components, euler_characteristic, half_edges
 
 __all__ = ["is_sheet", "t_junction", "weld_map", "welding"]
 

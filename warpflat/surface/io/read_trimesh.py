@@ -1,0 +1,101 @@
+"""PLY, STL, GLB and glTF, read with trimesh, which cuts polygons into triangles."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.input_files import noting_resolver
+from warpflat.surface.io.read_checks import check_ply, check_stl
+
+__all__ = ["GLTF", "read_with_trimesh"]
+
+GLTF = (".glb", ".gltf")
+
+
+def read_with_trimesh(file: Path, *, node: str | None) -> tuple[FloatArray, NDArray[np.int64], bool]:
+    """Read a file's meshes as one.
+
+    Args:
+        file: .ply, .stl, .glb or .gltf.
+        node: the name of the one node of a scene to read; None for all.
+
+    Returns:
+        #V by 3, positions in the file's unit; #F by 3 vertices; and whether the format splits vertices per corner of a face or
+        per texture coordinate.
+
+    Raises:
+        InputError: without the file's name: it cannot be read, has no such node, or no faces.
+    """
+    suffix = file.suffix.lower()
+    scene = _load_scene(file)
+    meshes = list(_instances(scene))
+    if node is not None:
+        names = [name for name, _, _ in meshes]
+        meshes = [item for item in meshes if item[0] == node]
+        if not meshes:
+            raise InputError(f"there is no mesh node {node!r}; {nearest(node, names)}")
+    if not any(len(faces) for _, _, faces in meshes):
+        raise InputError(f"has no faces: not a mesh, or not a readable {suffix[1:].upper()} file")
+    start = np.cumsum([0, *(len(vertices) for _, vertices, _ in meshes)])
+    return (
+        np.concatenate([vertices for _, vertices, _ in meshes]),
+        np.concatenate([faces + at for (_, _, faces), at in zip(meshes, start, strict=False)]),
+        suffix in (".stl", *GLTF) or (suffix == ".ply" and _is_textured(scene)),
+    )
+
+
+def _is_textured(scene: Any) -> bool:
+    geometries = [m for m in scene.geometry.values() if hasattr(m, "visual")]
+    return any(getattr(m.visual, "kind", None) == "texture" for m in geometries)
+
+
+def _load_scene(file: Path) -> Any:
+    """Load a file with trimesh, whose log and warnings are silenced meanwhile."""
+    import trimesh
+
+    suffix = file.suffix.lower()
+    if suffix == ".ply":
+        check_ply(file)
+    elif suffix == ".stl":
+        check_stl(file)
+    options = {"fix_texture": False, "skip_materials": True} if suffix == ".ply" else {}
+    # Its log goes nowhere, but to the handlers of a program that has its own.
+    logging.getLogger("trimesh").addHandler(logging.NullHandler())
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return trimesh.load_scene(str(file), process=False, resolver=noting_resolver(file), **options)
+    except InputError:
+        raise
+    # Any error of a parser is the file's fault, of whatever type it is.
+    except Exception as error:
+        raise InputError(
+            f"not a readable {suffix[1:].upper()} file: damaged, cut short, or with more in it than its reader knows; save it again with "
+            "vertices and faces alone"
+        ) from error
+
+
+def _instances(scene: Any) -> Iterator[tuple[str, FloatArray, NDArray[np.int64]]]:
+    """Yield the meshes of a trimesh scene: node, world positions, triangles."""
+    import trimesh
+
+    for node in scene.graph.nodes_geometry:
+        transform, geometry = scene.graph[node]
+        mesh = scene.geometry[geometry]
+        if not isinstance(mesh, trimesh.Trimesh):
+            continue
+        vertices = np.asarray(mesh.vertices, dtype=np.float64)
+        matrix = np.asarray(transform, dtype=np.float64)
+        if not np.array_equal(matrix, np.eye(4)):
+            vertices = vertices @ matrix[:3, :3].T + matrix[:3, 3]
+        faces = np.asarray(mesh.faces, dtype=np.int64).reshape(-1, 3)
+        yield node, vertices, faces if np.linalg.det(matrix[:3, :3]) >= 0 else faces[:, ::-1]
