@@ -11,8 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
+from warpflat.pattern.allowance import cut_hole, cut_outline
 from warpflat.pattern.curves import TOLERANCE, Curve, arc_lengths, fit_curve
+from warpflat.pattern.dart_allowance import WIDEST_DART
 from warpflat.pattern.drafted import (
     DraftedCutout,
     DraftedDart,
@@ -27,6 +28,7 @@ from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
 from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
+from warpflat.pattern.sides import Side, Wedge
 from warpflat.surface.cut.dart_legs import are_curved
 
 __all__ = ["draft_garment", "draft_piece", "eye_legs", "nest_label"]

@@ -7,11 +7,12 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.pattern.allowance import CutOutline, Wedge
+from warpflat.pattern.allowance import CutOutline
 from warpflat.pattern.curves import arc_lengths
 from warpflat.pattern.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import worst_difference
+from warpflat.pattern.sides import Wedge
 
 __all__ = ["cut_darts", "dart_notches", "seam_notches", "seam_reports"]
 
