@@ -10,8 +10,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.pattern.curves import Curve, arc_lengths, fit_curve
-from warpflat.pattern.draft import eye_legs, nest_label
+from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
+from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import Label
 from warpflat.pattern.lettering import Words, text_width
 
@@ -153,7 +154,7 @@ def _details(piece: DraftedPiece) -> list[Stroke]:
         Stroke(role="cutout", name=name, points=cutout.cut_line, closed=True) for name, cutout in piece.cutouts.items()
     ]
     for name, line in piece.fisheyes.items():
-        left, right = eye_legs(line)
+        left, right = fisheye_legs(line)
         strokes += [
             Stroke(role="dart", name=f"{name}.left", points=left),
             Stroke(role="dart", name=f"{name}.right", points=right),
@@ -202,7 +203,7 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
         dart = legs.get(edge.name)
         if edge.name == dart.left if dart is not None else borders and edge.kind != "fold":
             lines.append((edge.name if dart is None else dart.name, edge.line, True))
-    lines += [(name, eye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
     drawn = {index: shapely.LineString(line) for index, (_, line, _) in enumerate(lines)}
     words = []
     for index, (name, line, border) in enumerate(lines):
