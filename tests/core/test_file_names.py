@@ -12,7 +12,7 @@ import warpflat
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.core.file_names import checked_name, fitted_name
-from warpflat.garment.pattern_files import export_pattern
+from warpflat.garment.pattern_files import export_patterns
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
@@ -110,5 +110,5 @@ def test_nothing_is_written_outside_the_folder_whoever_gave_the_name(tmp_path: P
     drawn = json.loads((out / "pattern.json").read_text())
     (out / "pattern.json").write_text(json.dumps({**drawn, "name": "../evil"}))
     with pytest.raises(InputError, match="cannot name a file"):
-        export_pattern(out, "svg")
+        export_patterns(out, ["svg"])
     assert sorted(path.name for path in tmp_path.iterdir()) == ["out"]

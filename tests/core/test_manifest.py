@@ -12,7 +12,7 @@ from warpflat.cli.main import main
 from warpflat.core.errors import InputError
 from warpflat.core.manifest import remove_stale
 from warpflat.flattening.flatten_piece import flatten
-from warpflat.garment.pattern_files import export_pattern
+from warpflat.garment.pattern_files import export_patterns
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
 from warpflat.scene.write import SceneResult
@@ -51,7 +51,7 @@ def test_a_run_removes_what_an_earlier_one_left_and_it_does_not_make(tmp_path: P
     assert all(file in note for file in (*PATTERN, "frames.usdc"))
     assert json.loads(json.dumps(second.metrics)) == metrics(tmp_path)
     with pytest.raises(InputError, match=r"pattern\.json"):
-        export_pattern(tmp_path / "out", "dxf")
+        export_patterns(tmp_path / "out", ["dxf"])
 
 
 def test_the_console_says_what_was_removed(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
@@ -126,7 +126,7 @@ def test_saving_a_result_by_hand_removes_nothing_and_forgets_nothing(tmp_path: P
 def test_what_was_exported_later_belongs_to_the_run(tmp_path: Path):
     run(tmp_path, formats=("json", "dxf"))
     for kind in ("dxf", "svg"):
-        export_pattern(tmp_path / "out", kind, dialect="astm")
+        export_patterns(tmp_path / "out", [kind], dialect="astm")
     run(tmp_path)
     assert files(tmp_path) == {"cap.obj", "metrics.json"}
 
@@ -200,5 +200,5 @@ def test_a_result_saved_by_hand_does_not_replace_the_metrics_of_another_program(
 def test_a_pattern_is_exported_beside_the_metrics_of_another_program(tmp_path: Path):
     run(tmp_path, formats=("json",))
     (tmp_path / "out" / "metrics.json").write_text('{"accuracy": 0.9}')
-    assert export_pattern(tmp_path / "out", "svg") == "cap.svg"
+    assert export_patterns(tmp_path / "out", ["svg"]) == ["cap.svg"]
     assert (tmp_path / "out" / "metrics.json").read_text() == '{"accuracy": 0.9}'

@@ -15,7 +15,7 @@ from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_e
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_pen import GREY, Pen
-from warpflat.export.picture_png import png_bytes
+from warpflat.export.picture_png import save_png
 from warpflat.export.raster import Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
@@ -283,11 +283,17 @@ def test_samples_are_averaged_over_what_is_covered() -> None:
 
 @pytest.mark.parametrize("shape", [(1, 1), (70, 33), (32, 5)])
 def test_a_png_holds_the_pixels_its_resolution_and_who_wrote_it(tmp_path: Path, shape: tuple[int, int]) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
     from PIL import Image
 
     rng = np.random.default_rng(6)
     given = rng.integers(0, 256, (*shape, 4), dtype=np.uint8)
-    (tmp_path / "a.png").write_bytes(png_bytes(given[..., :3], dots_per_inch=150, text={"Software": "warpflat"}))
+    given[..., 3] = 255
+    figure = Figure(figsize=(shape[1] / 150, shape[0] / 150), dpi=150)
+    FigureCanvasAgg(figure)
+    figure.figimage(given, resize=True)
+    save_png(tmp_path / "a.png", figure, {"Software": "warpflat"})
     with Image.open(tmp_path / "a.png") as image:
         assert image.mode == "RGB"
         assert image.info["dpi"] == pytest.approx((150, 150), abs=0.1)

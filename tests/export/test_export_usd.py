@@ -11,12 +11,12 @@ from typing import Any
 import numpy as np
 import pytest
 from export_meshes import cut_up_the_middle, dome, mixed
+from usd_validation import validate_usd
 
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, linear_rgb
 from warpflat.export.usd import FrameWriter
-from warpflat.export.usd_validation import validate_usd
 
 # A child finds the package and the helpers where this process found them.
 FOUND = {

@@ -13,6 +13,7 @@ from xml.etree import ElementTree as ET
 import ezdxf
 import numpy as np
 import pytest
+from sample_dress import sample_dress
 from scipy.spatial import KDTree
 from shapely.geometry import LinearRing, Point
 
@@ -20,7 +21,6 @@ from warpflat.core.errors import InputError
 from warpflat.export.dxf import block_name, write_dxf
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.pieces import Edge, Garment, Piece
-from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40")
 CREATED = datetime(2024, 5, 17, 9, 30)

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 import shapely
 from PIL import Image
+from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.export.pdf import PAPERS, write_pdf
@@ -17,7 +18,6 @@ from warpflat.export.pdf_legend import TEST_INCHES, TEST_MM
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.pieces import Edge, Garment, Piece
-from warpflat.pattern.sample import sample_dress
 
 needs_poppler = pytest.mark.skipif(shutil.which("pdftoppm") is None, reason="pdftoppm (poppler) is not installed")
 MM = 1 / 25.4

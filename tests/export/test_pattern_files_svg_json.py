@@ -10,13 +10,13 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 import pytest
+from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.export.pattern_json import pattern_json, write_pattern_json
 from warpflat.export.svg import STYLE, write_marker_svg, write_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.marker import Cloth, make_marker
-from warpflat.pattern.sample import sample_dress
 
 SVG = "{http://www.w3.org/2000/svg}"
 CHROMIUM = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import turning_angles
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.ease import SeamWish, wished_seams
@@ -16,7 +17,6 @@ from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.membrane import Model
-from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.draft import draft_garment
 from warpflat.solver.relax import Relaxation, RelaxOptions
 from warpflat.surface.shapes import make_shape

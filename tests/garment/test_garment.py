@@ -21,6 +21,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import FixedLength
 from warpflat.garment.ease import SeamWish
 from warpflat.garment.garment import Garment, flatten_form
+from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.wear import Wear
@@ -186,15 +187,14 @@ def test_the_skirt_block_measures_what_the_table_says(block: Garment):
 
 
 def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
-    piece, carrier = block.pieces["front_bodice"], block.carrier("front_bodice")
+    piece = block.pieces["front_bodice"]
+    carrier = Carrier(piece.surface.vertices, piece.positions, piece.faces)
     drawn = np.linspace(piece.positions[piece.datum[3]], piece.positions[piece.surface.lines["bust"][5]], 7)
     on_body = carrier.to_body(drawn)
     np.testing.assert_allclose(carrier.to_pattern(on_body), drawn, atol=1e-6)
     np.testing.assert_allclose(carrier.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
     line = carrier.polyline_to_body(drawn)
     assert len(line) >= len(drawn)
-    with pytest.raises(InputError, match=r"no piece 'front_bodise'; did you mean 'front_bodice'"):
-        block.carrier("front_bodise")
 
 
 def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):

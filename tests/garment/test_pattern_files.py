@@ -15,6 +15,7 @@ import ezdxf
 import numpy as np
 import pytest
 import shapely
+from sample_dress import sample_dress
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
@@ -27,7 +28,7 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.garment import Garment as Flattened
 from warpflat.garment.garment import flatten_form
-from warpflat.garment.pattern_files import PatternOptions, export_pattern, surface_files
+from warpflat.garment.pattern_files import PatternOptions, export_patterns, surface_files
 from warpflat.garment.surface_to_pattern import check_edge_names, pattern_of_surface
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
@@ -35,7 +36,6 @@ from warpflat.pattern.curves import fit_curve
 from warpflat.pattern.draft import draft_garment, draft_piece
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece
-from warpflat.pattern.sample import sample_dress
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
 from warpflat.surface.repair.validate import make_surface
@@ -484,7 +484,7 @@ def test_another_size_that_went_wrong_is_a_warning(
 def test_a_broken_file_is_one_line(text: str, said: str, tmp_path: Path):
     (tmp_path / "pattern.json").write_text(text)
     with pytest.raises(InputError, match=said) as caught:
-        export_pattern(tmp_path, "svg")
+        export_patterns(tmp_path, ["svg"])
     assert "pattern.json" in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -496,11 +496,11 @@ def test_a_size_of_a_pattern_without_sizes_is_told(tmp_path: Path):
     (tmp_path / "pattern.json").write_text(json.dumps(pattern_json(drafted)))
     for kind in ("dxf", "svg", "pdf"):
         with pytest.raises(InputError, match="garment 'p' has no sizes: it is not graded"):
-            export_pattern(tmp_path, kind, sizes=["EU 38"])
+            export_patterns(tmp_path, [kind], sizes=["EU 38"])
 
 
 def test_a_folder_without_a_pattern_and_unknown_formats(tmp_path: Path):
     with pytest.raises(InputError, match="no such file"):
-        export_pattern(tmp_path, "svg")
+        export_patterns(tmp_path, ["svg"])
     with pytest.raises(InputError, match="unknown format 'dwg'"):
-        export_pattern(tmp_path, "dwg")
+        export_patterns(tmp_path, ["dwg"])

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from usd_validation import validate_usd
 
-from warpflat.export.usd_validation import validate_usd
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.output import write_mannequin
 

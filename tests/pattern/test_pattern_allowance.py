@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 from shapely.affinity import affine_transform
 
 from warpflat.core.errors import InputError
-from warpflat.pattern.allowance import MITRE_REACH, Side, Wedge, cut_hole, cut_outline
+from warpflat.pattern.allowance import cut_hole, cut_outline
+from warpflat.pattern.sides import MITRE_REACH, Side, Wedge
 
 WIDTHS = st.sampled_from([0.0, 0.005, 0.010, 0.015, 0.030, 0.050])
 

@@ -9,6 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from matplotlib.font_manager import FontProperties
 from matplotlib.textpath import TextPath
+from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, turning_angles
@@ -17,7 +18,6 @@ from warpflat.pattern.draft import draft_garment, draft_piece, nest_label
 from warpflat.pattern.drawing import draw_piece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.pieces import Dart, Edge, Garment, Hole, Piece, Seam, SeamSide
-from warpflat.pattern.sample import sample_dress
 
 SIZES = ("36", "38", "40", "42", "44")
 

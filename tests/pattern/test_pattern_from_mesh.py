@@ -9,7 +9,7 @@ from shapely.affinity import scale
 
 from warpflat.core.errors import InputError
 from warpflat.pattern.draft import draft_piece
-from warpflat.pattern.from_mesh import piece_from_mesh
+from warpflat.pattern.from_mesh import MeshFeatures, piece_from_mesh
 
 
 def grid(columns=10, rows=12, width=0.2, height=0.3):
@@ -18,6 +18,10 @@ def grid(columns=10, rows=12, width=0.2, height=0.3):
     faces = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)
     lines = {"hem": index[0], "side": index[:, -1], "centre": index[:, 0], "level": index[6]}
     return faces.astype(np.int32), np.column_stack([x.ravel(), y.ravel()]), lines, index
+
+
+def make_piece(faces, flat, *, name, **features):
+    return piece_from_mesh(faces, flat, name=name, features=MeshFeatures(**features))
 
 
 def cracked(opening=0.02):
@@ -38,7 +42,7 @@ def cracked(opening=0.02):
 
 def test_edges_take_the_names_of_the_lines_along_them():
     faces, flat, lines, index = grid()
-    piece = piece_from_mesh(
+    piece = make_piece(
         faces, flat, name="panel", lines=lines, kinds={"hem": "hem", "centre": "fold"}, allowances={"side": 0.015}
     )
     assert [e.name for e in piece.edges] == ["hem", "side", "edge_1", "centre"]
@@ -54,7 +58,7 @@ def test_edges_take_the_names_of_the_lines_along_them():
 def test_a_line_that_runs_along_two_stretches_names_both():
     faces, flat, _, index = grid()
     around = np.concatenate([index[3:7, -1], index[6, -2:0:-1], index[6:2:-1, 0]])
-    piece = piece_from_mesh(faces, flat, name="p", lines={"belt": around})
+    piece = make_piece(faces, flat, name="p", lines={"belt": around})
     names = [e.name for e in piece.edges]
     assert {"belt", "belt_2"} <= set(names)
     assert len(piece.internal_lines) == 1
@@ -62,7 +66,7 @@ def test_a_line_that_runs_along_two_stretches_names_both():
 
 def test_a_crack_is_found_and_becomes_a_dart_that_folds():
     faces, flat, lines, path, _ = cracked()
-    piece = piece_from_mesh(faces, flat, name="p", lines={k: v for k, v in lines.items() if k != "hem"})
+    piece = make_piece(faces, flat, name="p", lines={k: v for k, v in lines.items() if k != "hem"})
     assert [d.name for d in piece.darts] == ["dart"]
     left, right = piece.edge("dart.left"), piece.edge("dart.right")
     assert left.length == pytest.approx(right.length)
@@ -76,25 +80,25 @@ def test_a_crack_is_found_and_becomes_a_dart_that_folds():
 def test_a_dart_may_be_named_by_its_vertices():
     faces, flat, _, path, copies = cracked()
     mouth = (int(path[0]), int(path[-1]), copies[int(path[0])])
-    piece = piece_from_mesh(faces, flat, name="p", darts={"waist": mouth})
+    piece = make_piece(faces, flat, name="p", darts={"waist": mouth})
     assert [d.name for d in piece.darts] == ["waist"]
     assert piece.edge("waist.left").kind == "dart"
     with pytest.raises(InputError, match="counter-clockwise"):
-        piece_from_mesh(faces, flat, name="p", darts={"waist": mouth[::-1]})
+        make_piece(faces, flat, name="p", darts={"waist": mouth[::-1]})
     with pytest.raises(InputError, match="not on the outer border"):
-        piece_from_mesh(faces, flat, name="p", darts={"waist": (mouth[0], 93, mouth[2])})
+        make_piece(faces, flat, name="p", darts={"waist": (mouth[0], 93, mouth[2])})
 
 
 def test_a_layout_on_its_back_is_turned_over():
     faces, flat, lines, _ = grid()
-    piece = piece_from_mesh(faces, flat * [-1, 1], name="p", lines=lines)
-    assert np.array_equal(piece.outline, piece_from_mesh(faces, flat, name="p", lines=lines).outline)
+    piece = make_piece(faces, flat * [-1, 1], name="p", lines=lines)
+    assert np.array_equal(piece.outline, make_piece(faces, flat, name="p", lines=lines).outline)
 
 
 def test_a_border_inside_becomes_a_cutout():
     faces, flat, _, _ = grid()
     middle = np.linalg.norm(flat[faces].mean(axis=1) - [0.1, 0.15], axis=1) < 0.03
-    piece = piece_from_mesh(faces[~middle], flat, name="p")
+    piece = make_piece(faces[~middle], flat, name="p")
     (hole,) = piece.holes
     assert shapely.Polygon(hole.points).area == pytest.approx(middle.sum() * 0.02 * 0.025)
 
@@ -104,7 +108,7 @@ def test_a_smooth_border_without_lines_is_one_closed_edge():
     flat = np.concatenate([[[0.0, 0.0]], 0.1 * np.column_stack([np.cos(t), np.sin(t)])])
     ring = np.arange(1, 73)
     faces = np.column_stack([np.zeros(72), ring, np.roll(ring, -1), np.full(72, -1)]).astype(np.int32)
-    piece = piece_from_mesh(faces, flat, name="disc")
+    piece = make_piece(faces, flat, name="disc")
     assert len(piece.edges) == 1
     cut = shapely.Polygon(draft_piece(piece).cut_line)
     assert cut.is_valid
@@ -115,7 +119,7 @@ def test_a_ragged_border_has_no_more_corners_than_its_shape():
     faces, flat, _, index = grid(columns=60, rows=80)
     ragged = np.concatenate([index[0, 1:-1], index[-1, 1:-1], index[1:-1, 0], index[1:-1, -1]])
     flat[ragged] += np.random.default_rng(3).uniform(-0.0008, 0.0008, (len(ragged), 2))
-    piece = piece_from_mesh(faces, flat, name="p")
+    piece = make_piece(faces, flat, name="p")
     assert len(piece.edges) == 4
     assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted(
         [index[0, 0], index[0, -1], index[-1, 0], index[-1, -1]]
@@ -138,13 +142,13 @@ def strap(width, step, across, bend=0.0):
 @pytest.mark.parametrize("width", [0.004, 0.0077, 0.010, 0.012, 0.0121, 0.020, 0.040])
 def test_a_strap_has_four_corners_however_narrow(width, step, across, bend):
     faces, flat, corners = strap(width, step, across, bend)
-    piece = piece_from_mesh(faces, flat, name="strap")
+    piece = make_piece(faces, flat, name="strap")
     assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted(corners)
 
 
 def test_a_narrow_side_keeps_its_allowance_all_along():
     faces, flat, lines, _ = grid(4, 160, 0.010, 0.8)
-    piece = piece_from_mesh(
+    piece = make_piece(
         faces,
         flat,
         name="binding",
@@ -166,7 +170,7 @@ def test_a_pointed_end_has_a_corner_at_its_point_too():
     faces, flat, corners = strap(0.010, 0.005, 2)
     tip = len(flat) - 2
     flat[tip, 1] += 0.005
-    piece = piece_from_mesh(faces, flat, name="tie")
+    piece = make_piece(faces, flat, name="tie")
     assert sorted(int(e.vertices[0]) for e in piece.edges) == sorted([*corners, tip])
 
 
@@ -184,7 +188,7 @@ def test_a_round_end_has_one_corner(width, count):
     )
     faces = np.stack([np.arange(len(ring)), np.roll(np.arange(len(ring)), -1)], axis=1)
     faces = np.column_stack([np.full(len(ring), len(ring)), faces, np.full(len(ring), -1)]).astype(np.int32)
-    piece = piece_from_mesh(faces, np.concatenate([ring, [[0.0, 0.15]]]), name="strap")
+    piece = make_piece(faces, np.concatenate([ring, [[0.0, 0.15]]]), name="strap")
     starts = sorted(int(e.vertices[0]) for e in piece.edges)
     assert len(starts) == 3
     assert starts[1:] == [count + 59, count + 60]
@@ -194,7 +198,7 @@ def test_the_grain_follows_the_datum_line_inside_the_piece():
     faces, flat, lines, _ = grid()
     angle = np.radians(20)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    piece = piece_from_mesh(faces, flat @ turn.T, name="p", lines=lines, grain_line="centre")
+    piece = make_piece(faces, flat @ turn.T, name="p", lines=lines, grain_line="centre")
     along = piece.grain[1] - piece.grain[0]
     assert along / np.linalg.norm(along) == pytest.approx(turn[:, 1])
     assert shapely.Polygon(piece.outline).contains(shapely.LineString(piece.grain))
@@ -203,14 +207,14 @@ def test_the_grain_follows_the_datum_line_inside_the_piece():
 def test_unknown_names_and_bad_layouts_are_refused():
     faces, flat, lines, _ = grid()
     with pytest.raises(InputError, match="did you mean 'hem'"):
-        piece_from_mesh(faces, flat, name="p", lines=lines, kinds={"hen": "hem"})
+        make_piece(faces, flat, name="p", lines=lines, kinds={"hen": "hem"})
     with pytest.raises(InputError, match="no line 'centr'"):
-        piece_from_mesh(faces, flat, name="p", lines=lines, grain_line="centr")
+        make_piece(faces, flat, name="p", lines=lines, grain_line="centr")
     with pytest.raises(InputError, match="#V by 2"):
-        piece_from_mesh(faces, np.zeros((3, 3)), name="p")
+        make_piece(faces, np.zeros((3, 3)), name="p")
     tetrahedron = np.array([[0, 1, 2, -1], [0, 2, 3, -1], [0, 3, 1, -1], [1, 3, 2, -1]], dtype=np.int32)
     with pytest.raises(InputError, match="no border"):
-        piece_from_mesh(tetrahedron, np.random.default_rng(0).random((4, 2)), name="p")
+        make_piece(tetrahedron, np.random.default_rng(0).random((4, 2)), name="p")
 
 
 @pytest.mark.parametrize("rows", [30, 60])
@@ -224,7 +228,7 @@ def test_a_narrow_hollow_tip_has_its_corner_where_the_border_turns_and_an_even_a
     hollow = 1e-4 * (1 - share**4)
     flat[index[0], 1] += hollow
     flat[index[-1], 1] -= hollow
-    piece = piece_from_mesh(faces, flat, name="gore")
+    piece = make_piece(faces, flat, name="gore")
     ends = {int(edge.vertices[0]) for edge in piece.edges}
     assert ends <= {int(index[row, column]) for row in (0, -1) for column in (0, -1)}
     cut = shapely.Polygon(draft_piece(piece).cut_line)

@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import shapely
+from sample_dress import sample_dress
 
 from warpflat.core.errors import InputError
 from warpflat.export.svg import write_marker_svg
@@ -14,7 +15,6 @@ from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.marker import Cloth, make_marker, unfolded
 from warpflat.pattern.pieces import Edge, Garment, Hole, Piece
-from warpflat.pattern.sample import sample_dress
 
 
 @pytest.fixture(scope="module")

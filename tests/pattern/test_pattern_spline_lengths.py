@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import BSpline, splprep
 
 from warpflat.core.polyline import arc_lengths
-from warpflat.pattern.spline_lengths import HELD, _LengthSystem, with_lengths
+from warpflat.pattern.spline_lengths import MOVE_TOLERANCES, _LengthSystem, adjust_lengths
 
 FloatArray = NDArray[np.float64]
 TOLERANCE, WEIGHED = 1e-4, 8e-6
@@ -38,7 +38,7 @@ def errors(
     half = np.diff(at)[:, None] / 2.0
     speed = np.linalg.norm(spline(at[:-1, None] + half * (node + 1.0), 1), axis=-1)
     length = np.cumsum((half * weight * speed).sum(axis=1)) - arc[1:]
-    away, moved = (spline(at) - points)[1:-1] / TOLERANCE, (control - start)[1:-1] / (HELD * TOLERANCE)
+    away, moved = (spline(at) - points)[1:-1] / TOLERANCE, (control - start)[1:-1] / (MOVE_TOLERANCES * TOLERANCE)
     return np.concatenate([away.ravel(), length / WEIGHED, moved.ravel()])
 
 
@@ -68,7 +68,7 @@ def test_a_step_is_that_of_least_squares(count: int, smoothing: float):
 def test_steps_end_where_the_errors_weigh_least(count: int, smoothing: float):
     knots, start, points = spline_through(count, smoothing)
     arc = arc_lengths(points)
-    control, off = with_lengths(knots, start.copy(), points, arc, TOLERANCE, WEIGHED)
+    control, off = adjust_lengths(knots, start.copy(), points, arc, TOLERANCE, WEIGHED)
     before, after = (errors(of, start, knots, points, arc) for of in (start, control))
     assert after @ after < before @ before
     lengths = slice(2 * count - 4, 3 * count - 5)

@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from usd_validation import validate_usd
 
 from warpflat.core.errors import InputError
-from warpflat.export.usd_validation import validate_usd
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.library import find_fabric
 from warpflat.scene.frames import FrameSchedule

@@ -184,8 +184,7 @@ def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):
 
 def test_one_film_tells_the_whole_story(tmp_path: Path):
     from pxr import Usd, UsdGeom
-
-    from warpflat.export.usd_validation import validate_usd
+    from usd_validation import validate_usd
 
     cuts = [{"name": "bust", "line": "bust", "part": [0.0, 0.3]}, {"name": "bust", "line": "bust", "part": [1.0, 0.7]}]
     run_scene(scene(cuts=cuts, output={"frames": 12, "picture": False}), tmp_path)

@@ -21,9 +21,9 @@ from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import turning_angles
 from warpflat.core.text import control_in, plain_letters
 from warpflat.export.letters import titles
-from warpflat.pattern.curves import turning_angles
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width

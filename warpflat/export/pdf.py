@@ -23,7 +23,7 @@ from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, P
 from warpflat.export.svg import OF_SIZE, STYLE
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.drawing import Stroke, draw_nest
-from warpflat.pattern.layout import Sheet, lay_out, nests, taken_by
+from warpflat.pattern.layout import Sheet, lay_out, nests, occupied_points
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
 
 if TYPE_CHECKING:
@@ -94,7 +94,7 @@ def write_pdf(
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
     """The layout that needs the fewest pages, over sheets of one to eight tiles' width."""
     step = paper.step
-    widest = max(float(np.ptp(taken_by(group)[:, 0])) for group in groups)
+    widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
     best: tuple[Sheet, Tiling] | None = None
     for columns in range(1, 9 if paper.tiled else 2):
         width = columns * step[0] + paper.overlap

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from warpflat.core.arrays import IntArray
-from warpflat.core.errors import InputError, expect, expect_callback, expect_each, nearest
+from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import polyline_length
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.fit_report import garment_wear
@@ -22,7 +22,6 @@ from warpflat.garment.ease import SeamWish, wished_seams
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
-from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece, FormSeam
@@ -106,17 +105,6 @@ class Garment:
             ease=1.0 / ratio - 1.0,
             price=price,
         )
-
-    def carrier(self, piece: str) -> Carrier:
-        """What carries points and drawn lines between a piece's pattern and the body, both ways.
-
-        Raises:
-            InputError: there is no such piece.
-        """
-        if piece not in self.pieces:
-            raise InputError(f"garment {self.name!r} has no piece {piece!r}; {nearest(piece, self.pieces)}")
-        flat = self.pieces[piece]
-        return Carrier(flat.surface.vertices, flat.positions, flat.faces)
 
     def _measures(self, name: str) -> dict[str, Any]:
         """The piece's measures, its energy also brick by brick."""

@@ -24,7 +24,6 @@ __all__ = [
     "FORMATS",
     "PatternOptions",
     "WrittenPattern",
-    "export_pattern",
     "export_patterns",
     "garment_files",
     "surface_files",
@@ -116,13 +115,6 @@ def surface_files(
     return _drawn(
         lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
     )
-
-
-def export_pattern(
-    folder: Path, format: str, *, dialect: str = "aama", paper: str = "A4", sizes: Sequence[str] | None = None
-) -> str:
-    """Write one file of a run's pattern again; as :func:`export_patterns`, of which it returns the only name."""
-    return export_patterns(folder, [format], dialect=dialect, paper=paper, sizes=sizes)[0]
 
 
 def export_patterns(

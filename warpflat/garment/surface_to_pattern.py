@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.flattening.applied_cut import seam_kind
 from warpflat.garment.edge_rules import EdgeRules, unused
 from warpflat.garment.to_pattern import grain_of
-from warpflat.pattern.from_mesh import line_labels, piece_from_mesh
+from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.cut.dart import fish_eye_measure
@@ -124,9 +124,11 @@ def _piece(result: Flattening, size: str) -> Piece:
         result.faces,
         result.positions,
         name=result.surface.name,
-        lines=result.network.surface.lines,
-        darts=darts,
-        eyes={title: np.union1d(seam.left, seam.right) for title, seam in eyes.items()},
+        features=MeshFeatures(
+            lines=result.network.surface.lines,
+            darts=darts,
+            fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in eyes.items()},
+        ),
         size=size,
         fabric=result.fabric.name,
     )

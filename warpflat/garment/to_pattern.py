@@ -22,6 +22,7 @@ from warpflat.garment.form_plan import (
     plan_form,
 )
 from warpflat.garment.mirror_pieces import find_mirror_pairs, sew_mirror_pairs
+from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
 
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
     from warpflat.garment.garment import Garment as FlatGarment
     from warpflat.mannequin.pieces import FormPiece
 
-__all__ = ["grain_of", "inner_lines", "pattern_of_garment"]
+__all__ = ["grain_of", "pattern_of_garment"]
 
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
@@ -115,8 +116,8 @@ def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = N
     return default_grain(outline @ turn.T) @ turn
 
 
-def inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
-    """The stretches of feature lines inside a piece, #P by 2 [m], without what runs along its border.
+def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: FloatArray) -> dict[str, FloatArray]:
+    """Return the stretches of feature lines inside a piece, #P by 2 [m]; a second stretch of a line is "NAME 2".
 
     Args:
         lines: vertex indices by name.
@@ -126,14 +127,8 @@ def inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: Floa
     edges = {(min(a, b), max(a, b)) for ids in border for a, b in pairwise(np.asarray(ids).tolist())}
     found: dict[str, FloatArray] = {}
     for name, line in lines.items():
-        runs: list[list[int]] = [[]]
-        for a, b in pairwise(np.asarray(line).tolist()):
-            if (min(a, b), max(a, b)) in edges:
-                runs.append([])
-            else:
-                runs[-1] += [b] if runs[-1] else [a, b]
-        for run in (run for run in runs if run):
-            found[unused(name, found)] = flat[run]
+        for stretch in inner_stretches(np.asarray(line), edges):
+            found[unused(name, found)] = flat[stretch]
     return found
 
 
@@ -173,14 +168,14 @@ def _piece(
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
     border = list(piece.edges.values())
-    along = inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
+    along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
         name=name,
         size=size,
         fabric=flat.fabric.name,
         quantity=quantity,
         edges=edges,
-        internal_lines=inner_lines(piece.surface.lines, border, flat.positions),
+        internal_lines=_inner_lines(piece.surface.lines, border, flat.positions),
         grain=grain_of(
             np.concatenate([edge.points[:-1] for edge in edges]),
             flat,

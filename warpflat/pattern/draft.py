@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length, resample
-from warpflat.pattern.allowance import WIDEST_DART, Side, Wedge, cut_hole, cut_outline
-from warpflat.pattern.curves import TOLERANCE, Curve, fit_curve
+from warpflat.core.polyline import arc_lengths
+from warpflat.pattern.allowance import cut_hole, cut_outline
+from warpflat.pattern.curves import TOLERANCE, Curve
 from warpflat.pattern.drafted import (
     DraftedCutout,
     DraftedDart,
@@ -23,22 +23,26 @@ from warpflat.pattern.drafted import (
     DrillHole,
     SeamReport,
 )
+from warpflat.pattern.drafted_darts import (
+    DartLegs,
+    dart_legs,
+    dart_line,
+    dart_notes,
+    fisheye_legs,
+    smooth_fisheye,
+)
 from warpflat.pattern.fitting import TOLERANCES, fit_edges, is_wavy, smooth_line
 from warpflat.pattern.label import Label, default_grain, place_label
 from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam_reports
-from warpflat.pattern.pieces import SAME_POINT, Dart, Edge, Garment, Hole, Piece, Seam
+from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
-from warpflat.surface.cut.dart_legs import are_curved
+from warpflat.pattern.sides import Side, Wedge
 
-__all__ = ["draft_garment", "draft_piece", "eye_legs", "nest_label"]
+__all__ = ["draft_garment", "draft_piece", "nest_label"]
 
 
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
 ALONG_GRAIN = np.radians(1.0)
-#: Allowance [m] of the legs of a dart that is cut away, where they name none, and what there is to be cut away between both.
-LEG, BETWEEN = 0.010, 0.005
-#: Points of the fold between curved legs.
-MIDDLE = 33
 
 
 def draft_garment(
@@ -61,9 +65,9 @@ def draft_garment(
     drafted: dict[str, tuple[DraftedPiece, ...]] = {}
     reports: list[SeamReport] = []
     for size in chosen:
-        drawn = _fitted(garment.pieces[size], garment.seams, tolerance)
+        edges = _fitted_edges(garment.pieces[size], garment.seams, tolerance)
         pieces = {
-            piece.name: _draft(piece, garment.name, drawn[piece.name], tolerance) for piece in garment.pieces[size]
+            piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
         }
         notches = seam_notches([*garment.seams, *cut_darts(pieces)], pieces)
         drafted[size] = tuple(
@@ -74,59 +78,27 @@ def draft_garment(
 
 
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
-    """Draft one piece on its own: every line but the notches that its seams would give it."""
-    return _draft(piece, garment, _fitted([piece], (), tolerance)[piece.name], tolerance)
+    """Draft one piece on its own, without the notches that its seams would give it."""
+    return _draft(piece, garment, _fitted_edges([piece], (), tolerance)[piece.name], tolerance)
 
 
 def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance: float | None) -> DraftedPiece:
+    """Draft one piece whose edges are fitted: cut line, darts, holes, lines, label and notes."""
     frame = _frame(piece)
-    wedges, darts = _darts(piece, edges)
-    edges = tuple(_widened(edge, piece, darts) for edge in edges)
-    cut = cut_outline(_sides(piece, edges, wedges))
-    notes = [*cut.notes]
-    smoothed = [edge for edge in edges if tolerance is None and edge.tolerance > TOLERANCE]
-    if wavy := [edge.name for edge in smoothed if is_wavy(edge.curve)]:
-        notes.append(
-            f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
-            f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
-        )
-    for dart in piece.darts:
-        left, right = (next(e for e in edges if e.name == leg) for leg in (dart.left, dart.right))
-        if abs(left.length - right.length) > SEAM_TOLERANCE:
-            notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
-        if not darts[dart.name] and left.width > 0:
-            notes.append(
-                f"dart {dart.name} is cut away, not folded: {_why_cut(dart, left, right)}; sew its legs as a seam"
-            )
-        if darts[dart.name] and dart.cut:
-            notes.append(
-                f"dart {dart.name} is folded, not cut away: its mouth of {_mouth(left, right) * 1000:.0f} mm has no room for the "
-                f"allowances of its legs, which bend by {_bend(left, right) * 1000:.0f} mm; pin leg on leg"
-            )
-    drafted_darts = tuple(_dart_lines(dart, wedges, edges, cut.points) for dart in piece.darts)
+    darts = dart_legs(piece, edges)
+    drafted_legs = {leg.name: leg for legs in darts.values() for leg in (legs.left, legs.right)}
+    edges = tuple(drafted_legs.get(edge.name, edge) for edge in edges)
+    cut = cut_outline(_sides(edges, darts))
+    drafted_darts = tuple(dart_line(legs, cut.points) for legs in darts.values())
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
-    fisheyes = {hole.name: _fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
+    fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
     cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
-    notes += [
-        f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
-        for hole in piece.holes
-        if hole.name in cutouts and cutouts[hole.name].width < hole.width
-    ]
-    for name, line in fisheyes.items():
-        first, second = eye_legs(line)
-        apart = abs(polyline_length(first) - polyline_length(second))
-        if apart > SEAM_TOLERANCE:
-            notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
-    drills = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in drafted_darts]
-    drills += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in eye_legs(line)[0][[0, -1]]]
     internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
     internal = {name: smooth_line(line) if tolerance is None else line for name, line in internal.items()}
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
     obstacles = [grain, *internal.values()]
-    obstacles += [np.concatenate([_line(edges, d.left), _line(edges, d.right)]) for d in piece.darts]
-    folds = [edge.line for edge in edges if edge.kind == "fold"]
-    # Whether a dart's legs have an allowance is known only now.
+    obstacles += [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     return DraftedPiece(
         piece=piece,
@@ -134,19 +106,75 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         edges=edges,
         cut_line=cut.points,
         darts=drafted_darts,
-        drill_holes=tuple(drills),
-        notches=dart_notches(piece, wedges, cut),
+        drill_holes=_drill_holes(drafted_darts, fisheyes),
+        notches=dart_notches(piece, _wedges(darts), cut),
         internal_lines=internal,
         cutouts=cutouts,
         fisheyes=fisheyes,
         grain=grain,
-        label=place_label(widened, garment, (sew_line, cut.points), list(holes.values()), obstacles, folds),
-        notes=tuple(notes),
+        label=place_label(
+            widened,
+            garment,
+            (sew_line, cut.points),
+            list(holes.values()),
+            obstacles,
+            [edge.line for edge in edges if edge.kind == "fold"],
+        ),
+        notes=(
+            *cut.notes,
+            *_ragged_edges(edges, tolerance),
+            *(note for legs in darts.values() for note in dart_notes(legs)),
+            *_small_cutouts(piece, cutouts),
+            *_uneven_fisheyes(fisheyes),
+        ),
     )
 
 
+def _wedges(darts: Mapping[str, DartLegs]) -> dict[str, Wedge]:
+    """Return the darts that are folded."""
+    return {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}
+
+
+def _drill_holes(darts: Sequence[DraftedDart], fisheyes: Mapping[str, FloatArray]) -> tuple[DrillHole, ...]:
+    """Return the tips of all darts, which are marked through the cloth."""
+    holes = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts]
+    holes += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]]
+    return tuple(holes)
+
+
+def _ragged_edges(edges: Sequence[DraftedEdge], tolerance: float | None) -> list[str]:
+    """Return a note on the edges that even the widest tolerance leaves wavy."""
+    smoothed = [edge for edge in edges if tolerance is None and edge.tolerance > TOLERANCE]
+    wavy = [edge.name for edge in smoothed if is_wavy(edge.curve)]
+    if not wavy:
+        return []
+    return [
+        f"the border stays ragged at {', '.join(wavy)}: no smooth line of the right length keeps within "
+        f"{TOLERANCES[-1] * 1000:.0f} mm of it; a cut along the rows of the mesh, or a finer mesh, may help"
+    ]
+
+
+def _small_cutouts(piece: Piece, cutouts: Mapping[str, DraftedCutout]) -> list[str]:
+    """Return notes on the holes that are too small for their allowance."""
+    return [
+        f"{hole.name} is too small for an allowance of {hole.width * 1000:g} mm: it is cut on its sewing line"
+        for hole in piece.holes
+        if hole.name in cutouts and cutouts[hole.name].width < hole.width
+    ]
+
+
+def _uneven_fisheyes(fisheyes: Mapping[str, FloatArray]) -> list[str]:
+    """Return notes on the fish-eye darts whose sides differ in length."""
+    notes = []
+    for name, line in fisheyes.items():
+        apart = abs(float(np.subtract(*(arc_lengths(leg)[-1] for leg in fisheye_legs(line)))))
+        if apart > SEAM_TOLERANCE:
+            notes.append(f"dart {name}: its sides differ by {apart * 1000:.1f} mm")
+    return notes
+
+
 def _frame(piece: Piece) -> FloatArray:
-    """Turns the grain upwards and brings the fixed point of grading into the origin.
+    """Return the map (2 by 3) that turns the grain upwards and brings the fixed point of grading into the origin.
 
     The fixed point is the lower end of the fold, else of the longest straight edge along the grain (a centre back),
     else the middle of the lower border.
@@ -174,13 +202,14 @@ def _frame(piece: Piece) -> FloatArray:
 
 
 def _moved(points: FloatArray, frame: FloatArray) -> FloatArray:
+    """Map points (#P by 2 [m]) into the frame."""
     return points @ frame[:, :2].T + frame[:, 2]
 
 
-def _fitted(
+def _fitted_edges(
     pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None
 ) -> dict[str, tuple[DraftedEdge, ...]]:
-    """The edges of all pieces as curves, by piece."""
+    """Return the edges of all pieces as curves, by piece."""
     lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
@@ -195,11 +224,12 @@ def _fitted(
 
 
 def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: FloatArray) -> DraftedEdge:
+    """Return an edge with its curve, and the places of its points along that."""
     import shapely
 
     line, marks = curve.sample(), shapely.points(points)
     drawn = shapely.LineString(line)
-    # Not the nearest place anywhere: a border that nearly touches itself must not jump.
+    # Places rise along the line: where a border nearly touches itself, the nearest place may be on its other part.
     places = np.maximum.accumulate(shapely.line_locate_point(drawn, marks))
     places[[0, -1]] = 0.0, drawn.length
     fit_error = float(shapely.distance(drawn, marks).max())
@@ -208,108 +238,21 @@ def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: FloatArray
     )
 
 
-def _darts(piece: Piece, edges: tuple[DraftedEdge, ...]) -> tuple[dict[str, Wedge], dict[str, bool]]:
-    """The darts that are folded, and by name whether each is."""
-    wedges, folded = {}, {}
-    for dart in piece.darts:
-        left, right = _line(edges, dart.left), _line(edges, dart.right)
-        wedge = Wedge(name=dart.name, left=left, right=right, fold_to=dart.fold_to or _fold_to(left, right))
-        legs = [next(e for e in edges if e.name == name) for name in (dart.left, dart.right)]
-        # Legs that are one line (a dart of no width) have nothing to fold.
-        folded[dart.name] = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and _has_room(*legs))
-        if folded[dart.name]:
-            wedges[dart.name] = wedge
-    return wedges, folded
-
-
-def _has_room(left: DraftedEdge, right: DraftedEdge) -> bool:
-    """Whether a dart's mouth is so wide that there is something to cut away between its legs' allowances."""
-    widths = _leg_width(left) + _leg_width(right)
-    return widths == 0 or _mouth(left, right) >= widths + BETWEEN
-
-
-def _leg_width(leg: DraftedEdge) -> float:
-    return LEG if leg.edge.allowance is None else leg.edge.allowance
-
-
-def _mouth(left: DraftedEdge, right: DraftedEdge) -> float:
-    """How far [m] a dart opens at the border."""
-    return float(np.linalg.norm(left.line[0] - right.line[-1]))
-
-
-def _fold_to(left: FloatArray, right: FloatArray) -> str:
-    tip = left[-1]
-    away = (left[0] + right[-1]) / 2 - tip
-    if abs(away[0]) > abs(away[1]):
-        return "left" if left[0, 1] < right[-1, 1] else "right"
-    return "left" if abs(left[0, 0]) < abs(right[-1, 0]) else "right"
-
-
-def _widened(edge: DraftedEdge, piece: Piece, folded: Mapping[str, bool]) -> DraftedEdge:
-    """The legs of a dart that is cut out are seams, with a seam's allowance if they name none."""
-    if edge.kind != "dart":
-        return edge
-    dart = next(d for d in piece.darts if edge.name in (d.left, d.right))
-    if folded[dart.name]:
-        return replace(edge, width=0.0)
-    return replace(edge, width=_leg_width(edge))
-
-
-def _sides(piece: Piece, edges: tuple[DraftedEdge, ...], wedges: Mapping[str, Wedge]) -> list[Side | Wedge]:
-    by_left = {dart.left: dart for dart in piece.darts if dart.name in wedges}
-    by_right = {dart.right for dart in by_left.values()}
+def _sides(edges: Sequence[DraftedEdge], darts: Mapping[str, DartLegs]) -> list[Side | Wedge]:
+    """Return the outline in order; a wedge stands for both legs of a folded dart."""
+    folded = {legs.dart.left: legs.wedge for legs in darts.values() if legs.wedge is not None}
+    right_legs = {legs.dart.right for legs in darts.values() if legs.wedge is not None}
     sides: list[Side | Wedge] = []
     for edge in edges:
-        if edge.name in by_left:
-            sides.append(wedges[by_left[edge.name].name])
-        elif edge.name not in by_right:
+        if edge.name in folded:
+            sides.append(folded[edge.name])
+        elif edge.name not in right_legs:
             sides.append(Side(name=edge.name, points=edge.line, width=edge.width, kind=edge.kind))
     return sides
 
 
-def _dart_lines(
-    dart: Dart, wedges: Mapping[str, Wedge], edges: tuple[DraftedEdge, ...], cut_line: FloatArray
-) -> DraftedDart:
-    import shapely
-
-    left, right = _line(edges, dart.left), _line(edges, dart.right)
-    wedge = wedges.get(dart.name)
-    opening = float(np.linalg.norm(left[0] - right[-1]))
-    if wedge is None:
-        return DraftedDart(dart=dart, tip=left[-1], fold=None, fold_to="", opening=opening)
-    reach = float(np.linalg.norm(cut_line - wedge.tip, axis=1).max()) + 0.01
-    ray = shapely.LineString([wedge.tip, wedge.tip + reach * wedge.middle]).intersection(shapely.Polygon(cut_line))
-    parts = [part for part in shapely.get_parts(ray) if part.length > 0]
-    first = min(parts, key=lambda part: part.distance(shapely.Point(wedge.tip)))
-    ends = np.asarray(first.coords)[[0, -1]]
-    far = ends[np.argmax(np.linalg.norm(ends - wedge.tip, axis=1))]
-    fold = np.stack([wedge.tip, far])
-    if are_curved(left, right):
-        fold = np.concatenate([_between(left[::-1], right), fold[1:]])
-    return DraftedDart(dart=dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=opening)
-
-
-def _between(first: FloatArray, second: FloatArray) -> FloatArray:
-    """The middle line of two lines with one start, by shares of their lengths."""
-    shares = np.linspace(0.0, 1.0, MIDDLE)
-    return (resample(first, shares) + resample(second, shares)) / 2
-
-
-def _line(edges: tuple[DraftedEdge, ...], name: str) -> FloatArray:
-    return next(edge.line for edge in edges if edge.name == name)
-
-
-def eye_legs(line: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """The two sides (#P by 2 [m]) of a fish-eye dart's closed line, both from its lower tip to its upper one."""
-    distance = np.linalg.norm(line[:, None] - line[None], axis=2)
-    a, b = sorted(map(int, np.unravel_index(int(distance.argmax()), distance.shape)))
-    first, second = line[a : b + 1], np.concatenate([line[b:], line[: a + 1]])
-    if tuple(first[0, ::-1]) > tuple(first[-1, ::-1]):
-        return second, first[::-1]
-    return first, second[::-1]
-
-
 def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
+    """Return the sewing and the cutting line of a hole; one line if it is too small for an allowance."""
     line = cut_hole(points, hole.width)
     if line is None:
         return DraftedCutout(sew_line=points, cut_line=points, width=0.0)
@@ -317,7 +260,7 @@ def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:
-    """What is written on sizes that lie upon each other: the middle one's label, beside all if it stands beside it."""
+    """Return the label of sizes that lie upon each other: the middle one's, moved beside all if it stands beside its piece."""
     middle = pieces[len(pieces) // 2]
     if middle.label.leader is None:
         return middle.label
@@ -325,23 +268,3 @@ def nest_label(pieces: Sequence[DraftedPiece]) -> Label:
     away = np.array([right - float(middle.cut_line[:, 0].max()), 0.0])
     start, end = middle.label.leader
     return replace(middle.label, at=middle.label.at + away, leader=np.stack([start + away, end]))
-
-
-def _fisheye(points: FloatArray, tolerance: float | None) -> FloatArray:
-    """Its closed line with both sides as clean curves, the first point not repeated."""
-    first, second = (fit_curve(leg, tolerance or TOLERANCE).sample() for leg in eye_legs(points))
-    return np.concatenate([first[:-1], second[:0:-1]])
-
-
-def _why_cut(dart: Dart, left: DraftedEdge, right: DraftedEdge) -> str:
-    return f"its legs bend by {_bend(left, right) * 1000:.0f} mm" if dart.cut else "it opens too wide"
-
-
-def _bend(left: DraftedEdge, right: DraftedEdge) -> float:
-    """How far [m] the legs of a dart leave their chords."""
-    import shapely
-
-    return max(
-        float(shapely.distance(shapely.LineString(e.line[[0, -1]]), shapely.points(e.line)).max())
-        for e in (left, right)
-    )

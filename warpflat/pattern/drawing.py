@@ -1,4 +1,4 @@
-"""A drafted piece as strokes and words: what every picture of it shows, whatever the file format."""
+"""A drafted piece as strokes and words: what it shows in every file format."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length, resample
+from warpflat.core.polyline import arc_lengths, resample
 from warpflat.pattern.curves import Curve, fit_curve
-from warpflat.pattern.draft import eye_legs, nest_label
+from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
+from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import Label
 from warpflat.pattern.lettering import Words, text_width
 
 if TYPE_CHECKING:
-    from shapely import Polygon
+    from shapely import Geometry, Polygon
 
 __all__ = ["Drawing", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
 
@@ -28,7 +29,7 @@ ARROW, BARB = 0.006, 0.002
 BRACKET = 0.014
 #: Height [m] of capitals of an internal line's name, and the distance of its middle from the line.
 NAME, NAME_GAP = 0.0024, 0.0028
-#: Such a name keeps at least so far [m] from all else; height of letters with tails below, over that of capitals.
+#: Least distance [m] of such a name from all else; height of letters with tails below, over that of capitals.
 CLEAR, CAPITALS_AND_TAILS = 0.0004, 1.6
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
@@ -36,16 +37,15 @@ DRILL = 0.002
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Stroke:
-    """One line.
+    """One line of a drawing.
 
     Attributes:
-        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout",
-            "leader".
-        name: what it is called in files, unique among the strokes of a piece; empty for mere decoration.
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout", "leader".
+        name: what it is called in files, unique among the strokes of a piece; empty for decoration.
         points: #P by 2 [m].
         closed: the last point joins the first.
-        curve: the same line as Béziers, where there is one.
-        hidden: not to be seen, but named and kept in files that can keep what is not seen.
+        curve: the line as Béziers, where there are such.
+        hidden: not visible, but named and kept in files that can keep hidden lines.
     """
 
     role: str
@@ -66,49 +66,49 @@ class Drawing:
 
 
 def draw_piece(piece: DraftedPiece) -> Drawing:
-    """Everything that one piece in one size shows."""
+    """Draw one piece in one size."""
     strokes = [
-        _cut(piece),
-        *(_edge(edge) for edge in piece.edges),
-        *_around_cutouts(piece),
-        *_details(piece),
+        _cut_stroke(piece),
+        *(_edge_stroke(edge) for edge in piece.edges),
+        *_cutout_sew_strokes(piece),
+        *_detail_strokes(piece),
         *grain_strokes(piece.grain),
-        *_internal(piece),
-        *_leader(piece.label),
+        *_internal_strokes(piece),
+        *_leader_strokes(piece.label),
     ]
     words = [*piece.label.words(), *_line_names(piece)]
     for edge in piece.fold_edges:
-        fold_strokes, fold_words = _bracket(edge)
+        fold_strokes, fold_words = _fold_bracket(edge)
         strokes += fold_strokes
         words += fold_words
     return Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words))
 
 
 def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
-    """One piece in all its sizes, one upon the other: cut lines, darts and notches of each; label and grain once.
+    """Draw one piece in all its sizes upon each other: cut lines, darts and notches of each; label and grain once.
 
-    The sewing lines of so many sizes would be a thicket: they are hidden.
+    The sewing lines of several sizes would be a thicket: they are hidden.
     """
     if len(pieces) == 1:
         return (draw_piece(pieces[0]),)
     drawings = []
     middle = len(pieces) // 2
-    edge = _telling_edge(pieces)
+    edge = _most_graded_edge(pieces)
     for index, piece in enumerate(pieces):
         strokes = [
-            _cut(piece),
-            *(replace(_edge(e), hidden=e.kind not in ("dart", "fold")) for e in piece.edges),
-            *(replace(line, hidden=True) for line in _around_cutouts(piece)),
-            *_details(piece),
+            _cut_stroke(piece),
+            *(replace(_edge_stroke(e), hidden=e.kind not in ("dart", "fold")) for e in piece.edges),
+            *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
+            *_detail_strokes(piece),
         ]
         words: list[Words] = []
         if index == middle:
             label = nest_label(pieces)
-            strokes += [*grain_strokes(piece.grain), *_internal(piece), *_leader(label)]
+            strokes += [*grain_strokes(piece.grain), *_internal_strokes(piece), *_leader_strokes(label)]
             sizes = ", ".join(p.size for p in pieces)
-            words += [*_of_all_sizes(label, piece.size, sizes), *_line_names(piece, borders=False)]
+            words += [*_list_sizes(label, piece.size, sizes), *_line_names(piece, borders=False)]
             for fold in piece.fold_edges:
-                fold_strokes, fold_words = _bracket(fold)
+                fold_strokes, fold_words = _fold_bracket(fold)
                 strokes += fold_strokes
                 words += fold_words
         drawings.append(
@@ -117,17 +117,17 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
     return tuple(drawings)
 
 
-def _cut(piece: DraftedPiece) -> Stroke:
+def _cut_stroke(piece: DraftedPiece) -> Stroke:
     return Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)
 
 
-def _edge(edge: DraftedEdge) -> Stroke:
+def _edge_stroke(edge: DraftedEdge) -> Stroke:
     role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
     return Stroke(role=role, name=edge.name, points=edge.line, curve=edge.curve)
 
 
-def _around_cutouts(piece: DraftedPiece) -> list[Stroke]:
-    """The sewing lines of holes that have an allowance."""
+def _cutout_sew_strokes(piece: DraftedPiece) -> list[Stroke]:
+    """Return the sewing lines of holes that have an allowance."""
     return [
         Stroke(role="sew", name=f"{name}.sew", points=cutout.sew_line, closed=True)
         for name, cutout in piece.cutouts.items()
@@ -135,14 +135,14 @@ def _around_cutouts(piece: DraftedPiece) -> list[Stroke]:
     ]
 
 
-def _details(piece: DraftedPiece) -> list[Stroke]:
+def _detail_strokes(piece: DraftedPiece) -> list[Stroke]:
     strokes = [
         Stroke(role="dart_fold", name=f"{dart.dart.name}.fold", points=dart.fold)
         for dart in piece.darts
         if dart.fold is not None
     ]
     for index, notch in enumerate(piece.notches):
-        strokes += _slits(notch, index)
+        strokes += _notch_strokes(notch, index)
     for hole in piece.drill_holes:
         turn = np.linspace(0, 2 * np.pi, 17)[:-1]
         ring = hole.at + DRILL * np.column_stack([np.cos(turn), np.sin(turn)])
@@ -154,7 +154,7 @@ def _details(piece: DraftedPiece) -> list[Stroke]:
         Stroke(role="cutout", name=name, points=cutout.cut_line, closed=True) for name, cutout in piece.cutouts.items()
     ]
     for name, line in piece.fisheyes.items():
-        left, right = eye_legs(line)
+        left, right = fisheye_legs(line)
         strokes += [
             Stroke(role="dart", name=f"{name}.left", points=left),
             Stroke(role="dart", name=f"{name}.right", points=right),
@@ -163,7 +163,7 @@ def _details(piece: DraftedPiece) -> list[Stroke]:
     return strokes
 
 
-def _slits(notch: Notch, index: int) -> list[Stroke]:
+def _notch_strokes(notch: Notch, index: int) -> list[Stroke]:
     strokes = []
     for slit, base in enumerate(notch.base):
         name = f"notch{index}.{notch.seam}" + (f".{slit}" if notch.double else "")
@@ -171,64 +171,84 @@ def _slits(notch: Notch, index: int) -> list[Stroke]:
     return strokes
 
 
-def _internal(piece: DraftedPiece) -> list[Stroke]:
+def _internal_strokes(piece: DraftedPiece) -> list[Stroke]:
     return [
-        Stroke(role="internal", name=name, points=line, curve=_fitted(line.tobytes()))
+        Stroke(role="internal", name=name, points=line, curve=_fit_internal_line(line.tobytes()))
         for name, line in piece.internal_lines.items()
     ]
 
 
 @lru_cache(maxsize=1024)
-def _fitted(line: bytes) -> Curve:
-    """The curve through an internal line: every file asks for it anew."""
+def _fit_internal_line(line: bytes) -> Curve:
+    """Fit a curve to an internal line; cached, since every file asks for it."""
     return fit_curve(np.frombuffer(line).reshape(-1, 2))
 
 
 def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
-    """The names of edges, darts and internal lines, along them, where they have room and keep clear of all else.
+    """Place the names of edges, darts and internal lines along them, where they have room and keep clear of all else.
 
     An edge's name stands inside the sewing line, a dart's beside its first leg. Without `borders` edges have none.
     """
     import shapely
 
-    taken = [
+    lines = _named_lines(piece, borders=borders)
+    drawn = [shapely.LineString(line) for _, line, _ in lines]
+    obstacles = _name_obstacles(piece)
+    words = []
+    for index, (name, line, inwards) in enumerate(lines):
+        others = shapely.union_all([*obstacles, *(other for key, other in enumerate(drawn) if key != index)])
+        placed = _place_name(name, line, others, inwards=inwards)
+        if placed is not None:
+            words.append(placed)
+            obstacles.append(_text_box(placed))
+    return words
+
+
+def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, FloatArray, bool]]:
+    """Return the lines that get a name: the name, its line, and whether it stands to the left of the line."""
+    first_legs = {dart.dart.left: dart.dart.name for dart in piece.darts}
+    second_legs = {dart.dart.right for dart in piece.darts}
+    lines = [(name, line, False) for name, line in piece.internal_lines.items()]
+    for edge in piece.edges:
+        if edge.name in first_legs:
+            lines.append((first_legs[edge.name], edge.line, True))
+        elif borders and edge.kind != "fold" and edge.name not in second_legs:
+            lines.append((edge.name, edge.line, True))
+    return lines + [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+
+
+def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:
+    """Return what names keep clear of besides other lines: the label, drill holes, cutouts and the grain."""
+    import shapely
+
+    return [
         *([shapely.Polygon(piece.label.box)] if piece.label.leader is None else []),
         *(shapely.Point(hole.at).buffer(2 * DRILL) for hole in piece.drill_holes),
         *(shapely.LinearRing(cutout.sew_line) for cutout in piece.cutouts.values()),
         *(shapely.LineString(stroke.points) for stroke in grain_strokes(piece.grain)),
     ]
-    legs = {leg: dart.dart for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)}
-    lines = [(name, line, False) for name, line in piece.internal_lines.items()]
-    for edge in piece.edges:
-        dart = legs.get(edge.name)
-        if edge.name == dart.left if dart is not None else borders and edge.kind != "fold":
-            lines.append((edge.name if dart is None else dart.name, edge.line, True))
-    lines += [(name, eye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
-    drawn = {index: shapely.LineString(line) for index, (_, line, _) in enumerate(lines)}
-    words = []
-    for index, (name, line, border) in enumerate(lines):
-        length, half = polyline_length(line), text_width(name, NAME) / 2
-        if length < 2 * half + (0.008 if border else 0.02):
+
+
+def _place_name(name: str, line: FloatArray, obstacles: Geometry, *, inwards: bool) -> Words | None:
+    """Return a name at the place along its line that is clearest of all obstacles; None where there is no room."""
+    length, half = arc_lengths(line)[-1], text_width(name, NAME) / 2
+    if length < 2 * half + (0.008 if inwards else 0.02):
+        return None
+    clear, chosen = CLEAR, None
+    for share in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
+        if not half <= share * length <= length - half:
             continue
-        others = shapely.union_all([*taken, *(other for key, other in drawn.items() if key != index)])
-        clear, chosen = CLEAR, None
-        for tried in (0.25, 0.2, 0.3, 0.15, 0.35, 0.4, 0.1, 0.6, 0.7, 0.8, 0.5):
-            if not half <= tried * length <= length - half:
-                continue
-            there = _words_along(name, line, tried, half, inwards=border)
-            distance = float(others.distance(_ground(there)))
-            if distance > clear:
-                clear, chosen = distance, there
-            if clear > 0.006:
-                break
-        if chosen is not None:
-            words.append(chosen)
-            taken.append(_ground(chosen))
-    return words
+        words = _words_along(name, line, share, half, inwards=inwards)
+        distance = float(obstacles.distance(_text_box(words)))
+        if distance > clear:
+            clear, chosen = distance, words
+        if clear > 0.006:
+            break
+    return chosen
 
 
-def _ground(words: Words) -> Polygon:
-    """The box that words cover."""
+def _text_box(words: Words) -> Polygon:
+    """Return the box that words cover."""
     import shapely
 
     half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * CAPITALS_AND_TAILS]) / 2
@@ -238,8 +258,8 @@ def _ground(words: Words) -> Polygon:
 
 
 def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
-    """A name beside a line, upright: above it, or to its left as the line runs, where a border has the piece."""
-    length = max(polyline_length(line), 1e-12)
+    """Write a name beside a line, upright: above it, or to its left where the line is a border, so that it stands inside."""
+    length = max(float(arc_lengths(line)[-1]), 1e-12)
     near, far = resample(line, share - half / length), resample(line, share + half / length)
     along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
     left = np.array([-along[1], along[0]])
@@ -255,7 +275,7 @@ def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwa
 
 
 def grain_strokes(grain: FloatArray) -> list[Stroke]:
-    """The grain line (2 by 2 [m]) with an arrow at either end."""
+    """Draw the grain line (2 by 2 [m]) with an arrow at either end."""
     low, high = grain
     strokes = [Stroke(role="grain", name="grain", points=grain)]
     strokes += [_arrow(high, high - low, "grain"), _arrow(low, low - high, "grain")]
@@ -269,8 +289,8 @@ def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
     return Stroke(role=role, name="", points=points)
 
 
-def _bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
-    """A line beside the fold whose two arms point to it, with words along it."""
+def _fold_bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
+    """Draw a line beside the fold whose two arms point to it, with words along it."""
     start, end = edge.line[0], edge.line[-1]
     span = end - start
     length = float(np.linalg.norm(span))
@@ -288,12 +308,12 @@ def _bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
     return strokes, [words]
 
 
-def _leader(label: Label) -> list[Stroke]:
+def _leader_strokes(label: Label) -> list[Stroke]:
     return [] if label.leader is None else [Stroke(role="leader", name="", points=label.leader)]
 
 
-def _of_all_sizes(label: Label, size: str, sizes: str) -> list[Words]:
-    """The label's words with all sizes for its own, no wider than the label is."""
+def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
+    """Return the label's words with all sizes in place of its own, no wider than the label is."""
     words = label.words()
     for index, row in enumerate(words):
         if row.text == f"Size {size}":
@@ -303,10 +323,10 @@ def _of_all_sizes(label: Label, size: str, sizes: str) -> list[Words]:
     return words
 
 
-def _telling_edge(pieces: tuple[DraftedPiece, ...]) -> str:
-    """The edge on which the sizes lie farthest apart: there a size can be read off its own line."""
+def _most_graded_edge(pieces: tuple[DraftedPiece, ...]) -> str:
+    """Return the edge on which the sizes lie farthest apart: there a size is easiest to read off its own line."""
 
-    def spread(name: str) -> float:
+    def shift_across(name: str) -> float:
         middles = [resample(piece.edge(name).line, 0.5) for piece in (pieces[0], pieces[-1])]
         start, end = pieces[0].edge(name).line[[0, -1]]
         along = (end - start) / max(float(np.linalg.norm(end - start)), 1e-12)
@@ -315,11 +335,11 @@ def _telling_edge(pieces: tuple[DraftedPiece, ...]) -> str:
 
     names = [e.name for e in pieces[0].edges if e.kind not in ("fold", "dart")]
     shared = [name for name in names if all(name in {e.name for e in piece.edges} for piece in pieces)]
-    return max(shared, key=lambda name: spread(name) * pieces[0].edge(name).length ** 0.5, default="")
+    return max(shared, key=lambda name: shift_across(name) * pieces[0].edge(name).length ** 0.5, default="")
 
 
 def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:
-    """The size on its own cut line, staggered along an edge so that the tags of neighbouring sizes do not collide."""
+    """Write the size on its own cut line, staggered along an edge so that the tags of neighbouring sizes do not collide."""
     import shapely
 
     if not edge:

@@ -1,4 +1,4 @@
-"""What is written on a piece and where there is room for it; the grain line of a piece that names none."""
+"""The label of a piece: its text, and where there is room for it; the grain line of a piece that names none."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ __all__ = ["LEADING", "Label", "default_grain", "fit_label", "label_lines", "pla
 
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
 TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
-#: Labels keep so far [m] from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
-#: are 16 mm wide; the second where there is little room.
+#: Distances [m] of labels from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
+#: are 16 mm wide; the second row holds where there is little room.
 CLEARANCES = ((0.004, 0.006, 0.022), (0.0015, 0.0025, 0.0165))
-#: Labels on a piece are at least so large, of their full size; below they stand beside it. With less room than
-#: ENOUGH asks for they come nearer to lines.
+#: Smallest share of its full size at which a label stands on its piece, not beside it; below the second share it may come
+#: nearer to lines.
 LEAST, ENOUGH = 0.3, 0.6
 #: A label beside its piece: its size, its greatest width [m], its distance from the piece [m], and how far [m] its
 #: leader reaches into the cloth.
-BESIDE, BESIDE_WIDTH, BESIDE_GAP, LEADER = 0.6, 0.075, 0.010, 0.005
+BESIDE_SIZE, BESIDE_WIDTH, BESIDE_GAP, LEADER = 0.6, 0.075, 0.010, 0.005
 #: Room is sought by ellipses of these ratios of height to width: labels are wide, wrapped ones less so.
 ELLIPSES = (0.4, 0.15, 1.0)
-#: How much larger a label must get by being turned, by one more line break, by a name no larger than the rest.
+#: Factor by which a label must get larger to be turned, to have one more line break, to have a name as small as the rest.
 TURNED, BROKEN, SMALL_TITLE = 1.25, 1.06, 1.15
 #: Lines may be broken at these shares of the widest one.
 BREAKS = (0.75, 0.55, 0.4, 0.28)
@@ -44,9 +44,9 @@ class Label:
 
     Attributes:
         at: the centre [m].
-        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts rows of one.
+        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts the rows of a line.
         angle: [rad] counter-clockwise.
-        leader: where it stands beside its piece, 2 by 2 [m] from the label to the cloth; None where it stands on it.
+        leader: 2 by 2 [m], from a label beside its piece to the cloth; None where the label stands on the piece.
     """
 
     at: FloatArray
@@ -61,63 +61,67 @@ class Label:
 
     @property
     def height(self) -> float:
-        """Of the whole block [m], along its own upright."""
+        """Height of the whole block [m], at right angles to its lines."""
         return sum(height * LEADING for _, height, _ in self.rows)
 
     @property
     def width(self) -> float:
-        """Of the widest row [m]."""
+        """Width of the widest row [m]."""
         return max(text_width(text, height, bold=bold) for text, height, bold in self.rows)
 
     @property
     def box(self) -> FloatArray:
-        """4 by 2 [m], the corners of the block."""
+        """Corners of the block, 4 by 2 [m]."""
         half = np.array([self.width, self.height]) / 2
-        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ _turn(self.angle).T
+        return self.at + half * [[-1, -1], [1, -1], [1, 1], [-1, 1]] @ _rotation(self.angle).T
 
     def words(self) -> list[Words]:
-        """Each row at its place."""
+        """Return each row at its place."""
         words, y = [], self.height / 2
         for text, height, bold in self.rows:
             y -= height * LEADING
-            at = self.at + _turn(self.angle) @ [0.0, y + height * LEADING / 2]
+            at = self.at + _rotation(self.angle) @ [0.0, y + height * LEADING / 2]
             words.append(Words(text=text, at=at, height=height, angle=self.angle, bold=bold))
         return words
 
     def scaled(self, factor: float) -> Label:
-        """Of another size, about its centre."""
+        """Return the label in another size, about its centre."""
         return replace(self, lines=tuple((text, height * factor) for text, height in self.lines))
 
 
 def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
-    """Name, size, how to cut it, cloth, garment and which allowances are included.
-
-    Legs of darts that have an allowance are cut, and sewn as a seam.
-    """
-    if piece.on_fold:
-        cut = f"Cut {piece.quantity} on fold"
-    elif piece.quantity % 2 == 0 and piece.paired:
-        half = piece.quantity // 2
-        cut = f"Cut {piece.quantity}, {half} mirrored"
-    else:
-        cut = f"Cut {piece.quantity}"
+    """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
     lines = [piece.name.replace("_", " ").upper()]
     if piece.size:
         words = size_words(piece.size)
         lines.append(words[0].upper() + words[1:])
-    lines.append(cut + (f" - {piece.fabric}" if piece.fabric else ""))
-    widths = {}
-    for kind in ("seam", "hem"):
-        own = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
-        values = sorted({round(e.width * 1000, 1) for e in own})
-        if values:
-            widths[kind] = "/".join(f"{v:g}" for v in values) + " mm"
-    if widths:
-        lines.append("Includes " + ", ".join(f"{kind} {text}" for kind, text in widths.items()))
+    lines.append(_cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
+    if allowances := _allowance_words(piece):
+        lines.append(f"Includes {allowances}")
     title = garment.replace("_", " ")
     if title.upper() != lines[0]:
         lines.append(title)
     return tuple(lines)
+
+
+def _cutting_words(piece: Piece) -> str:
+    """Return how often a piece is cut, and how."""
+    if piece.on_fold:
+        return f"Cut {piece.quantity} on fold"
+    if piece.quantity % 2 == 0 and piece.paired:
+        return f"Cut {piece.quantity}, {piece.quantity // 2} mirrored"
+    return f"Cut {piece.quantity}"
+
+
+def _allowance_words(piece: Piece) -> str:
+    """Return the allowances of seams and hems; the legs of a dart that is cut away are sewn as a seam."""
+    words = []
+    for kind in ("seam", "hem"):
+        own = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
+        values = sorted({round(e.width * 1000, 1) for e in own})
+        if values:
+            words.append(f"{kind} {'/'.join(f'{v:g}' for v in values)} mm")
+    return ", ".join(words)
 
 
 def place_label(
@@ -128,15 +132,15 @@ def place_label(
     obstacles: Sequence[FloatArray],
     folds: Sequence[FloatArray],
 ) -> Label:
-    """The label on the widest free place of the piece, smaller where there is little room, beside it where none is.
+    """Place the label on the widest free place of a piece, smaller where there is little room, beside it where there is none.
 
     Args:
         piece: whose label it is.
         garment: its name.
         lines: #P by 2 [m], the sewing line and the cutting line.
-        holes: #P by 2 [m], the sewing lines of holes and the borders of fish-eye darts: no label stands in there.
+        holes: #P by 2 [m], the sewing lines of holes and the borders of fish-eye darts, which the label avoids.
         obstacles: #P by 2 [m], lines that it does not cross.
-        folds: #P by 2 [m], the edges on the fold: there stands a bracket.
+        folds: #P by 2 [m], the edges on the fold, beside which a bracket stands.
     """
     import shapely
 
@@ -150,43 +154,50 @@ def place_label(
         keep_off += [shapely.LineString(edge).buffer(fold) for edge in folds]
         label = fit_label(sew.buffer(-border).difference(shapely.union_all(keep_off)), texts)
         found += [] if label is None else [label]
-        if label is not None and _size(label) >= ENOUGH:
+        if label is not None and _relative_size(label) >= ENOUGH:
             break
-    return max(found, key=_size) if found else _beside(cut.buffer(0).difference(shapely.union_all(away)), texts)
+    return (
+        max(found, key=_relative_size)
+        if found
+        else _label_beside(cut.buffer(0).difference(shapely.union_all(away)), texts)
+    )
 
 
-def _size(label: Label) -> float:
-    """That of its smallest line, of its full size."""
+def _relative_size(label: Label) -> float:
+    """Return the size of a label's smallest line, as a share of its full size."""
     return min(height for _, height in label.lines) / TEXT
 
 
 def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: float = LEAST) -> Label | None:
-    """Lines (text, height of capitals [m]) where they get largest in an area [m], upright or turned, wrapped or not.
+    """Fit lines into an area [m] as large as they get, upright or turned, wrapped or not; None where they get too small.
 
-    None where they would have to be smaller than `least` of their size. They are never larger than asked for.
+    Args:
+        area: where there is room [m].
+        lines: (text, height of capitals [m]); they get no larger than that.
+        least: smallest share of that height.
     """
     import shapely
 
     parts = sorted((p for p in shapely.get_parts(area) if p.geom_type == "Polygon"), key=lambda p: -p.area)[:6]
-    places = list(_places([part for part in parts if part.area > 1e-7]))
+    places = list(_roomy_places([part for part in parts if part.area > 1e-7]))
     best, reached = None, 0.0
-    for label, harder in _ways(tuple(lines)):
+    for label, penalty in _wrapped_labels(tuple(lines)):
         shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
         for part, at, angle in places:
-            worse = harder * (TURNED if angle else 1.0)
-            factor = _largest(part, shape @ _turn(angle).T, at, max(least, reached * worse * 1.001))
+            penalty_here = penalty * (TURNED if angle else 1.0)
+            factor = _largest_factor(part, shape @ _rotation(angle).T, at, max(least, reached * penalty_here * 1.001))
             if factor > 0.0:
-                best, reached = replace(label.scaled(factor), at=at, angle=angle), factor / worse
+                best, reached = replace(label.scaled(factor), at=at, angle=angle), factor / penalty_here
         if reached >= 1.0:
             break
     return best
 
 
-def _ways(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:
-    """Labels of full size around the origin, wrapped more and more, and how much harder each is to read."""
+def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:
+    """Yield labels of full size around the origin, wrapped more and more, each with a penalty for reading it."""
     seen = set()
     smallest = min(height for _, height in lines)
-    for heights, harder in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
+    for heights, penalty in (([h for _, h in lines], 1.0), ([smallest for _ in lines], SMALL_TITLE)):
         plain = [(text, height) for (text, _), height in zip(lines, heights, strict=True)]
         widest = Label(at=np.zeros(2), lines=tuple(plain)).width
         for share in (1.0, *BREAKS):
@@ -198,11 +209,11 @@ def _ways(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]
             if rows not in seen:
                 seen.add(rows)
                 breaks = sum(text.count("\n") for text, _ in rows)
-                yield Label(at=np.zeros(2), lines=rows), harder * BROKEN**breaks
+                yield Label(at=np.zeros(2), lines=rows), penalty * BROKEN**breaks
 
 
 def _corners(label: Label) -> FloatArray:
-    """Of the boxes of its rows [m]."""
+    """Return the corners of all rows' boxes [m]."""
     corners = []
     for words in label.words():
         half = np.array([text_width(words.text, words.height, bold=words.bold), words.height * LEADING]) / 2
@@ -210,9 +221,11 @@ def _corners(label: Label) -> FloatArray:
     return np.concatenate(corners)
 
 
-def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:
-    """Centres of widest ellipses with the polygon that they lie in and the angle of lines along them: those that lie
-    flat before those that stand, the roomiest first."""
+def _roomy_places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, float]]:
+    """Yield the centres of widest ellipses, each with its polygon and the angle of lines along it.
+
+    Those that lie flat come before those that stand, the roomiest first.
+    """
     import shapely
     from shapely.affinity import scale
 
@@ -225,8 +238,8 @@ def _places(parts: Sequence[Polygon]) -> Iterator[tuple[Polygon, FloatArray, flo
                 yield parts[number], np.asarray(circles[number].coords[0]) / squeeze, angle
 
 
-def _largest(part: Polygon, shape: FloatArray, at: FloatArray, floor: float) -> float:
-    """How large, of its size and at most 1, a convex shape (#P by 2 [m]) fits in around a place; 0 below `floor`."""
+def _largest_factor(part: Polygon, shape: FloatArray, at: FloatArray, floor: float) -> float:
+    """Return by what factor, at most 1, a convex shape (#P by 2 [m]) fits in around a place; 0 if below `floor`."""
     import shapely
 
     def fits(factor: float) -> bool:
@@ -243,13 +256,13 @@ def _largest(part: Polygon, shape: FloatArray, at: FloatArray, floor: float) -> 
     return low
 
 
-def _beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
-    """To the right of the cloth, with a leader to it at half its height."""
+def _label_beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
+    """Place a label to the right of the cloth, with a leader to it at half its height."""
     import shapely
 
     left, bottom, right, top = cloth.bounds
     rows = tuple(
-        (wrapped(text, height * BESIDE, BESIDE_WIDTH, bold=k == 0), height * BESIDE)
+        (wrapped(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
         for k, (text, height) in enumerate(lines)
     )
     label = Label(at=np.zeros(2), lines=rows)
@@ -266,13 +279,13 @@ def _beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
     )
 
 
-def _turn(angle: float) -> FloatArray:
+def _rotation(angle: float) -> FloatArray:
     cosine, sine = np.cos(angle), np.sin(angle)
     return np.array([[cosine, -sine], [sine, cosine]])
 
 
 def default_grain(sew_line: FloatArray, holes: Sequence[FloatArray] = ()) -> FloatArray:
-    """2 by 2 [m], upwards through the widest place, two thirds of the height there."""
+    """Return a grain line (2 by 2 [m]), upwards through the widest place, over two thirds of the height there."""
     import shapely
 
     polygon = shapely.Polygon(sew_line)

@@ -11,12 +11,18 @@ from warpflat.core.arrays import FloatArray
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 
-__all__ = ["Placed", "Sheet", "lay_out", "nests", "taken_by"]
+__all__ = ["Placed", "Sheet", "lay_out", "nests", "occupied_points"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Placed:
-    """A piece in one or more sizes, shifted by `offset` [m]; `box` is its lower left and upper right on the sheet."""
+    """A piece in one or more sizes on a sheet.
+
+    Attributes:
+        pieces: upon each other.
+        offset: shift from the pieces' coordinates to the sheet's [m].
+        box: lower left and upper right on the sheet [m].
+    """
 
     pieces: tuple[DraftedPiece, ...]
     offset: FloatArray
@@ -25,9 +31,12 @@ class Placed:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Sheet:
-    """What lies where; `size` [m] is the width and height in use, the origin its lower left.
+    """Pieces on a sheet, whose origin is its lower left.
 
-    `reserved` is the lower left [m] of the block that was asked to be kept free, None without one.
+    Attributes:
+        placed: where each lies.
+        size: width and height in use [m].
+        reserved: lower left [m] of the block that is kept free; None without one.
     """
 
     placed: tuple[Placed, ...]
@@ -36,13 +45,13 @@ class Sheet:
 
 
 def nests(garment: DraftedGarment) -> list[tuple[DraftedPiece, ...]]:
-    """Each piece with all its drafted sizes."""
+    """Return each piece in all its drafted sizes."""
     first = next(iter(garment.pieces.values()))
     return [garment.all_sizes(piece.name) for piece in first]
 
 
-def taken_by(group: Sequence[DraftedPiece]) -> FloatArray:
-    """#P by 2 [m], the cut lines of pieces that lie upon each other, and the corners of a label beside them."""
+def occupied_points(group: Sequence[DraftedPiece]) -> FloatArray:
+    """Return the cut lines of pieces that lie upon each other, and the corners of a label beside them (#P by 2 [m])."""
     label = nest_label(group)
     return np.concatenate([*(piece.cut_line for piece in group), *([] if label.leader is None else [label.box])])
 
@@ -55,7 +64,7 @@ def lay_out(
     page_height: float | None = None,
     reserved: tuple[float, float] | None = None,
 ) -> Sheet:
-    """Rows of pieces from top to bottom, the tallest first.
+    """Lay pieces in rows from top to bottom, the tallest first.
 
     Args:
         groups: pieces that lie upon each other (a nest of sizes, or a single piece).
@@ -66,11 +75,11 @@ def lay_out(
     """
     boxes = []
     for group in groups:
-        points = taken_by(group)
+        points = occupied_points(group)
         boxes.append((points.min(axis=0), points.max(axis=0)))
     extents = [high - low for low, high in boxes] + ([np.array(reserved)] if reserved is not None else [])
     rows = _rows(extents, width, gap)
-    top, spots = 0.0, {}
+    top, places = 0.0, {}
     for row in rows:
         height = max(float(extents[i][1]) for i, _ in row)
         if page_height is not None and height + 2 * gap <= page_height:
@@ -78,10 +87,10 @@ def lay_out(
             if top + height + 2 * gap > (page + 1) * page_height + 1e-9:
                 top = (page + 1) * page_height
         for i, x in row:
-            spots[i] = np.array([x, top + gap + float(extents[i][1])])
+            places[i] = np.array([x, top + gap + float(extents[i][1])])
         top += height + gap
-    total = np.array([max(spots[i][0] + extents[i][0] for i in spots), top]) + gap
-    corners = {i: np.array([spot[0], total[1] - spot[1]]) for i, spot in spots.items()}
+    total = np.array([max(places[i][0] + extents[i][0] for i in places), top]) + gap
+    corners = {i: np.array([place[0], total[1] - place[1]]) for i, place in places.items()}
     placed = []
     for i, group in enumerate(groups):
         offset = corners[i] - boxes[i][0]
@@ -90,7 +99,7 @@ def lay_out(
 
 
 def _rows(extents: Sequence[FloatArray], width: float, gap: float) -> list[list[tuple[int, float]]]:
-    """Rows of (box, left edge): boxes by falling height, each in the first row with room (first fit decreasing)."""
+    """Return rows of (box, left edge): boxes by falling height, each in the first row with room (first fit decreasing)."""
     rows: list[list[tuple[int, float]]] = []
     ends: list[float] = []
     for i in sorted(range(len(extents)), key=lambda i: (-float(extents[i][1]), i)):

@@ -8,16 +8,17 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.pattern.allowance import CutOutline, Wedge
+from warpflat.pattern.allowance import CutOutline
 from warpflat.pattern.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import worst_difference
+from warpflat.pattern.sides import Wedge
 
 __all__ = ["cut_darts", "dart_notches", "seam_notches", "seam_reports"]
 
 
 #: Notches are cut this deep [m], and never deeper than this share of the allowance.
-DEPTH, SHARE = 0.005, 0.6
+DEPTH, MOST_OF_ALLOWANCE = 0.005, 0.6
 #: Depth [m] on an edge without allowance.
 RAW_DEPTH = 0.003
 #: Seams shorter than this [m] get no notch of their own; longer ones get one per `SPACING` [m].
@@ -27,15 +28,15 @@ DOUBLE_SPACING = 0.008
 #: A notch this close [m] to a joint of edges would be lost in it.
 CLEAR = 0.012
 #: A place at which one side cannot be notched is tried again at these shares of its length from the seam's start.
-NEARER = (1.0, 0.5, 0.25)
+SHARES_FROM_START = (1.0, 0.5, 0.25)
 
 
 def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
     """Lengths of both sides of every seam, along the fitted sewing lines."""
     reports = []
     for seam in seams:
-        chains = [_Chain(side, pieces) for side in seam.sides]
-        first, second = (chain.length for chain in chains)
+        lines = [_SeamLine(side, pieces) for side in seam.sides]
+        first, second = (line.length for line in lines)
         reports.append(
             SeamReport(
                 name=seam.name,
@@ -44,7 +45,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 length_mm=(first * 1000, second * 1000),
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
-                local_mm=_local_difference(chains[0], chains[1], seam.ease),
+                local_mm=_local_difference(lines[0], lines[1], seam.ease),
             )
         )
     return reports
@@ -63,14 +64,14 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     """
     notches: dict[str, list[Notch]] = {}
     for seam in seams:
-        first, second = (_Chain(side, pieces) for side in seam.sides)
+        first, second = (_SeamLine(side, pieces) for side in seam.sides)
         # A piece that is sewn to its own mirror image has one edge for both sides.
-        chains = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
+        lines = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
         for fraction in _fractions(seam, first, second):
-            for piece, notch in _matched(seam, chains, fraction):
+            for piece, notch in _notch_pair(seam, lines, fraction):
                 notches.setdefault(piece, []).append(notch)
-        for chain, other in ((first, second), (second, first)):
-            for joint in chain.joints[1:-1] / chain.length:
+        for line, other in ((first, second), (second, first)):
+            for joint in line.joints[1:-1] / line.length:
                 length = float(joint * other.length)
                 if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
                     single = other.notch(seam.name, length, double=False)
@@ -79,22 +80,22 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     return notches
 
 
-def _matched(seam: Seam, chains: Sequence[_Chain], fraction: float) -> list[tuple[str, Notch]]:
+def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list[tuple[str, Notch]]:
     """The notches of both sides for one share of the seam's length, each with its piece; none if they cannot be cut."""
-    for share in NEARER:
-        places = [(chain, share * fraction * chain.length) for chain in chains]
-        names = [chain.piece_name(length).lower() for chain, length in places]
+    for share in SHARES_FROM_START:
+        places = [(line, share * fraction * line.length) for line in lines]
+        names = [line.piece_name(length).lower() for line, length in places]
         back = any("back" in name for name in names) and not any("front" in name for name in names)
         double = back if seam.double is None else seam.double
-        places = [(chain, length) for chain, length in places if not chain.mirrored(length)]
-        found = [(chain.piece_name(length), chain.notch(seam.name, length, double)) for chain, length in places]
+        places = [(line, length) for line, length in places if not line.mirrored(length)]
+        found = [(line.piece_name(length), line.notch(seam.name, length, double)) for line, length in places]
         matched = [(piece, notch) for piece, notch in found if notch is not None]
         if len(matched) == len(found):
             return matched
     return []
 
 
-def _fractions(seam: Seam, first: _Chain, second: _Chain) -> list[float]:
+def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
     if seam.notches is not None:
         return list(seam.notches)
     if first.length < SHORTEST:
@@ -132,18 +133,18 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> 
         mouths = ((dart.left, wedge.left[0]), (dart.right, wedge.right[-1]))
         for (name, mouth), outwards in zip(mouths, cut.prolonged[dart.name], strict=True):
             inwards = -outwards
-            base = _base(mouth, inwards, 0.05, cut.points)
+            base = _point_on_cut_line(mouth, inwards, 0.05, cut.points)
             if base is None:
                 continue
             width = float(np.linalg.norm(base - mouth))
-            depth = min(DEPTH, SHARE * width) if width > 1e-4 else RAW_DEPTH
+            depth = min(DEPTH, MOST_OF_ALLOWANCE * width) if width > 1e-4 else RAW_DEPTH
             notches.append(
                 Notch(seam=dart.name, edge=name, length=0.0, at=mouth, base=(base,), direction=inwards, depth=depth)
             )
     return tuple(notches)
 
 
-def _base(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArray) -> FloatArray | None:
+def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArray) -> FloatArray | None:
     """Where the cut line is met, straight out from a point of the sewing line; None if it is not, within twice the width."""
     import shapely
 
@@ -155,7 +156,7 @@ def _base(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArra
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
 
 
-def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
+def _local_difference(one: _SeamLine, other: _SeamLine, ease: float) -> float | None:
     """The worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
     if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
         return None
@@ -163,7 +164,7 @@ def _local_difference(one: _Chain, other: _Chain, ease: float) -> float | None:
     return None if worst is None else 1000 * worst
 
 
-class _Chain:
+class _SeamLine:
     """One side of a seam as one long line, run in the seam's direction."""
 
     def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
@@ -208,11 +209,13 @@ class _Chain:
         local = length - self.joints[index]
         at, direction = self._frame(index, local)
         offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
-        found = [_base(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets]
+        found = [
+            _point_on_cut_line(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets
+        ]
         base = tuple(point for point in found if point is not None)
         if len(base) < len(offsets):
             return None
-        depth = min(DEPTH, SHARE * edge.width) if edge.width > 0 else RAW_DEPTH
+        depth = min(DEPTH, MOST_OF_ALLOWANCE * edge.width) if edge.width > 0 else RAW_DEPTH
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
     def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:

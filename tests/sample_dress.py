@@ -1,6 +1,6 @@
-"""A dress drawn on the table, to try the pattern files with: it is not developed from a surface.
+"""A dress drawn from a few measures, to try patterns and their files with; it is developed from no surface.
 
-Proportions of a plain block for women, grown by fixed steps per size; good for tests and first looks, not for sewing.
+The proportions are those of a plain block for women, grown by fixed steps per size: good for tests, not for sewing.
 """
 
 from __future__ import annotations
