@@ -196,7 +196,7 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
         before = relax_cut(before, surface, before.positions, stage="refine", cuts=before.cuts, options=relax)
     after = cut(before, CutPlan(name=candidate.name, paths=tuple(paths)), relax=relax)
     opening, angle = _widest(after)
-    old, new = before.measures, after.measures
+    old, new = before.layout_measures, after.layout_measures
     return LedgerEntry(
         candidate=candidate,
         length=path_length(before.surface, paths),

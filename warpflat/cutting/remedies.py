@@ -46,7 +46,7 @@ def advise(result: Flattening) -> Flattening:
     the three nearest are named and none is tried.
     """
     found = remedies(result, result.fit, trial=result.wear is not None)
-    return replace(result, remedies=tuple(found)) if found else result
+    return result.with_remedies(found) if found else result
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:

@@ -77,12 +77,11 @@ class Film:
         """The frame of a finished result, with its measures."""
         if self._writer is None:
             return
-        numbers = {key: value for key, value in result.measures.items() if isinstance(value, (int, float))}
         self._writer.write(
             self._surface.name,
             positions=result.positions,
             face_energy_density=result.face_energy_density,
-            measures={"step": result.stages[-1].steps, **numbers},
+            measures={"step": result.stages[-1].steps, **result.layout_measures},
         )
 
     def mark(self, result: Flattening, plan: CutPlan) -> None:

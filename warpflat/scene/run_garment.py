@@ -183,7 +183,7 @@ def run_garment(
         }
         if writer is not None:
             _last_frames(writer, garment)
-    files = garment.save(out, picture=settings.output.picture)
+    files = [*garment.write_files(out, picture=settings.output.picture), "metrics.json"]
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_sheet
 
@@ -238,10 +238,9 @@ def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
 
 def _last_frames(writer: Any, garment: Garment) -> None:
     for name, piece in garment.pieces.items():
-        numbers = {key: value for key, value in piece.measures.items() if isinstance(value, (int, float))}
         writer.write(
             name,
             positions=piece.positions,
             face_energy_density=piece.face_energy_density,
-            measures={"step": piece.stages[-1].steps, **numbers},
+            measures={"step": piece.stages[-1].steps, **piece.layout_measures},
         )
