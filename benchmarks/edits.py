@@ -38,11 +38,11 @@ def measure(name: str, run: Callable[[Look], Flattening], repeats: int) -> None:
         begun = time.perf_counter()
 
         def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
-            looks.append((at.spring_energy + at.guard_energy, time.perf_counter() - begun, at.work_units))
+            looks.append((at.model_energy, time.perf_counter() - begun, at.work_units))
 
         last = run(look).stages[-1]
         seconds = time.perf_counter() - begun
-        looks.append((last.potential_j, seconds, last.work_units))
+        looks.append((last.model_energy_j, seconds, last.work_units))
         near = next(each for each in looks if each[0] <= ALLOWANCE * looks[-1][0])
         best = min(best, (near[1], seconds, near[2], last.work_units))
     print(

@@ -35,7 +35,7 @@ def paths(piece: Flattening, line: str, stops: list[str]) -> tuple[np.ndarray, .
 def energies(piece: Flattening) -> tuple[float, float]:
     """Minimised energy and strain energy as worn [J]."""
     last = piece.stages[-1]
-    return last.potential_j, last.strain_energy_j
+    return last.model_energy_j, last.strain_energy_j
 
 
 def main() -> None:

@@ -24,7 +24,7 @@ def row(result: Flattening, title: str, uncut: Flattening) -> PicturePiece:
     """A row of the figure."""
     worn, before = result.stages[-1].strain_energy_j, uncut.stages[-1].strain_energy_j
     change = {
-        "energy": (result.stages[-1].potential_j, uncut.stages[-1].potential_j),
+        "energy": (result.stages[-1].model_energy_j, uncut.stages[-1].model_energy_j),
         "as worn": (worn, before),
     }
     captions = {"fabric": result.fabric.name}

@@ -106,10 +106,12 @@ def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(warpflat: 
 
 
 def test_a_residual_that_is_no_number_is_not_printed():
-    last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "spring_energy_j": 2e-3, "converged": False}
+    last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "strain_energy_j": 2e-3, "converged": False}
     for residual in (math.inf, None):
         lines = warnings_of({"pieces": {"front": {"stages": [{**last, "residual": residual}], "flipped_faces": 0}}})
-        assert lines == ["front did not converge within 9 steps (2 mJ left); the pattern is not final: raise max_steps"]
+        assert lines == [
+            "front did not converge within 9 steps (strain energy 2 mJ); the pattern is not final: raise max_steps"
+        ]
 
 
 def test_mended_input_is_noted(warpflat: Run):
@@ -487,14 +489,14 @@ def test_progress_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch):
         def isatty(self) -> bool:
             return True
 
-    look = SimpleNamespace(stage="relax", step=7, max_steps=100, spring_energy=0.0021, residual=0.5)
+    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy=0.0021, residual=0.5)
     for stream, hidden, shown in ((Terminal(), False, True), (Terminal(), True, False), (io.StringIO(), False, False)):
         monkeypatch.setattr("sys.stderr", stream)
         monkeypatch.setattr("warpflat.cli.tables._REFRESH", 0.0)
         with ProgressBar("cap", hidden=hidden) as bar:
             bar(look)  # type: ignore[arg-type]
         assert ("cap: relax: 7 steps" in stream.getvalue()) == shown
-        assert ("2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
+        assert ("model energy 2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
 
 
 def test_a_size_takes_measures_of_ones_own(warpflat: Run):

@@ -29,7 +29,7 @@ def cloth(shear: float) -> Fabric:
 
 
 def minimum(piece: Flattening) -> float:
-    return piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j
+    return piece.stages[-1].model_energy_j
 
 
 def moved(surface: Surface) -> Surface:
@@ -54,7 +54,7 @@ def test_changing_the_fabric_gives_what_flattening_in_it_gives(triangles: bool):
     assert changed.stages[:-1] == first.stages
     assert changed.stages[-1].name == "fabric:softer cloth"
     assert set(stages) == {"fabric:softer cloth"}
-    energies = [piece.stages[-1].spring_energy_j + piece.stages[-1].guard_energy_j for piece in (changed, fresh, first)]
+    energies = [piece.stages[-1].model_energy_j for piece in (changed, fresh, first)]
     assert energies[0] == pytest.approx(energies[1], rel=1e-3)
     assert energies[0] < 0.95 * energies[2]
     with pytest.raises(InputError, match="fabric"):

@@ -78,9 +78,7 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
     assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.price, rel=0.05)
     assert prices["side left"] == pytest.approx(prices["side right"], rel=1e-3)
     assert all(seam.price is None for seam in alone.seams)
-    assert block.sewn.energy_before == pytest.approx(
-        sum(p.stages[-1].spring_energy_j + p.stages[-1].guard_energy_j for p in alone.pieces.values())
-    )
+    assert block.sewn.energy_before == pytest.approx(sum(p.stages[-1].model_energy_j for p in alone.pieces.values()))
 
 
 def test_mirrored_pieces_are_recognised_as_pairs(mannequin: Mannequin, block: Garment):
@@ -135,7 +133,7 @@ def test_a_half_with_a_low_neck_is_half_of_the_whole(top: str):
     assert half.pieces["front"].flipped_faces == 0
     # Its quads lie along the threads, as those of the harmonic maps did not from which they started.
     assert not any("times as stiff" in note for garment in (half, whole) for note in garment.notes)
-    energy = [garment.pieces["front"].stages[-1].spring_energy_j for garment in (half, whole)]
+    energy = [garment.pieces["front"].stages[-1].model_energy_j for garment in (half, whole)]
     assert 2 * energy[0] == pytest.approx(energy[1], rel=1e-3)
     of_half, of_whole = (garment.form.pieces["front"].grid_vertices for garment in (half, whole))
     there = whole.pieces["front"].positions[np.searchsorted(of_whole, of_half)]
@@ -160,7 +158,7 @@ def test_the_waist_of_a_small_body_does_not_zigzag_in_knitwear():
     bend = waist[1:-1, 1] - 0.5 * (waist[:-2, 1] + waist[2:, 1])
     assert np.abs(bend).max() < 3e-4
     last = back.stages[-1]
-    assert back.measures["strain_energy_j"] < 2.0 * (last.spring_energy_j + last.guard_energy_j)
+    assert back.measures["strain_energy_j"] < 2.0 * last.model_energy_j
 
 
 def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):

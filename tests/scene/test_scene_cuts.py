@@ -49,7 +49,7 @@ def test_a_scene_cuts_along_lines_points_and_planes(tmp_path: Path):
         "cut:down",
         "sew",
     ]
-    energy = [stage["spring_energy_j"] + stage["guard_energy_j"] for stage in piece["stages"][1:-1]]
+    energy = [stage["model_energy_j"] for stage in piece["stages"][1:-1]]
     assert energy == sorted(energy, reverse=True)
     assert piece["flipped_faces"] == 0
     # The slanted path begins a little inside the border: a fish-eye dart.
@@ -221,7 +221,7 @@ def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
     stages = found.metrics["pieces"]["trial"]["stages"]
     assert len(stages) == 4
     assert any(note.startswith("cuts found: ") for note in found.notes)
-    enough = stages[1]["spring_energy_j"] + stages[1]["guard_energy_j"] + 0.01
+    enough = stages[1]["model_energy_j"] + 0.01
     # The same cut is drawn into the mesh, and not made.
     settings = {"max_cuts": 1, "by": "per_cm", "stop_below": enough}
     none = run_scene(scene(auto_cut=settings, **QUIET), tmp_path / "none")

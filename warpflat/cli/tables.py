@@ -82,7 +82,7 @@ class ProgressBar:
         self._stage = progress.stage
         self._bar.bar_format = _STEPS
         self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
-        told = f"{progress.spring_energy * 1e3:.4g} mJ"
+        told = f"model energy {progress.model_energy * 1e3:.4g} mJ"
         if math.isfinite(progress.residual):
             told += f", residual {progress.residual:.1e}"
         self._bar.set_postfix_str(told, refresh=False)
@@ -97,7 +97,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         files: their names.
         folder: where they lie.
     """
-    head = ("piece", "vertices", "length error", "area error", "energy", "flips", "converged")
+    head = ("piece", "vertices", "length error", "area error", "strain energy", "flips", "converged")
     rows = []
     for name, piece in metrics["pieces"].items():
         rows.append(
@@ -106,7 +106,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 f"{piece['vertices']:,}",
                 f"{100 * piece['length_error']:.3g} %",
                 f"{100 * piece['area_error']:.3g} %",
-                f"{1e3 * piece['spring_energy_j']:.4g} mJ",
+                f"{1e3 * piece['strain_energy_j']:.4g} mJ",
                 f"{piece['flipped_faces']:,}",
                 "yes" if _converged(piece) else "NO",
             )
@@ -211,7 +211,8 @@ def ledger_table(ledger: Ledger) -> str:
         rows.append((str(number), entry.candidate.name, *candidate_words(entry), *errors, str(entry.flipped_faces)))
     peaks = "\n".join(f"peak {number}: {words}" for number, words in enumerate(ledger.peaks.words, start=1))
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    return "\n".join([peaks, _aligned(head, rows, left=(1,)), *refused])
+    note = "released and left: model energy, relaxed coarsely"
+    return "\n".join([peaks, _aligned(head, rows, left=(1,)), note, *refused])
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:
@@ -303,7 +304,7 @@ def _left(stage: Mapping[str, Any]) -> str:
     """How far from rest a stage has ended: by the residual, unless forces are infinite, as of crushed faces."""
     residual = stage["residual"]
     if residual is None or not math.isfinite(residual):
-        return f"{1e3 * stage['spring_energy_j']:.3g} mJ left"
+        return f"strain energy {1e3 * stage['strain_energy_j']:.3g} mJ"
     return f"residual {residual:.1e}"
 
 

@@ -277,7 +277,7 @@ class DartMove:
     Attributes:
         result: the piece afterwards.
         closed, opened: names of the cuts.
-        energy_before, energy_both, energy_after: what is minimised, springs and guard, with the old dart, with both open, with the new
+        energy_before, energy_both, energy_after: model energy (springs and guard) with the old dart, with both open, with the new
             one [J].
         angle_before, angle_after: of the old dart and of the new one, all their seams together [rad].
     """
@@ -339,9 +339,9 @@ def move_dart(
         result=after,
         closed=close,
         opened=plan.name,
-        energy_before=result.stages[-1].potential_j,
-        energy_both=both.stages[-1].potential_j,
-        energy_after=after.stages[-1].potential_j,
+        energy_before=result.stages[-1].model_energy_j,
+        energy_both=both.stages[-1].model_energy_j,
+        energy_after=after.stages[-1].model_energy_j,
         angle_before=_angle_of(result, close),
         angle_after=_angle_of(after, plan.name),
     )
@@ -445,7 +445,7 @@ def _part(result: Flattening, piece: Piece) -> Flattening:
     energies = Relaxation(network, RelaxOptions(), start=positions).energies()
     last = replace(
         result.stages[-1],
-        spring_energy_j=energies.spring,
+        model_energy_j=energies.potential,
         guard_energy_j=energies.guard,
         strain_energy_j=strain_energy(network, positions),
     )

@@ -37,8 +37,8 @@ class LedgerEntry:
     Attributes:
         candidate: the cut.
         length: cut [m].
-        energy_before, energy_after: what is minimised, springs and guard [J]; on a refined mesh both of the refined one.
-        strain_energy_before, strain_energy_after: of the cloth as worn [J].
+        model_energy_before, model_energy_after: what is minimised, springs and guard [J]; both on the refined mesh, if the cut needs one.
+        strain_energy_before, strain_energy_after: strain energy of the cloth as worn [J].
         opening: widest gap of its cracks, at the border or, of a fish-eye dart, in its middle [m].
         angle: of its widest dart [rad]; NaN if it parts the cloth. Negative: its sides overlap.
         length_error, area_error, flipped_faces, pieces: after the cut.
@@ -48,8 +48,8 @@ class LedgerEntry:
 
     candidate: Candidate
     length: float
-    energy_before: float
-    energy_after: float
+    model_energy_before: float
+    model_energy_after: float
     strain_energy_before: float
     strain_energy_after: float
     opening: float
@@ -64,7 +64,7 @@ class LedgerEntry:
     @property
     def released(self) -> float:
         """[J]."""
-        return self.energy_before - self.energy_after
+        return self.model_energy_before - self.model_energy_after
 
     @property
     def per_cm(self) -> float:
@@ -81,8 +81,8 @@ class LedgerEntry:
         return {
             "name": self.candidate.name,
             "length_m": self.length,
-            "energy_before_j": self.energy_before,
-            "energy_after_j": self.energy_after,
+            "model_energy_before_j": self.model_energy_before,
+            "model_energy_after_j": self.model_energy_after,
             "strain_energy_before_j": self.strain_energy_before,
             "strain_energy_after_j": self.strain_energy_after,
             "released_j": self.released,
@@ -200,8 +200,8 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
     return LedgerEntry(
         candidate=candidate,
         length=path_length(before.surface, paths),
-        energy_before=before.stages[-1].potential_j,
-        energy_after=after.stages[-1].potential_j,
+        model_energy_before=before.stages[-1].model_energy_j,
+        model_energy_after=after.stages[-1].model_energy_j,
         strain_energy_before=old["strain_energy_j"],
         strain_energy_after=new["strain_energy_j"],
         opening=opening,
@@ -238,8 +238,8 @@ class AutoCut:
 
     Attributes:
         max_cuts: at most so many; a mirrored pair counts as one.
-        stop_below: what is minimised, springs and guard, at which it is enough [J].
-        stop_below_strain: likewise for the largest worn strain along warp or weft that all but 2 % of the cloth stay below.
+        stop_below: a piece of at most this model energy (springs and guard) needs no further cut [J].
+        stop_below_strain: so does a piece of which 98 % of the cloth is strained by at most this share along warp and weft, as worn.
         by: what the best cut is: "per_cm", or "released" in all.
     """
 
@@ -250,7 +250,9 @@ class AutoCut:
 
     def is_enough(self, result: Flattening) -> bool:
         """Whether a piece needs no further cut."""
-        return result.stages[-1].potential_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
+        return (
+            result.stages[-1].model_energy_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
+        )
 
 
 def worn_strain_level(result: Flattening) -> float:

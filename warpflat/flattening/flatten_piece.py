@@ -62,7 +62,7 @@ def flatten(
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
         units: of a mesh file that carries none: "m", "cm", "mm", "in", "ft".
         model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.model.network`); what is
-            minimised is reported as `spring_energy_j` either way.
+            minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         relax: options of the relaxation.
         callback: called with a `Progress` for the development (step 0) and after every step.
@@ -216,7 +216,7 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
     run, development = piece.run, piece.development
     developed = Stage(
         name="develop",
-        spring_energy_j=end.begin.spring,
+        model_energy_j=end.begin.potential,
         guard_energy_j=end.begin.guard,
         strain_energy_j=strain_energy(piece.network, development.positions),
         steps=0,

@@ -135,7 +135,7 @@ class Run:
         """The line of the history for a stage that ended so."""
         return Stage(
             name=name,
-            spring_energy_j=outcome.energies.spring,
+            model_energy_j=outcome.energies.potential,
             guard_energy_j=outcome.energies.guard,
             strain_energy_j=strain_energy(network, positions),
             steps=outcome.steps,
@@ -303,7 +303,7 @@ class _Batch:
         for piece, number in enumerate(state.numbers):
             spring, guard, _ = state.last.energies[piece].tolist()
             run = self._runs[number]
-            run.history.append((float(state.steps), spring, guard, float(state.last.residual[piece])))
+            run.history.append((float(state.steps), spring + guard, guard, float(state.last.residual[piece])))
 
     def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
         self._tell(state, self._runs[0].stage_name)

@@ -48,7 +48,7 @@ class Flattening:
         datum_name: its name, or how it was chosen.
         positions: #P by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
         stages: development and relaxation, with their energies.
-        history: #K by 4, step, spring energy [J], guard energy [J], residual, at every look.
+        history: #K by 4, step, model energy [J], guard energy [J], residual, at every convergence check.
         notes: what was mended or chosen on the way, one sentence each.
         cuts: made since the first relaxation, see `warpflat.cutting.cut_piece`.
         wear: how it is meant to be worn, if that was asked for.
@@ -141,7 +141,7 @@ class Flattening:
             "area_error": errors.area_error,
             "boundary_error": errors.boundary_error,
             "strain_energy_j": last.strain_energy_j,
-            "spring_energy_j": last.spring_energy_j,
+            "model_energy_j": last.model_energy_j,
             "guard_energy_j": last.guard_energy_j,
             "area_m2": float(self.worn.area.sum()),
             "converged": self.converged,

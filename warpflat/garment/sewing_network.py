@@ -65,7 +65,7 @@ class SewingNetwork:
             energies = Relaxation(piece.network, state.options, start=own).energies()
             stage = Stage(
                 name="sew",
-                spring_energy_j=energies.spring,
+                model_energy_j=energies.potential,
                 guard_energy_j=energies.guard,
                 strain_energy_j=strain_energy(piece.network, own),
                 steps=state.steps,

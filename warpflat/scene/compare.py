@@ -130,9 +130,7 @@ def comparison_table(comparison: Comparison) -> str:
         for name in borders[0]:
             rows.append((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]))
         rows.append(("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]))
-        rows.append(
-            ("minimised energy [mJ]", [f"{1e3 * (m['spring_energy_j'] + m['guard_energy_j']):.4g}" for m in measures])
-        )
+        rows.append(("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]))
         rows.append(("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]))
         for thread in ("warp", "weft"):
             worst = [m["wear"][f"strain_{thread}"] for m in measures]

@@ -70,7 +70,7 @@ class Film:
             faces=cut_surface.faces if opened else None,
             lines=cut_surface.lines if opened else None,
             cuts=self._cut_lines() if opened else None,
-            measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
+            measures={"step": progress.step, "model_energy_j": progress.model_energy},
         )
 
     def last(self, result: Flattening) -> None:
@@ -95,7 +95,7 @@ class Film:
             positions=result.positions,
             face_energy_density=result.face_energy_density,
             cuts=self._cut_lines(),
-            measures={"step": 0, "spring_energy_j": result.stages[-1].spring_energy_j},
+            measures={"step": 0, "model_energy_j": result.stages[-1].model_energy_j},
         )
 
     def _cut_lines(self) -> dict[str, list[IntArray]]:

@@ -168,7 +168,7 @@ def run_garment(
                     name,
                     positions=progress.positions(),
                     face_energy_density=progress.face_energy_density(),
-                    measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
+                    measures={"step": progress.step, "model_energy_j": progress.model_energy},
                 )
             if on_progress is not None:
                 on_progress(progress)
