@@ -43,7 +43,7 @@ def refused(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capfd: pytest.Captu
         before = {path: path.read_bytes() for path in Path().rglob("*") if path.is_file()}
         with monkeypatch.context() as patched:
             patched.setattr("warpflat.flattening.flatten_piece.flatten", fail)
-            patched.setattr("warpflat.mannequin.Mannequin.from_scan", fail)
+            patched.setattr("warpflat.mannequin.mannequin.Mannequin.from_scan", fail)
             code = main(list(arguments))
         told = capfd.readouterr()
         assert (code, told.out, told.err.count("\n")) == (2, "", 1), told
