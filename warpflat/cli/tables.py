@@ -10,7 +10,7 @@ from dataclasses import asdict, fields
 from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.activity import listening
+from warpflat.core.activity import activity_listener
 from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
@@ -57,7 +57,7 @@ class ProgressBar:
                 mininterval=_REFRESH,
                 bar_format=_DOING,
             )
-            self._listening.enter_context(listening(self.say))
+            self._listening.enter_context(activity_listener(self.say))
         return self
 
     def __exit__(

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import warp as wp
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.threads import thread_count
@@ -62,7 +62,7 @@ def compile_common_modules(module: wp.Module, device: wp.Device) -> None:
         _require_room()
         if threads == 1 or name not in _COMMON_MODULES:
             return  # Warp compiles it by itself
-        doing("compiling kernels, once on this machine")
+        report_activity("compiling kernels, once on this machine")
         names = [f"{package}.{each}" for each in _COMMON_MODULES]
         for each in names:
             import_module(each)

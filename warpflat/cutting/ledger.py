@@ -9,7 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import Candidate, Peaks, find_candidates, find_peaks
 from warpflat.cutting.cut_piece import CutPlan, cut, refine_along
@@ -157,7 +157,7 @@ def make_ledger(
     chosen = find_candidates(result, peaks) if candidates is None else candidates
     entries, refused = [], []
     for number, candidate in enumerate(chosen, 1):
-        doing(f"cut {number} of {len(chosen)}, {candidate.name}")
+        report_activity(f"cut {number} of {len(chosen)}, {candidate.name}")
         try:
             entries.append(evaluate(result, candidate, relax=coarse(relax)))
         except InputError as reason:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
@@ -100,7 +100,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     """
     settings = scene.settings
     relax, fabric = scene_relax_options(scene), scene_fabric(scene)
-    doing("building the mannequin")
+    report_activity("building the mannequin")
     mannequin, form = scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
@@ -174,7 +174,7 @@ def run_garment(
                 on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
-        doing("measuring how it fits")
+        report_activity("measuring how it fits")
         garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
         told = on_progress or (lambda progress: None)
         graded = {
