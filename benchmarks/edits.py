@@ -21,7 +21,8 @@ from meshes import KINDS, Mesh
 from speed import ALLOWANCE, CLOTH
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening

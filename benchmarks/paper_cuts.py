@@ -17,7 +17,8 @@ import argparse
 import numpy as np
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.result import Flattening
 from warpflat.mannequin.mannequin import Mannequin
 

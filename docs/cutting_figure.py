@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat import CutPlan, cut
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.flattening.result import Flattening
 from warpflat.surface.shapes import make_shape

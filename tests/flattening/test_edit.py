@@ -11,7 +11,8 @@ import pytest
 from devices import DEVICE
 
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.edit import change_fabric, change_surface
 from warpflat.flattening.flatten_piece import flatten

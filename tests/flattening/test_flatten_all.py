@@ -11,7 +11,8 @@ from scipy.spatial import cKDTree
 
 import warpflat
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_all import flatten_all

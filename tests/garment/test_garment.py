@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.remedies import advise
 from warpflat.flattening.edit import change_fabric, change_surface
 from warpflat.flattening.fit_report import fit_lines

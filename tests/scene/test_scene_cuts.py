@@ -10,7 +10,8 @@ from devices import DEVICE
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut_surfaces
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.cutting.separate_pieces import cut_surfaces
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.scene.load import make_scene

@@ -12,7 +12,8 @@ from scipy.spatial import Delaunay
 
 from warpflat import flatten_all
 from warpflat.core import free_memory as heap
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening

@@ -12,7 +12,9 @@ import numpy as np
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import Candidate, Peaks, find_candidates, find_peaks
-from warpflat.cutting.cut_piece import CutPlan, cut, refine_along
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.cutting.refine_piece import refine_along
 from warpflat.flattening.applied_cut import seam_kind
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress

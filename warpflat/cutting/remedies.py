@@ -142,7 +142,8 @@ def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy
 
 
 def _tried(result: Flattening, remedy: Remedy) -> Remedy:
-    from warpflat.cutting.cut_piece import CutPlan, cut
+    from warpflat.cutting.cut_piece import cut
+    from warpflat.cutting.cut_plan import CutPlan
 
     options = result.options
     quick = replace(

@@ -50,7 +50,7 @@ class Flattening:
         stages: development and relaxation, with their energies.
         history: #K by 4, step, model energy [J], guard energy [J], residual, at every convergence check.
         notes: what was mended or chosen on the way, one sentence each.
-        cuts: made since the first relaxation, see `warpflat.cutting.cut_piece`.
+        cuts: what `warpflat.cut` has cut since the first relaxation.
         wear: how it is meant to be worn, if that was asked for.
         options: of its last relaxation.
         alone: the piece as it lay before it was sewn or given fullness; None of one that was not.

@@ -77,8 +77,8 @@ def _run(
     scene: Scene, story: CutStory | None, told: Callable[[Progress], None], device: str | None
 ) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
     """The pieces as a run of the scene gives them, and how they were sewn."""
-    from warpflat.cutting.cut_piece import separate
     from warpflat.cutting.remedies import advise
+    from warpflat.cutting.separate_pieces import separate
     from warpflat.scene.run_garment import plan_garment
 
     if story is None:

@@ -10,7 +10,7 @@ from warpflat.core.arrays import IntArray
 from warpflat.scene.schema import AutoCutTable, CutTable
 
 if TYPE_CHECKING:
-    from warpflat.cutting.cut_piece import CutPlan
+    from warpflat.cutting.cut_plan import CutPlan
     from warpflat.cutting.ledger import AutoCut, Ledger
     from warpflat.flattening.result import Flattening
     from warpflat.solver.relax import RelaxOptions
@@ -53,7 +53,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
-    from warpflat.cutting.cut_piece import CutPlan, draw_line, line_part
+    from warpflat.cutting.cut_plan import CutPlan, draw_line, line_part
     from warpflat.scene.load import errors_named
 
     names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
@@ -131,7 +131,7 @@ def plan_automatic_cuts(
         InputError: a cut that is made before is refused.
     """
     from warpflat.core.errors import InputError
-    from warpflat.cutting.cut_piece import replace_paths
+    from warpflat.cutting.cut_plan import CutPlan
     from warpflat.cutting.ledger import AutoCut, coarse, cut_automatically
 
     auto = AutoCut(**table.model_dump())
@@ -143,7 +143,7 @@ def plan_automatic_cuts(
         result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
     except InputError as nowhere:
         ledgers, why = (), str(nowhere)
-    plans = tuple(replace_paths(made, made.paths) for made in result.cuts)
+    plans = tuple(CutPlan.from_applied(made) for made in result.cuts)
     found = [plan.name for plan in plans[len(story.plans) :]]
     note = f"cuts found: {'; '.join(found)}" if found else f"no cut was found: {why}"
     planned = CutStory(
@@ -171,9 +171,9 @@ def story_of_entry(ledger: Ledger, number: int) -> CutStory:
         InputError: there is no such number.
     """
     from warpflat.core.errors import InputError
-    from warpflat.cutting.cut_piece import replace_paths
+    from warpflat.cutting.cut_plan import CutPlan
 
     if not 1 <= number <= len(ledger.entries):
         raise InputError(f"there is no candidate {number}; valid: 1 to {len(ledger.entries)}")
     result = ledger.entries[number - 1].result
-    return CutStory(surface=result.surface, plans=tuple(replace_paths(made, made.paths) for made in result.cuts))
+    return CutStory(surface=result.surface, plans=tuple(CutPlan.from_applied(made) for made in result.cuts))

@@ -21,7 +21,7 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.topology import half_edges
 
 if TYPE_CHECKING:
-    from warpflat.cutting.cut_piece import CutPlan
+    from warpflat.cutting.cut_plan import CutPlan
     from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening

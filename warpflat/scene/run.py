@@ -82,8 +82,8 @@ def _run_surface(
     device: str | None,
     cuts: CutStory | None,
 ) -> SceneResult:
-    from warpflat.cutting.cut_piece import separate
     from warpflat.cutting.remedies import advise
+    from warpflat.cutting.separate_pieces import separate
     from warpflat.export.usd import FrameWriter
     from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
@@ -191,7 +191,7 @@ def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
     Raises:
         InputError: a name that no piece can have, or a cut that cannot be made.
     """
-    from warpflat.cutting.cut_piece import cut_surfaces
+    from warpflat.cutting.separate_pieces import cut_surfaces
     from warpflat.garment.surface_to_pattern import check_edge_names
 
     if not (rules.kinds or rules.allowances):
