@@ -130,12 +130,12 @@ def test_the_paper_cuts_on_a_real_body():
         across = {"point": bust_point, "normal": [0.0, 1.0, 0.0], "towards": [side, 0.0, 0.0]}
         down = {"point": bust_point, "normal": [1.0, 0.0, 0.0], "towards": [0.0, -1.0, 0.0]}
         tables += [{"name": "A", "plane": across}, {"name": "B", "plane": down}]
-    story = plan_cuts(surface, [CutTable.model_validate(table) for table in tables])
+    sequence = plan_cuts(surface, [CutTable.model_validate(table) for table in tables])
     # To the end it takes minutes: all three take the same number of steps, and none has come to rest.
     some = RelaxOptions(max_steps=900, solver="plain")
-    start = warpflat.flatten(story.surface, fabric="woven", datum="centre front", relax=some)
+    start = warpflat.flatten(sequence.surface, fabric="woven", datum="centre front", relax=some)
     uncut = relax_cut(start, start.surface, start.positions, stage="relax", cuts=(), options=some)
-    a, b = (stored(cut(start, plan, relax=some)) / stored(uncut) - 1 for plan in story.plans)
+    a, b = (stored(cut(start, plan, relax=some)) / stored(uncut) - 1 for plan in sequence.plans)
     assert a <= -0.205
     assert b <= -0.301
     assert b < a

@@ -555,7 +555,7 @@ def test_a_folder_where_a_file_is_to_be_is_told_before_anything_is_written(tmp_p
 
 def test_a_tube_closed_at_one_end_is_crushed_and_flagged_and_its_film_is_written(tmp_path):
     from warpflat.export.usd import FrameWriter
-    from warpflat.scene.frames import Film
+    from warpflat.scene.frames import FrameRecorder
     from warpflat.surface.repair.validate import make_surface
 
     around, up = 16, 80
@@ -576,8 +576,8 @@ def test_a_tube_closed_at_one_end_is_crushed_and_flagged_and_its_film_is_written
             return step % 50 == 0
 
     with FrameWriter(tmp_path / "frames.usdc") as writer:
-        film = Film(writer, tube, Seldom)
-        result = flatten(tube, relax=RelaxOptions(max_steps=100), callback=film)
-        film.last(result)
+        recorder = FrameRecorder(writer, tube, Seldom)
+        result = flatten(tube, relax=RelaxOptions(max_steps=100), callback=recorder)
+        recorder.record_result(result)
     assert result.flipped_faces > 0
     assert (tmp_path / "frames.usdc").exists()

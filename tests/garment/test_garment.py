@@ -288,11 +288,11 @@ def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin:
         for piece in (full, block.pieces["front_skirt"]):
             with pytest.raises(InputError, match=r"'front_skirt' has been sewn: .* again with the change, or edit its"):
                 edit(piece)
-        assert full.alone is not None
-        assert edit(full.alone).converged
+        assert full.unsewn is not None
+        assert edit(full.unsewn).converged
     unsewn = flatten_form(mannequin, block.form, fabric="woven", sewn=False).pieces["front_skirt"]
-    assert unsewn.alone is None
-    np.testing.assert_array_equal(full.alone.positions, unsewn.positions)
+    assert unsewn.unsewn is None
+    np.testing.assert_array_equal(full.unsewn.positions, unsewn.positions)
 
 
 def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():

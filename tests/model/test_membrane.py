@@ -208,4 +208,4 @@ def test_faces_that_open_are_told_of_with_their_place(tmp_path: Path):
     )
     gentle = warpflat.flatten(bump(0.02), fabric="denim", model="membrane", grain_angle=30.0, device=DEVICE)
     assert gentle.measures["opened"] is None
-    assert gentle.told == gentle.notes
+    assert gentle.messages == gentle.notes

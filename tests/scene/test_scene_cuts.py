@@ -171,8 +171,8 @@ def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):
 
     def paths(point: list[float], **more: object):
         plane = {"point": point, "normal": [0.0, 1.0, 0.0], **more}
-        story = scene_cuts(scene(cuts=[{"name": "waist", "plane": plane}]))
-        return story.surface.vertices[story.plans[0].paths[0]]
+        sequence = scene_cuts(scene(cuts=[{"name": "waist", "plane": plane}]))
+        return sequence.surface.vertices[sequence.plans[0].paths[0]]
 
     inside, far = paths([0.0, 0.1, 0.0]), paths([0.0, 0.1, -7.0])
     np.testing.assert_array_equal(inside, far)

@@ -49,7 +49,7 @@ def cuts(
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.json_file import write_json
     from warpflat.cutting.ledger_picture import write_ledger_picture
-    from warpflat.scene.cuts import story_of_entry
+    from warpflat.scene.cuts import cuts_of_entry
     from warpflat.scene.load import load_scene
     from warpflat.scene.run import files_of_run, run_scene, scene_ledger
 
@@ -66,8 +66,8 @@ def cuts(
         write_json(folder / "ledger.json", ledger.as_dict())
         write_ledger_picture(folder / "ledger.png", ledger)
         if apply is not None:
-            story = story_of_entry(ledger, apply)
-            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=story)
+            sequence = cuts_of_entry(ledger, apply)
+            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=sequence)
     if as_json and result is None:
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):

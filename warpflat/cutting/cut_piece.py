@@ -10,7 +10,7 @@ from collections.abc import Callable
 
 from warpflat.core.errors import InputError
 from warpflat.cutting.cut_plan import CutPlan, carry_layout, line_part, make_cuts
-from warpflat.flattening.edit import expect_unsewn, relax_cut
+from warpflat.flattening.edit import relax_cut, require_unsewn
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.solver.relax import RelaxOptions, given_options
@@ -40,7 +40,7 @@ def cut(
         InputError: the path leaves the mesh, repeats a vertex, runs along the border or an earlier cut, or separates
             nothing; or a cut of that name has been made, or the piece has been sewn. The message names the vertex.
     """
-    expect_unsewn(result)
+    require_unsewn(result)
     if isinstance(plan, str):
         plan = CutPlan(name=plan, paths=(line_part(result.surface, plan),))
     if plan.name in [made.name for made in result.cuts]:

@@ -23,11 +23,20 @@ from warpflat.solver.relax import RelaxOptions, given_options
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure
 from warpflat.surface.paths.edge_paths import path_length
 
-__all__ = ["AutoCut", "Ledger", "LedgerEntry", "RankedBy", "coarse", "cut_automatically", "evaluate", "make_ledger"]
+__all__ = [
+    "AutoCut",
+    "Ledger",
+    "LedgerEntry",
+    "RankedBy",
+    "coarse_options",
+    "cut_automatically",
+    "evaluate",
+    "make_ledger",
+]
 
 RankedBy = Literal["per_cm", "released"]
 
-# Enough to tell candidates apart: see `coarse`.
+# Enough to tell candidates apart: see `coarse_options`.
 _LOOSER = 10.0
 _COARSE_STEPS = 600
 
@@ -126,7 +135,7 @@ class Ledger:
         }
 
 
-def coarse(options: RelaxOptions | None = None) -> RelaxOptions:
+def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
     """Options for ranking: tolerances ten times looser, and few steps."""
     given = given_options(options)
     return replace(
@@ -161,7 +170,7 @@ def make_ledger(
     for number, candidate in enumerate(chosen, 1):
         report_activity(f"cut {number} of {len(chosen)}, {candidate.name}")
         try:
-            entries.append(evaluate(result, candidate, relax=coarse(relax)))
+            entries.append(evaluate(result, candidate, relax=coarse_options(relax)))
         except InputError as reason:
             refused.append((candidate.name, str(reason)))
     if not entries:

@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.cutting.cut_plan import CutPlan, make_cuts
-from warpflat.flattening.edit import expect_unsewn
+from warpflat.flattening.edit import require_unsewn
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
 from warpflat.surface.cut.split_faces import split_faces_along
@@ -27,7 +27,7 @@ def refine_along(result: Flattening, name: str, path: SurfacePath) -> tuple[Flat
     Raises:
         InputError: as :func:`draw_line`.
     """
-    expect_unsewn(result)
+    require_unsewn(result)
     if name in result.surface.lines:
         raise InputError(f"piece {result.surface.name!r} already has a line {name!r}; call the cut something else")
     old = result.surface

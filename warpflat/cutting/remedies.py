@@ -60,7 +60,7 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
         fit: how it sits.
         trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
     """
-    alone = result.alone or result
+    alone = result.unsewn or result
     if fit.fits or alone.fit.fits:
         return []
     found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _TOLD))

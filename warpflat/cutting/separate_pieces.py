@@ -101,7 +101,7 @@ def _part(result: Flattening, piece: Piece) -> Flattening:
         development=replace(result.development, positions=result.development.positions[used]),
         stages=(*result.stages[:-1], last),
         cuts=tuple(made for made in cuts if made.seams),
-        alone=None if result.alone is None else _part(result.alone, piece),
+        unsewn=None if result.unsewn is None else _part(result.unsewn, piece),
     )
 
 

@@ -238,7 +238,7 @@ def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y
     if not fit.fits:
         lines.append("")
         lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
-        lines += [help_words(remedy.as_dict(), sewn=result.alone is not None) for remedy in result.remedies[:1]]
+        lines += [help_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
     figure.text(x, y, title, fontsize=11, weight="bold", va="top")
     y -= 0.22 / float(figure.get_size_inches()[1])
     text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)

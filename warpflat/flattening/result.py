@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 __all__ = ["Flattening", "run_metrics", "write_files"]
 
 # What is measured of a layout, and does not change with the advice on it.
-_MEASURED = ("vertex_origin", "_errors", "worn", "fit", "opened", "layout_measures")
+_MEASURED = ("vertex_origin", "_errors", "worn", "fit", "stretched_faces", "layout_measures")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -53,7 +53,7 @@ class Flattening:
         cuts: what `warpflat.cut` has cut since the first relaxation.
         wear: how it is meant to be worn, if that was asked for.
         options: of its last relaxation.
-        alone: the piece as it lay before it was sewn or given fullness; None of one that was not.
+        unsewn: the piece as it lay before it was sewn or given fullness; None if it was not.
         remedies: cuts that may help where it does not fit, once `warpflat.advise` has looked for them.
     """
 
@@ -71,7 +71,7 @@ class Flattening:
     cuts: tuple[AppliedCut, ...] = ()
     wear: Wear | None = None
     options: RelaxOptions = field(default_factory=RelaxOptions)
-    alone: Flattening | None = None
+    unsewn: Flattening | None = None
     remedies: tuple[Remedy, ...] = ()
 
     @property
@@ -117,16 +117,17 @@ class Flattening:
         return self.worn.energy_density
 
     @cached_property
-    def opened(self) -> StretchedFaces | None:
+    def stretched_faces(self) -> StretchedFaces | None:
         """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
         if any(stage.name == "fullness" for stage in self.stages):
             return None
         return find_stretched_faces(self.network, self.positions)
 
     @property
-    def told(self) -> tuple[str, ...]:
-        """`notes`, and what is to be said of the pattern as it lies."""
-        return self.notes if self.opened is None else (*self.notes, self.opened.words(self.network.model))
+    def messages(self) -> tuple[str, ...]:
+        """The notes, and a warning about faces that the pattern has stretched."""
+        stretched = self.stretched_faces
+        return self.notes if stretched is None else (*self.notes, stretched.message(self.network.model))
 
     @cached_property
     def layout_measures(self) -> dict[str, Any]:
@@ -167,14 +168,14 @@ class Flattening:
             "wear": wear_measures(
                 self.fit,
                 wear=self.wear,
-                unsewn=None if self.alone is None else self.alone.fit,
+                unsewn=None if self.unsewn is None else self.unsewn.fit,
                 remedies=self.remedies,
             ),
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
             "energy": energy_report(self.network.surface, self.worn.energy, regions=regions),
-            "opened": None if self.opened is None else self.opened.as_dict(),
-            "notes": list(self.told),
+            "opened": None if self.stretched_faces is None else self.stretched_faces.as_dict(),
+            "notes": list(self.messages),
         }
 
     def with_remedies(self, remedies: Sequence[Remedy]) -> Flattening:

@@ -94,7 +94,7 @@ def give_fullness(
         positions=positions,
         stages=(*piece.stages, stage),
         notes=notes,
-        alone=piece.alone or piece,
+        unsewn=piece.unsewn or piece,
     )
 
 

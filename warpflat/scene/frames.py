@@ -1,4 +1,4 @@
-"""The story of a piece as frames: development, relaxation, the line of a cut, the crack as it opens."""
+"""Frames of a run: the development, the relaxation, the line of a cut, and the crack as it opens."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Film", "FrameSchedule", "path_in_pattern"]
+__all__ = ["FrameRecorder", "FrameSchedule", "path_in_pattern"]
 
 
 class Schedule(Protocol):
@@ -37,7 +37,7 @@ class Schedule(Protocol):
         ...
 
 
-class Film:
+class FrameRecorder:
     """Writes frames of one piece while it runs; a callback of `flatten` and of `cut`."""
 
     def __init__(self, writer: FrameWriter | None, surface: Surface, new_schedule: Callable[[], Schedule]) -> None:
@@ -73,7 +73,7 @@ class Film:
             measures={"step": progress.step, "model_energy_j": progress.model_energy},
         )
 
-    def last(self, result: Flattening) -> None:
+    def record_result(self, result: Flattening) -> None:
         """The frame of a finished result, with its measures."""
         if self._writer is None:
             return
@@ -84,7 +84,7 @@ class Film:
             measures={"step": result.stages[-1].steps, **result.layout_measures},
         )
 
-    def mark(self, result: Flattening, plan: CutPlan) -> None:
+    def record_cut_line(self, result: Flattening, plan: CutPlan) -> None:
         """The frame in which the line of the next cut is drawn on the piece; the next stage begins."""
         self._plans.append(plan)
         self._schedule = self._new_schedule()

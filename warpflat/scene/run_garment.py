@@ -141,7 +141,7 @@ def run_garment(
     on_progress: Callable[[Progress], None] | None = None,
     device: str | None = None,
 ) -> SceneResult:
-    """As :func:`warpflat.scene.run.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
+    """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     from warpflat.core.atomic_files import expect_files
     from warpflat.cutting.remedies import advise
     from warpflat.export.letters import note_on_names

@@ -42,7 +42,7 @@ def write_surface(
     frames: bool,
     notes: Sequence[str],
 ) -> SceneResult:
-    """Write all files of a flattened surface but its film, and remove what earlier runs have left.
+    """Write all files of a flattened surface but its frames, and remove what earlier runs have left.
 
     Args:
         scene: whose surface it is.
