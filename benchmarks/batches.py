@@ -40,7 +40,7 @@ def sizes_of(shape: str, vertices: int, triangles: bool) -> list[Surface]:
 def energy(piece: Flattening) -> float:
     """What is left of it [J]."""
     last = piece.stages[-1]
-    return last.potential_j
+    return last.model_energy_j
 
 
 def main() -> None:

@@ -50,11 +50,11 @@ def measure(mesh: Mesh, fabric: Fabric, repeats: int) -> str:
         begun = time.perf_counter()
 
         def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
-            looks.append((at.spring_energy + at.guard_energy, at.work_units, time.perf_counter() - begun))
+            looks.append((at.model_energy, at.work_units, time.perf_counter() - begun))
 
         piece = warpflat.flatten(surface, fabric=fabric, datum=mesh.datum, device="cpu", callback=look)
         seconds, last = time.perf_counter() - begun, piece.stages[-1]
-        energy = last.potential_j
+        energy = last.model_energy_j
         looks.append((energy, last.work_units, seconds))
         if seconds < least:
             least = seconds

@@ -21,7 +21,8 @@ from meshes import KINDS, Mesh
 from speed import ALLOWANCE, CLOTH
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
@@ -38,11 +39,11 @@ def measure(name: str, run: Callable[[Look], Flattening], repeats: int) -> None:
         begun = time.perf_counter()
 
         def look(at: Progress, begun: float = begun, looks: list[tuple[float, float, float]] = looks) -> None:
-            looks.append((at.spring_energy + at.guard_energy, time.perf_counter() - begun, at.work_units))
+            looks.append((at.model_energy, time.perf_counter() - begun, at.work_units))
 
         last = run(look).stages[-1]
         seconds = time.perf_counter() - begun
-        looks.append((last.potential_j, seconds, last.work_units))
+        looks.append((last.model_energy_j, seconds, last.work_units))
         near = next(each for each in looks if each[0] <= ALLOWANCE * looks[-1][0])
         best = min(best, (near[1], seconds, near[2], last.work_units))
     print(

@@ -17,7 +17,8 @@ import argparse
 import numpy as np
 
 import warpflat
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.flattening.result import Flattening
 from warpflat.mannequin.mannequin import Mannequin
 
@@ -35,7 +36,7 @@ def paths(piece: Flattening, line: str, stops: list[str]) -> tuple[np.ndarray, .
 def energies(piece: Flattening) -> tuple[float, float]:
     """Minimised energy and strain energy as worn [J]."""
     last = piece.stages[-1]
-    return last.potential_j, last.strain_energy_j
+    return last.model_energy_j, last.strain_energy_j
 
 
 def main() -> None:

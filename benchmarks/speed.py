@@ -172,7 +172,7 @@ class Runner:
             begun = now()
 
             def look(at: Progress, begun: float = begun, looks: list[Look] = looks) -> None:
-                looks.append((at.spring_energy + at.guard_energy, now() - begun, at.work_units))
+                looks.append((at.model_energy, now() - begun, at.work_units))
 
             flat = warpflat.flatten(
                 surface, fabric=CLOTH, datum=self.mesh.datum, device=device, callback=look, **OURS[name]
@@ -183,7 +183,7 @@ class Runner:
         assert best is not None
         seconds, flat, looks = best
         last = flat.stages[-1]
-        self._looks[name, place] = [*looks, (last.potential_j, seconds, last.work_units)]
+        self._looks[name, place] = [*looks, (last.model_energy_j, seconds, last.work_units)]
         self._layouts[name, place] = flat.positions
         errors = layout_errors(flat.network.surface, flat.network, flat.positions)
         relaxing = sum(stage.seconds for stage in flat.stages if stage.name != "develop")

@@ -19,11 +19,11 @@ class Watch:
 
     def __call__(self, progress: Progress) -> None:
         """Called after every step; between two looks, steps apart, the energy is that of the last one."""
-        if progress.spring_energy != self.seen:
+        if progress.model_energy != self.seen:
             print(
-                f"  {progress.stage:8} {progress.work_units:5.1f} units of work {1e3 * progress.spring_energy:9.4f} mJ"
+                f"  {progress.stage:8} {progress.work_units:5.1f} units of work model energy {1e3 * progress.model_energy:9.4f} mJ"
             )
-            self.seen = progress.spring_energy
+            self.seen = progress.model_energy
 
 
 surface = make_shape("dome", resolution=33)
@@ -32,7 +32,7 @@ for fabric in ("denim", "interlock"):
     pattern = warpflat.flatten(surface, fabric=fabric, datum="centre", callback=Watch())
     last = pattern.stages[-1]
     print(
-        f"  at rest  {last.work_units:5.1f} units of work {1e3 * last.spring_energy_j:9.4f} mJ, residual {last.residual:.1e}"
+        f"  at rest  {last.work_units:5.1f} units of work model energy {1e3 * last.model_energy_j:9.4f} mJ, residual {last.residual:.1e}"
     )
     print(f"  length error {100 * pattern.measures['length_error']:.2f} %, flips {pattern.flipped_faces}")
     pattern.save(f"out/scripted/{fabric}")

@@ -20,9 +20,12 @@ if TYPE_CHECKING:
     from typing import Any
 
     from warpflat.core.errors import InputError
-    from warpflat.cutting.cut_piece import CutPlan, cut, line_part, move_dart, separate
+    from warpflat.cutting.cut_piece import cut
+    from warpflat.cutting.cut_plan import CutPlan, line_part
+    from warpflat.cutting.dart_move import move_dart
     from warpflat.cutting.ledger import make_ledger
     from warpflat.cutting.remedies import advise
+    from warpflat.cutting.separate_pieces import separate
     from warpflat.export.read_pattern_json import read_pattern_json
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
@@ -83,7 +86,7 @@ _find_kernels()
 
 _HOME = {
     "Cloth": "pattern.marker",
-    "CutPlan": "cutting.cut_piece",
+    "CutPlan": "cutting.cut_plan",
     "EdgeRules": "garment.edge_rules",
     "Fabric": "fabric.fabric",
     "FixedLength": "garment.constraints",
@@ -118,7 +121,7 @@ _HOME = {
     "line_between": "surface.paths.lines",
     "line_from_curve": "surface.paths.lines",
     "line_on_plane": "surface.paths.lines",
-    "line_part": "cutting.cut_piece",
+    "line_part": "cutting.cut_plan",
     "load_library": "fabric.library",
     "load_scene": "scene.load",
     "make_ledger": "cutting.ledger",
@@ -126,13 +129,13 @@ _HOME = {
     "make_scene": "scene.load",
     "make_shape": "surface.shapes",
     "make_surface": "surface.repair.validate",
-    "move_dart": "cutting.cut_piece",
+    "move_dart": "cutting.dart_move",
     "pattern_of_garment": "garment.to_pattern",
     "read_pattern_json": "export.read_pattern_json",
     "read_surface": "surface.io.read",
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
-    "separate": "cutting.cut_piece",
+    "separate": "cutting.separate_pieces",
     "sew": "garment.sewing",
     "shipped_form": "mannequin.forms",
     "size_names": "mannequin.measurements",

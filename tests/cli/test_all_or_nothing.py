@@ -397,7 +397,7 @@ def test_a_temporary_file_that_cannot_be_written_is_not_blamed_on_standard_outpu
     def full() -> None:
         raise OSError(28, "No space left on device")
 
-    monkeypatch.setattr("warpflat.cli.main._start_warp", full)
+    monkeypatch.setattr("warpflat.cli.run.start_warp_silently", full)
     monkeypatch.setattr("warpflat.scene.load.load_scene", lambda _: None)
     assert main(["run", "cap.toml"]) == 2
     assert capfd.readouterr().err == "warpflat: cannot read or write a temporary file: no space left on device\n"

@@ -17,7 +17,8 @@ import warp as wp
 
 from warpflat._version import __version__
 from warpflat.cli.main import main
-from warpflat.cli.tables import ProgressBar, warnings_of
+from warpflat.cli.progress_bar import ProgressBar
+from warpflat.cli.tables import warnings_of
 
 Run = Callable[..., tuple[int, str, str]]
 
@@ -106,10 +107,12 @@ def test_with_levels_it_says_how_much_work_the_limit_was_reached_with(warpflat: 
 
 
 def test_a_residual_that_is_no_number_is_not_printed():
-    last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "spring_energy_j": 2e-3, "converged": False}
+    last = {"steps": 9, "work_units": 9.0, "residual": math.inf, "strain_energy_j": 2e-3, "converged": False}
     for residual in (math.inf, None):
         lines = warnings_of({"pieces": {"front": {"stages": [{**last, "residual": residual}], "flipped_faces": 0}}})
-        assert lines == ["front did not converge within 9 steps (2 mJ left); the pattern is not final: raise max_steps"]
+        assert lines == [
+            "front did not converge within 9 steps (strain energy 2 mJ); the pattern is not final: raise max_steps"
+        ]
 
 
 def test_mended_input_is_noted(warpflat: Run):
@@ -132,7 +135,7 @@ def test_interrupting_is_one_line_and_leaves_no_half_file(warpflat: Run, monkeyp
     def interrupt(*_: object) -> None:
         raise KeyboardInterrupt
 
-    monkeypatch.setattr("warpflat.cli.tables.ProgressBar.__call__", interrupt)
+    monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", interrupt)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     assert warpflat("run", "cap.toml") == (130, "", "warpflat: interrupted\n")
     assert not Path("out").exists()
@@ -148,7 +151,7 @@ def test_a_signal_that_ends_a_run_leaves_no_half_file(
     warpflat: Run, monkeypatch: pytest.MonkeyPatch, name: str, code: int, told: str
 ):
     number = getattr(signal, name)
-    monkeypatch.setattr("warpflat.cli.tables.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), number))
+    monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", lambda *_: os.kill(os.getpid(), number))
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     # Whatever it was before is what it is again.
     before = signal.signal(number, signal.SIG_DFL)
@@ -453,7 +456,7 @@ def test_memory_that_runs_out_is_one_line(warpflat: Run, monkeypatch: pytest.Mon
     def short(*_: object, **__: object) -> None:
         raise RuntimeError("Failed to allocate 9586176 bytes on device 'cpu'")
 
-    monkeypatch.setattr("warpflat.cli.tables.ProgressBar.__call__", short)
+    monkeypatch.setattr("warpflat.cli.progress_bar.ProgressBar.__call__", short)
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n")
     assert mistake(warpflat("run", "cap.toml")).startswith("not enough memory: Failed to allocate 9586176 bytes")
     assert not Path("out").exists()
@@ -487,14 +490,14 @@ def test_progress_shows_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch):
         def isatty(self) -> bool:
             return True
 
-    look = SimpleNamespace(stage="relax", step=7, max_steps=100, spring_energy=0.0021, residual=0.5)
+    look = SimpleNamespace(stage="relax", step=7, max_steps=100, model_energy=0.0021, residual=0.5)
     for stream, hidden, shown in ((Terminal(), False, True), (Terminal(), True, False), (io.StringIO(), False, False)):
         monkeypatch.setattr("sys.stderr", stream)
-        monkeypatch.setattr("warpflat.cli.tables._REFRESH", 0.0)
+        monkeypatch.setattr("warpflat.cli.progress_bar._REFRESH", 0.0)
         with ProgressBar("cap", hidden=hidden) as bar:
             bar(look)  # type: ignore[arg-type]
         assert ("cap: relax: 7 steps" in stream.getvalue()) == shown
-        assert ("2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
+        assert ("model energy 2.1 mJ, residual 5.0e-01" in stream.getvalue()) == shown
 
 
 def test_a_size_takes_measures_of_ones_own(warpflat: Run):

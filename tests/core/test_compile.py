@@ -18,45 +18,44 @@ import warpflat.kernels
 from warpflat.kernels import membrane, springs
 
 from warpflat.core import compile as compiling
-from warpflat.core.compile import compile_usual
+from warpflat.core.compile import compile_common_modules
 from warpflat.core.errors import InputError
 
 
 @pytest.fixture
 def asked(monkeypatch: pytest.MonkeyPatch) -> list[tuple[list[str], int]]:
-    """The modules that Warp is asked for, and on how many threads; nothing but `cells` and `membrane` is compiled."""
+    """The modules that Warp is asked for, and on how many threads; only `membrane` is compiled yet."""
     calls: list[tuple[list[str], int]] = []
 
-    def force_load(device: wp.Device, modules: Sequence[Any], *, block_dim: int, max_workers: int) -> None:
+    def force_load(device: wp.Device, modules: Sequence[Any], *, max_workers: int) -> None:
         assert device.is_cpu
-        assert block_dim == 1
         calls.append(([module.name for module in modules], max_workers))
 
     wp.init()
     monkeypatch.setattr(wp, "force_load", force_load)
-    monkeypatch.setattr(compiling, "_is_compiled", lambda module: module.name.endswith((".cells", ".membrane")))
+    monkeypatch.setattr(compiling, "_is_compiled", lambda module: module.name.endswith(".membrane"))
     monkeypatch.setenv("WARPFLAT_THREADS", "2")
     return calls
 
 
-def test_what_is_missing_is_compiled_together(asked: list[tuple[list[str], int]]):
-    compile_usual(springs.compute_spring_energy.module, wp.get_device("cpu"))
+def test_what_a_usual_run_needs_is_compiled_together(asked: list[tuple[list[str], int]]):
+    compile_common_modules(springs.compute_spring_energy.module, wp.get_device("cpu"))
     ((names, threads),) = asked
     assert threads == 2
-    assert sorted(names) == sorted(f"warpflat.kernels.{name}" for name in compiling._USUAL if name != "cells")
+    assert sorted(names) == sorted(f"warpflat.kernels.{name}" for name in compiling._COMMON_MODULES)
     known = {module.name for module in pkgutil.iter_modules(warpflat.kernels.__path__)}
-    assert set(compiling._USUAL) < known
+    assert set(compiling._COMMON_MODULES) < known
 
 
 def test_nothing_is_compiled_for_what_is_there_or_seldom_needed_or_by_one_thread(
     asked: list[tuple[list[str], int]], monkeypatch: pytest.MonkeyPatch
 ):
-    compile_usual(membrane.compute_membrane_energy.module, wp.get_device("cpu"))
+    compile_common_modules(membrane.compute_membrane_energy.module, wp.get_device("cpu"))
     monkeypatch.setenv("WARPFLAT_THREADS", "1")
-    compile_usual(springs.compute_spring_energy.module, wp.get_device("cpu"))
+    compile_common_modules(springs.compute_spring_energy.module, wp.get_device("cpu"))
     monkeypatch.setenv("WARPFLAT_THREADS", "2")
     monkeypatch.setattr(compiling, "_is_compiled", lambda _: True)
-    compile_usual(springs.compute_spring_energy.module, wp.get_device("cpu"))
+    compile_common_modules(springs.compute_spring_energy.module, wp.get_device("cpu"))
     assert asked == []
 
 
@@ -68,7 +67,7 @@ def test_a_kernel_cache_that_is_full_is_named(asked: list[tuple[list[str], int]]
     with pytest.raises(
         InputError, match=r"^kernel cache /.* cannot be written: no space left on device; set WARP_CACHE_PATH"
     ):
-        compile_usual(springs.compute_spring_energy.module, wp.get_device("cpu"))
+        compile_common_modules(springs.compute_spring_energy.module, wp.get_device("cpu"))
     assert asked == []
 
 
@@ -128,10 +127,10 @@ os.environ["WARPFLAT_THREADS"] = "2"
 import warp as wp
 wp.config.kernel_cache_dir = {str(tmp_path)!r}
 import numpy as np
-from warpflat.core import compile
+from warpflat.core import compile as compiling
 from warpflat.kernels.reduce import subtract
 from warpflat.core.launch import launch_each
-compile._USUAL = ("reduce", "springs")
+compiling._COMMON_MODULES = ("reduce", "springs")
 way = np.ones((3, 2))
 launch_each(subtract, 3, [np.full((3, 2), 5.0), np.full((3, 2), 3.0)], [way])
 sys.exit(int(way[0, 0]))

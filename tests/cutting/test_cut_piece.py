@@ -14,8 +14,12 @@ from numpy.typing import NDArray
 import warpflat
 from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import find_candidates, find_peaks
-from warpflat.cutting.cut_piece import CutPlan, cut, draw_line, line_part, move_dart, refine_along, separate
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan, draw_line, line_part
+from warpflat.cutting.dart_move import move_dart
 from warpflat.cutting.ledger import AutoCut, cut_automatically, make_ledger
+from warpflat.cutting.refine_piece import refine_along
+from warpflat.cutting.separate_pieces import separate
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
@@ -41,7 +45,7 @@ FINE = RelaxOptions(residual_tolerance=1e-6, energy_tolerance=1e-12, max_steps=6
 
 def stored(result: Flattening) -> float:
     """What the relaxation minimises [J]."""
-    return result.stages[-1].spring_energy_j + result.stages[-1].guard_energy_j
+    return result.stages[-1].model_energy_j
 
 
 def worn(result: Flattening) -> float:
@@ -126,12 +130,12 @@ def test_the_paper_cuts_on_a_real_body():
         across = {"point": bust_point, "normal": [0.0, 1.0, 0.0], "towards": [side, 0.0, 0.0]}
         down = {"point": bust_point, "normal": [1.0, 0.0, 0.0], "towards": [0.0, -1.0, 0.0]}
         tables += [{"name": "A", "plane": across}, {"name": "B", "plane": down}]
-    story = plan_cuts(surface, [CutTable.model_validate(table) for table in tables])
+    sequence = plan_cuts(surface, [CutTable.model_validate(table) for table in tables])
     # To the end it takes minutes: all three take the same number of steps, and none has come to rest.
     some = RelaxOptions(max_steps=900, solver="plain")
-    start = warpflat.flatten(story.surface, fabric="woven", datum="centre front", relax=some)
+    start = warpflat.flatten(sequence.surface, fabric="woven", datum="centre front", relax=some)
     uncut = relax_cut(start, start.surface, start.positions, stage="relax", cuts=(), options=some)
-    a, b = (stored(cut(start, plan, relax=some)) / stored(uncut) - 1 for plan in story.plans)
+    a, b = (stored(cut(start, plan, relax=some)) / stored(uncut) - 1 for plan in sequence.plans)
     assert a <= -0.205
     assert b <= -0.301
     assert b < a
@@ -253,7 +257,7 @@ def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):
 
     result = cut(bodice, paper_cuts()[0], callback=watch)
     assert np.array_equal(first[0], bodice.positions[result.vertex_origin])
-    assert seen[0].spring_energy == pytest.approx(bodice.stages[-1].spring_energy_j, rel=1e-9)
+    assert seen[0].model_energy == pytest.approx(bodice.stages[-1].model_energy_j, rel=1e-9)
     assert {progress.stage for progress in seen} == {"cut:bust"}
     assert [stage.name for stage in result.stages] == ["develop", "relax", "cut:bust"]
 
@@ -338,7 +342,7 @@ def test_a_dart_moved_to_another_line_keeps_its_budget(bust_cut: Flattening):
     before = Relaxation(bust_cut.network, RelaxOptions(), start=bust_cut.positions).energies()
     assert before.guard > 0.1 * before.potential
     assert moved.energy_before == pytest.approx(before.potential, rel=1e-6)
-    assert moved.energy_after == moved.result.stages[-1].potential_j
+    assert moved.energy_after == moved.result.stages[-1].model_energy_j
     # The bust's angle defect must open somewhere: both darts show most of it.
     assert moved.angle_after == pytest.approx(moved.angle_before, rel=0.4)
     with pytest.raises(InputError, match="no cut 'bosom' to close"):
@@ -389,7 +393,7 @@ def test_the_ledger_ranks_candidates_by_what_they_release(bodice: Flattening):
     single = by_name["bust from left"]
     assert single.candidate.has_twin
     assert not pair.candidate.has_twin
-    assert pair.energy_after < single.energy_after < single.energy_before
+    assert pair.model_energy_after < single.model_energy_after < single.model_energy_before
     assert pair.length == pytest.approx(2 * single.length, rel=0.05)
     assert math.isnan(by_name["bust, whole"].angle)
     # Coarse is enough to rank: within a few per cent of the full relaxation.

@@ -212,7 +212,7 @@ def test_a_plane_with_fullness_is_a_wider_plane_without_energy(model: str):
     np.testing.assert_allclose(after, before * [1.5, 1.0], rtol=1e-5)
     assert wide.stages[-1].name == "fullness"
     assert wide.stages[-1].converged
-    assert wide.stages[-1].spring_energy_j < 1e-9
+    assert wide.stages[-1].model_energy_j < 1e-9
     assert wide.stages[-1].strain_energy_j < 1e-9
 
 

@@ -12,7 +12,8 @@ import pytest
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.cutting.cut_piece import CutPlan, cut
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
 from warpflat.cutting.remedies import advise
 from warpflat.flattening.edit import change_fabric, change_surface
 from warpflat.flattening.fit_report import fit_lines
@@ -79,9 +80,7 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
     assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.price, rel=0.05)
     assert prices["side left"] == pytest.approx(prices["side right"], rel=1e-3)
     assert all(seam.price is None for seam in alone.seams)
-    assert block.sewn.energy_before == pytest.approx(
-        sum(p.stages[-1].spring_energy_j + p.stages[-1].guard_energy_j for p in alone.pieces.values())
-    )
+    assert block.sewn.energy_before == pytest.approx(sum(p.stages[-1].model_energy_j for p in alone.pieces.values()))
 
 
 def test_mirrored_pieces_are_recognised_as_pairs(mannequin: Mannequin, block: Garment):
@@ -136,7 +135,7 @@ def test_a_half_with_a_low_neck_is_half_of_the_whole(top: str):
     assert half.pieces["front"].flipped_faces == 0
     # Its quads lie along the threads, as those of the harmonic maps did not from which they started.
     assert not any("times as stiff" in note for garment in (half, whole) for note in garment.notes)
-    energy = [garment.pieces["front"].stages[-1].spring_energy_j for garment in (half, whole)]
+    energy = [garment.pieces["front"].stages[-1].model_energy_j for garment in (half, whole)]
     assert 2 * energy[0] == pytest.approx(energy[1], rel=1e-3)
     of_half, of_whole = (garment.form.pieces["front"].grid_vertices for garment in (half, whole))
     there = whole.pieces["front"].positions[np.searchsorted(of_whole, of_half)]
@@ -161,7 +160,7 @@ def test_the_waist_of_a_small_body_does_not_zigzag_in_knitwear():
     bend = waist[1:-1, 1] - 0.5 * (waist[:-2, 1] + waist[2:, 1])
     assert np.abs(bend).max() < 3e-4
     last = back.stages[-1]
-    assert back.measures["strain_energy_j"] < 2.0 * (last.spring_energy_j + last.guard_energy_j)
+    assert back.measures["strain_energy_j"] < 2.0 * last.model_energy_j
 
 
 def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
@@ -289,11 +288,11 @@ def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin:
         for piece in (full, block.pieces["front_skirt"]):
             with pytest.raises(InputError, match=r"'front_skirt' has been sewn: .* again with the change, or edit its"):
                 edit(piece)
-        assert full.alone is not None
-        assert edit(full.alone).converged
+        assert full.unsewn is not None
+        assert edit(full.unsewn).converged
     unsewn = flatten_form(mannequin, block.form, fabric="woven", sewn=False).pieces["front_skirt"]
-    assert unsewn.alone is None
-    np.testing.assert_array_equal(full.alone.positions, unsewn.positions)
+    assert unsewn.unsewn is None
+    np.testing.assert_array_equal(full.unsewn.positions, unsewn.positions)
 
 
 def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():

@@ -9,7 +9,9 @@ import pytest
 import shapely
 
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut, separate
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.cutting.separate_pieces import separate
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import plan_form

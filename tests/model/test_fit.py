@@ -52,7 +52,7 @@ def test_a_stretched_cylinder_has_the_closed_form_pattern_and_laplace_s_pressure
     np.testing.assert_allclose(fit.tension_weft, tension, rtol=1e-5)
     np.testing.assert_allclose(fit.pressure, tension / RADIUS, rtol=0.01)
     assert fit.fits
-    assert result.measures["spring_energy_j"] < 1e-9
+    assert result.measures["model_energy_j"] < 1e-9
     assert result.measures["strain_energy_j"] == pytest.approx(
         0.5 * NET.stiffness_weft * 0.2**2 * width * height, rel=1e-5
     )

@@ -81,7 +81,7 @@ def test_files_and_table(comparison: Comparison, tmp_path: Path):
     assert save_comparison(comparison, tmp_path) == ["compare.json", "compare.png", "compare.svg"]
     data = json.loads((tmp_path / "compare.json").read_text())
     assert data["compared_with"] == "denim"
-    assert set(data["fabrics"]["interlock"]["front"]) >= {"area_m2", "border_lengths_m", "spring_energy_j", "wear"}
+    assert set(data["fabrics"]["interlock"]["front"]) >= {"area_m2", "border_lengths_m", "model_energy_j", "wear"}
     assert (tmp_path / "compare.png").read_bytes().startswith(b"\x89PNG")
 
     root = ET.parse(tmp_path / "compare.svg").getroot()

@@ -230,7 +230,7 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
 
     stage = Usd.Stage.Open(str(tmp_path / "out" / "frames.usdc"))
     prim = stage.GetPrimAtPath("/World/trial")
-    for key in ("spring_energy_j", "strain_energy_j", "length_error"):
+    for key in ("model_energy_j", "strain_energy_j", "length_error"):
         assert prim.GetAttribute(f"warpflat:{key}").Get(stage.GetEndTimeCode()) == piece[key]
     points = UsdGeom.Mesh(stage.GetPrimAtPath("/World/trial/pattern")).GetPointsAttr()
     texture = [

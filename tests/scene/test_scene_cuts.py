@@ -10,7 +10,8 @@ from devices import DEVICE
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.cutting.cut_piece import CutPlan, cut_surfaces
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.cutting.separate_pieces import cut_surfaces
 from warpflat.export.read_pattern_json import read_pattern_json
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.scene.load import make_scene
@@ -49,7 +50,7 @@ def test_a_scene_cuts_along_lines_points_and_planes(tmp_path: Path):
         "cut:down",
         "sew",
     ]
-    energy = [stage["spring_energy_j"] + stage["guard_energy_j"] for stage in piece["stages"][1:-1]]
+    energy = [stage["model_energy_j"] for stage in piece["stages"][1:-1]]
     assert energy == sorted(energy, reverse=True)
     assert piece["flipped_faces"] == 0
     # The slanted path begins a little inside the border: a fish-eye dart.
@@ -170,8 +171,8 @@ def test_a_plane_all_through_may_be_given_by_any_of_its_points(tmp_path: Path):
 
     def paths(point: list[float], **more: object):
         plane = {"point": point, "normal": [0.0, 1.0, 0.0], **more}
-        story = scene_cuts(scene(cuts=[{"name": "waist", "plane": plane}]))
-        return story.surface.vertices[story.plans[0].paths[0]]
+        sequence = scene_cuts(scene(cuts=[{"name": "waist", "plane": plane}]))
+        return sequence.surface.vertices[sequence.plans[0].paths[0]]
 
     inside, far = paths([0.0, 0.1, 0.0]), paths([0.0, 0.1, -7.0])
     np.testing.assert_array_equal(inside, far)
@@ -220,7 +221,7 @@ def test_auto_cut_finds_cuts_and_stops(tmp_path: Path):
     stages = found.metrics["pieces"]["trial"]["stages"]
     assert len(stages) == 4
     assert any(note.startswith("cuts found: ") for note in found.notes)
-    enough = stages[1]["spring_energy_j"] + stages[1]["guard_energy_j"] + 0.01
+    enough = stages[1]["model_energy_j"] + 0.01
     # The same cut is drawn into the mesh, and not made.
     settings = {"max_cuts": 1, "by": "per_cm", "stop_below": enough}
     none = run_scene(scene(auto_cut=settings, **QUIET), tmp_path / "none")

@@ -153,4 +153,4 @@ def test_pieces_come_to_the_same_rest(shape: str, triangles: bool, fabric: str, 
         wished = flatten(surface, device="cpu", **given)
     assert piece.converged
     assert piece.flipped_faces == 0
-    assert piece.stages[-1].potential_j == pytest.approx(wished.stages[-1].potential_j, rel=1e-4)
+    assert piece.stages[-1].model_energy_j == pytest.approx(wished.stages[-1].model_energy_j, rel=1e-4)

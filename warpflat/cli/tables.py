@@ -1,25 +1,19 @@
-"""What the command line shows: a progress bar, the summary of a run, tables of fabrics."""
+"""The tables and warnings of the command line."""
 
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import asdict, fields
-from types import TracebackType
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.activity import listening
 from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, value_names
 
 if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger
-    from warpflat.flattening.progress import Progress
     from warpflat.mannequin.mannequin import Level
 
 __all__ = [
-    "ProgressBar",
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
@@ -29,64 +23,7 @@ __all__ = [
     "warnings_of",
 ]
 
-_REFRESH = 0.1  # [s]
-_STEPS = "{desc}: {n_fmt} steps [{elapsed}{postfix}]"
-_DOING = "{desc} [{elapsed}]"
 _AMISS = 0.2  # [mm] of a seam or constraint that is told
-
-
-class ProgressBar:
-    """Steps, energy and residual on stderr while a run goes on, or what else it does; nothing where stderr is no terminal or `hidden`."""
-
-    def __init__(self, name: str, *, hidden: bool = False) -> None:
-        """Show nothing yet: `name` is what is being flattened."""
-        self._name = name
-        self._hidden = hidden or not sys.stderr.isatty()
-        self._bar: Any = None
-        self._stage = ""
-        self._listening = ExitStack()
-
-    def __enter__(self) -> ProgressBar:
-        if not self._hidden:
-            from tqdm import tqdm
-
-            self._bar = tqdm(
-                desc=self._name,
-                file=sys.stderr,
-                leave=False,
-                mininterval=_REFRESH,
-                bar_format=_DOING,
-            )
-            self._listening.enter_context(listening(self.say))
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self._listening.close()
-        if self._bar is not None:
-            self._bar.close()
-
-    def say(self, words: str) -> None:
-        """Show what is being done."""
-        if self._bar is not None:
-            self._bar.bar_format = _DOING
-            self._bar.set_description_str(f"{self._name}: {words}", refresh=True)
-
-    def __call__(self, progress: Progress) -> None:
-        """Show where the run stands."""
-        if self._bar is None:
-            return
-        if progress.stage != self._stage and progress.step == 0:
-            self._bar.reset()
-        self._stage = progress.stage
-        self._bar.bar_format = _STEPS
-        self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
-        told = f"{progress.spring_energy * 1e3:.4g} mJ"
-        if math.isfinite(progress.residual):
-            told += f", residual {progress.residual:.1e}"
-        self._bar.set_postfix_str(told, refresh=False)
-        self._bar.update(max(0, progress.step - self._bar.n))
 
 
 def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
@@ -97,7 +34,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         files: their names.
         folder: where they lie.
     """
-    head = ("piece", "vertices", "length error", "area error", "energy", "flips", "converged")
+    head = ("piece", "vertices", "length error", "area error", "strain energy", "flips", "converged")
     rows = []
     for name, piece in metrics["pieces"].items():
         rows.append(
@@ -106,7 +43,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 f"{piece['vertices']:,}",
                 f"{100 * piece['length_error']:.3g} %",
                 f"{100 * piece['area_error']:.3g} %",
-                f"{1e3 * piece['spring_energy_j']:.4g} mJ",
+                f"{1e3 * piece['strain_energy_j']:.4g} mJ",
                 f"{piece['flipped_faces']:,}",
                 "yes" if _converged(piece) else "NO",
             )
@@ -211,7 +148,8 @@ def ledger_table(ledger: Ledger) -> str:
         rows.append((str(number), entry.candidate.name, *candidate_words(entry), *errors, str(entry.flipped_faces)))
     peaks = "\n".join(f"peak {number}: {words}" for number, words in enumerate(ledger.peaks.words, start=1))
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
-    return "\n".join([peaks, _aligned(head, rows, left=(1,)), *refused])
+    note = "released and left: model energy, relaxed coarsely"
+    return "\n".join([peaks, _aligned(head, rows, left=(1,)), note, *refused])
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:
@@ -303,7 +241,7 @@ def _left(stage: Mapping[str, Any]) -> str:
     """How far from rest a stage has ended: by the residual, unless forces are infinite, as of crushed faces."""
     residual = stage["residual"]
     if residual is None or not math.isfinite(residual):
-        return f"{1e3 * stage['spring_energy_j']:.3g} mJ left"
+        return f"strain energy {1e3 * stage['strain_energy_j']:.3g} mJ"
     return f"residual {residual:.1e}"
 
 

@@ -1,6 +1,6 @@
-"""What is being done just now, in a few words, told to whoever listens; to nobody otherwise.
+"""The activity of a run, such as "compiling kernels", is reported here to the registered listener, if there is one.
 
-A callback tells of every step of a relaxation. This is for the rest of a run: compiling, sewing, drafting, drawing.
+The callback of a relaxation reports its steps. This is for the rest of a run: compiling, sewing, drafting, drawing.
 """
 
 from __future__ import annotations
@@ -9,21 +9,21 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
 
-__all__ = ["doing", "listening"]
+__all__ = ["activity_listener", "report_activity"]
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
 
 
-def doing(words: str) -> None:
-    """Tell what is being done from now on."""
+def report_activity(activity: str) -> None:
+    """Report what the run does from now on, in a few words."""
     listener = _listener.get()
     if listener is not None:
-        listener(words)
+        listener(activity)
 
 
 @contextmanager
-def listening(listener: Callable[[str], None]) -> Iterator[None]:
-    """Have `listener` told of what is done in the body."""
+def activity_listener(listener: Callable[[str], None]) -> Iterator[None]:
+    """Register `listener` for the activities that are reported in the block."""
     before = _listener.set(listener)
     try:
         yield

@@ -30,11 +30,11 @@ from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_re
 
 __all__ = [
     "atomic_path",
-    "current",
     "expect_files",
     "file_in",
     "hidden_file",
     "is_input",
+    "latest_file",
     "output_folder",
     "prepare_folder",
     "remove_file",
@@ -381,8 +381,8 @@ def expect_files(folder: Path, files: Iterable[str]) -> None:
         run.expect(files)
 
 
-def current(path: Path) -> Path:
-    """Where the latest content of an output file lies: in an :func:`output_folder` that which was written in its block."""
+def latest_file(path: Path) -> Path:
+    """Return the path of an output file's latest content: the hidden one while an :func:`output_folder` is open."""
     run = _run_into(path.parent)
     return path if run is None or path.name not in run.names else run.new / path.name
 

@@ -1,6 +1,6 @@
-"""Kernels are compiled when they are first needed, once on a machine: here those of a usual run together, on all cores.
+"""Warp's kernels are compiled here: those of a usual run together, on several threads.
 
-Module after module takes seven seconds, on two cores at once less than five.
+Warp compiles a module when its first kernel is launched, one after the other, and keeps the code in its kernel cache.
 """
 
 from __future__ import annotations
@@ -13,15 +13,15 @@ from pathlib import Path
 
 import warp as wp
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.threads import thread_count
 
-__all__ = ["compile_usual", "start_warp", "writing_kernels"]
+__all__ = ["compile_common_modules", "kernel_cache_errors", "start_warp"]
 
-# Modules that nearly every run needs, those that take longest first; what it writes in the end, too.
-_USUAL = (
+# Modules that nearly every run needs. Those that take longest come first, so that no thread is left with one at the end.
+_COMMON_MODULES = (
     "grid_lists",
     "coarsen",
     "cells",
@@ -38,18 +38,18 @@ _USUAL = (
     "reduce",
     "springs",
 )
-# Each thread reads Warp's own headers first, which takes a second: more would not gain by it.
-_MOST_THREADS = 4
-# All kernels take a tenth of it, the compiler's own files the rest for the time being [bytes].
-_ROOM = 32 << 20
+# Each thread first reads Warp's own headers, so that more threads gain nothing.
+_MAX_THREADS = 4
+# What the kernels and the compiler's temporary files need [bytes].
+_REQUIRED_BYTES = 32 << 20
 
 
-def compile_usual(module: wp.Module, device: wp.Device) -> None:
-    """Compile what a usual run needs, before the first kernel of it that is not compiled yet; nothing if all is.
+def compile_common_modules(module: wp.Module, device: wp.Device) -> None:
+    """Compile what a usual run needs, if `module` is part of that and not compiled yet.
 
     Args:
-        module: of the kernel that is about to be run.
-        device: on which; for CUDA devices nothing is done.
+        module: the module of the kernel that is about to be launched.
+        device: where; nothing is done for CUDA devices.
 
     Raises:
         InputError: something must be compiled, and the kernel cache cannot be written or has no room.
@@ -57,34 +57,34 @@ def compile_usual(module: wp.Module, device: wp.Device) -> None:
     if device.is_cuda or _is_compiled(module):
         return
     package, _, name = module.name.rpartition(".")
-    threads = min(thread_count(), _MOST_THREADS)
-    with writing_kernels():
+    threads = min(thread_count(), _MAX_THREADS)
+    with kernel_cache_errors():
         _require_room()
-        if threads == 1 or name not in _USUAL:
-            return
-        doing("compiling kernels, once on this machine")
-        for each in _USUAL:
-            import_module(f"{package}.{each}")
-        missing = [own for own in (wp.get_module(f"{package}.{each}") for each in _USUAL) if not _is_compiled(own)]
-        wp.force_load(device, missing, block_dim=1, max_workers=threads)
+        if threads == 1 or name not in _COMMON_MODULES:
+            return  # Warp compiles it by itself
+        report_activity("compiling kernels, once on this machine")
+        names = [f"{package}.{each}" for each in _COMMON_MODULES]
+        for each in names:
+            import_module(each)
+        wp.force_load(device, [wp.get_module(each) for each in names], max_workers=threads)
 
 
 def start_warp() -> None:
-    """Start Warp, if nobody has; it makes the folder of its kernel cache then.
+    """Initialise Warp, which makes the folder of its kernel cache.
 
     Raises:
-        InputError: that cannot be made.
+        InputError: the folder cannot be made.
     """
-    with writing_kernels():
+    with kernel_cache_errors():
         wp.init()
 
 
 @contextmanager
-def writing_kernels() -> Iterator[None]:
-    """Have a file error in the body told as one of the kernel cache.
+def kernel_cache_errors() -> Iterator[None]:
+    """Report a file error in the block as an error of the kernel cache.
 
     Raises:
-        InputError: there was one.
+        InputError: there was a file error.
     """
     try:
         yield
@@ -94,18 +94,19 @@ def writing_kernels() -> Iterator[None]:
         folder = wp.config.kernel_cache_dir or "of Warp"
         reason = (error.strerror or str(error)).lower()
         raise InputError(
-            f"kernel cache {folder} cannot be written: {reason}; set WARP_CACHE_PATH to a folder that can, with {_ROOM >> 20} MB free"
+            f"kernel cache {folder} cannot be written: {reason}; "
+            f"set WARP_CACHE_PATH to a folder that can, with {_REQUIRED_BYTES >> 20} MB free"
         ) from error
 
 
 def _require_room() -> None:
-    """See that compiled kernels can be written: where a disk is full the compiler would end the process."""
-    for folder in (wp.config.kernel_cache_dir, None):  # None: where temporary files are, for the compiler's own
+    """Write a probe file: on a full disk the compiler would end the process."""
+    for folder in (wp.config.kernel_cache_dir, None):  # None is the system's folder for temporary files
         with tempfile.TemporaryFile(dir=folder) as probe:
-            probe.write(bytes(_ROOM))
+            probe.write(bytes(_REQUIRED_BYTES))
             probe.flush()
 
 
 def _is_compiled(module: wp.Module) -> bool:
-    """Whether Warp has the module's code for the CPU."""
+    """Return whether Warp's cache has the module's code for the CPU."""
     return (Path(wp.config.kernel_cache_dir) / module.get_module_identifier(1)).is_dir()

@@ -10,7 +10,7 @@ import warp as wp
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.kernels.reduce import dot_blocks, least_of_blocks, sum_blocks
 
 __all__ = ["DeviceSums"]
@@ -29,7 +29,7 @@ class DeviceSums:
 
     def __init__(self, counts: Sequence[int], device: wp.Device) -> None:
         """Of ranges of so many."""
-        self._device, self._begin, self._chain = device, begins(counts), list[wp.array]()
+        self._device, self._begin, self._chain = device, range_offsets(counts), list[wp.array]()
         ends = self._begin
         while True:
             blocks, first = _blocks_of(ends)
@@ -103,6 +103,6 @@ class DeviceSums:
 def _blocks_of(begin: IntArray) -> tuple[IntArray, IntArray]:
     """Where the blocks of ranges begin, and the last one ends; of each range the first block, and how many there are."""
     counts = -(-np.diff(begin) // _BLOCK)
-    first = begins(counts)
+    first = range_offsets(counts)
     inside = np.arange(first[-1]) - np.repeat(first[:-1], counts)
     return np.append(np.repeat(begin[:-1], counts) + _BLOCK * inside, begin[-1]).astype(np.int32), first

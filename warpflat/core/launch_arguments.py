@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpflat.core.compile import compile_usual, writing_kernels
+from warpflat.core.compile import compile_common_modules, kernel_cache_errors
 
 __all__ = ["Command", "commands_of"]
 
@@ -56,7 +56,7 @@ def commands_of(
             with _loading:
                 form = _forms.get((kernel, device.alias))
                 if form is None:
-                    compile_usual(kernel.module, device)
+                    compile_common_modules(kernel.module, device)
                 form = form or _Form(_recorded(kernel, ranges[0], given, outputs, device), len(given))
                 if form.fits:
                     _forms[kernel, device.alias] = form
@@ -70,7 +70,7 @@ def _recorded(
     kernel: wp.Kernel, over: tuple[int, int], given: Sequence[Any], outputs: Sequence[Any], device: wp.Device
 ) -> wp.Launch:
     begin, end = over
-    with writing_kernels():  # nothing runs yet, but a module that is new is compiled
+    with kernel_cache_errors():  # nothing runs yet, but a module that is new is compiled
         return wp.launch(
             kernel, dim=end - begin, inputs=[*given, begin], outputs=list(outputs), device=device, record_cmd=True
         )

@@ -12,7 +12,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.atomic_files import current, is_input, remove_file
+from warpflat.core.atomic_files import is_input, latest_file, remove_file
 from warpflat.core.errors import InputError
 from warpflat.core.json_file import write_json
 
@@ -56,7 +56,7 @@ def remove_stale(
         InputError: `metrics.json` cannot be written.
     """
     record = _record(_read(folder))
-    mine = {file: _digest(current(folder / file)) for file in files if file != "metrics.json"}
+    mine = {file: _digest(latest_file(folder / file)) for file in files if file != "metrics.json"}
     earlier = {run: {file: was for file, was in known.items() if file not in mine} for run, known in record.items()}
     stale = {
         (run, file): was
@@ -91,7 +91,7 @@ def record_file(folder: Path, name: str, file: str) -> None:
         return  # somebody else's, which knows of no run
     record = _record(metrics)
     if name in record:
-        record[name][file] = _digest(current(folder / file))
+        record[name][file] = _digest(latest_file(folder / file))
         write_json(folder / "metrics.json", {**metrics, "files": record})
 
 
@@ -127,7 +127,7 @@ def _read(folder: Path) -> dict[str, Any]:
     """
     file = folder / "metrics.json"
     try:
-        data = json.loads(current(file).read_text(encoding="utf-8"))
+        data = json.loads(latest_file(file).read_text(encoding="utf-8"))
     except FileNotFoundError:
         return {}
     except (OSError, ValueError, RecursionError):

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 
-__all__ = ["begins", "dot", "products", "weighted_percentile", "weighted_percentiles", "weighted_rows"]
+__all__ = ["dot", "products", "range_offsets", "weighted_percentile", "weighted_percentiles", "weighted_rows"]
 
 Rows = Sequence[NDArray[np.floating]] | NDArray[np.floating]
 
@@ -22,8 +22,12 @@ _COLUMNS = 512
 _GATHERED = 16 * _COLUMNS
 
 
-def begins(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
-    """Where each of several ranges of so many begins, and where the last one ends."""
+def range_offsets(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
+    """Return the offsets of consecutive ranges: #N + 1, the begin of each of #N ranges, and the end of the last.
+
+    Args:
+        counts: #N, the lengths of the ranges.
+    """
     ends = np.zeros(np.size(counts) + 1, dtype=np.int32)
     np.cumsum(counts, out=ends[1:])
     return ends

@@ -114,7 +114,7 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
         InputError: the piece stores no energy away from its border, so there is nowhere to cut to.
     """
     peaks = peaks or find_peaks(result)
-    if not peaks.vertices or result.measures["length_error"] < _FREE_OF_STRAIN:
+    if not peaks.vertices or result.layout_measures["length_error"] < _FREE_OF_STRAIN:
         raise InputError(f"piece {result.surface.name!r} stores no strain energy inside: there is nothing to cut for")
     found: list[Candidate] = []
     for name, line in result.surface.lines.items():

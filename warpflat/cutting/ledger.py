@@ -9,10 +9,12 @@ from typing import Any, Literal
 
 import numpy as np
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError
 from warpflat.cutting.candidates import Candidate, Peaks, find_candidates, find_peaks
-from warpflat.cutting.cut_piece import CutPlan, cut, refine_along
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.cutting.refine_piece import refine_along
 from warpflat.flattening.applied_cut import seam_kind
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
@@ -21,11 +23,20 @@ from warpflat.solver.relax import RelaxOptions, given_options
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure
 from warpflat.surface.paths.edge_paths import path_length
 
-__all__ = ["AutoCut", "Ledger", "LedgerEntry", "RankedBy", "coarse", "cut_automatically", "evaluate", "make_ledger"]
+__all__ = [
+    "AutoCut",
+    "Ledger",
+    "LedgerEntry",
+    "RankedBy",
+    "coarse_options",
+    "cut_automatically",
+    "evaluate",
+    "make_ledger",
+]
 
 RankedBy = Literal["per_cm", "released"]
 
-# Enough to tell candidates apart: see `coarse`.
+# Enough to tell candidates apart: see `coarse_options`.
 _LOOSER = 10.0
 _COARSE_STEPS = 600
 
@@ -37,8 +48,8 @@ class LedgerEntry:
     Attributes:
         candidate: the cut.
         length: cut [m].
-        energy_before, energy_after: what is minimised, springs and guard [J]; on a refined mesh both of the refined one.
-        strain_energy_before, strain_energy_after: of the cloth as worn [J].
+        model_energy_before, model_energy_after: what is minimised, springs and guard [J]; both on the refined mesh, if the cut needs one.
+        strain_energy_before, strain_energy_after: strain energy of the cloth as worn [J].
         opening: widest gap of its cracks, at the border or, of a fish-eye dart, in its middle [m].
         angle: of its widest dart [rad]; NaN if it parts the cloth. Negative: its sides overlap.
         length_error, area_error, flipped_faces, pieces: after the cut.
@@ -48,8 +59,8 @@ class LedgerEntry:
 
     candidate: Candidate
     length: float
-    energy_before: float
-    energy_after: float
+    model_energy_before: float
+    model_energy_after: float
     strain_energy_before: float
     strain_energy_after: float
     opening: float
@@ -64,7 +75,7 @@ class LedgerEntry:
     @property
     def released(self) -> float:
         """[J]."""
-        return self.energy_before - self.energy_after
+        return self.model_energy_before - self.model_energy_after
 
     @property
     def per_cm(self) -> float:
@@ -81,8 +92,8 @@ class LedgerEntry:
         return {
             "name": self.candidate.name,
             "length_m": self.length,
-            "energy_before_j": self.energy_before,
-            "energy_after_j": self.energy_after,
+            "model_energy_before_j": self.model_energy_before,
+            "model_energy_after_j": self.model_energy_after,
             "strain_energy_before_j": self.strain_energy_before,
             "strain_energy_after_j": self.strain_energy_after,
             "released_j": self.released,
@@ -124,7 +135,7 @@ class Ledger:
         }
 
 
-def coarse(options: RelaxOptions | None = None) -> RelaxOptions:
+def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
     """Options for ranking: tolerances ten times looser, and few steps."""
     given = given_options(options)
     return replace(
@@ -157,9 +168,9 @@ def make_ledger(
     chosen = find_candidates(result, peaks) if candidates is None else candidates
     entries, refused = [], []
     for number, candidate in enumerate(chosen, 1):
-        doing(f"cut {number} of {len(chosen)}, {candidate.name}")
+        report_activity(f"cut {number} of {len(chosen)}, {candidate.name}")
         try:
-            entries.append(evaluate(result, candidate, relax=coarse(relax)))
+            entries.append(evaluate(result, candidate, relax=coarse_options(relax)))
         except InputError as reason:
             refused.append((candidate.name, str(reason)))
     if not entries:
@@ -196,12 +207,12 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
         before = relax_cut(before, surface, before.positions, stage="refine", cuts=before.cuts, options=relax)
     after = cut(before, CutPlan(name=candidate.name, paths=tuple(paths)), relax=relax)
     opening, angle = _widest(after)
-    old, new = before.measures, after.measures
+    old, new = before.layout_measures, after.layout_measures
     return LedgerEntry(
         candidate=candidate,
         length=path_length(before.surface, paths),
-        energy_before=before.stages[-1].potential_j,
-        energy_after=after.stages[-1].potential_j,
+        model_energy_before=before.stages[-1].model_energy_j,
+        model_energy_after=after.stages[-1].model_energy_j,
         strain_energy_before=old["strain_energy_j"],
         strain_energy_after=new["strain_energy_j"],
         opening=opening,
@@ -238,8 +249,8 @@ class AutoCut:
 
     Attributes:
         max_cuts: at most so many; a mirrored pair counts as one.
-        stop_below: what is minimised, springs and guard, at which it is enough [J].
-        stop_below_strain: likewise for the largest worn strain along warp or weft that all but 2 % of the cloth stay below.
+        stop_below: a piece of at most this model energy (springs and guard) needs no further cut [J].
+        stop_below_strain: so does a piece of which 98 % of the cloth is strained by at most this share along warp and weft, as worn.
         by: what the best cut is: "per_cm", or "released" in all.
     """
 
@@ -250,7 +261,9 @@ class AutoCut:
 
     def is_enough(self, result: Flattening) -> bool:
         """Whether a piece needs no further cut."""
-        return result.stages[-1].potential_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
+        return (
+            result.stages[-1].model_energy_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
+        )
 
 
 def worn_strain_level(result: Flattening) -> float:

@@ -36,7 +36,7 @@ def candidate_words(entry: LedgerEntry) -> tuple[str, str, str, str, str, str]:
     return (
         f"{1e3 * entry.per_cm:.2f} mJ",
         f"{1e3 * entry.released:.0f} mJ",
-        f"{100 * entry.energy_after / max(entry.energy_before, np.finfo(float).tiny):.0f} %",
+        f"{100 * entry.model_energy_after / max(entry.model_energy_before, np.finfo(float).tiny):.0f} %",
         f"{100 * entry.length:.1f} cm",
         f"{1e3 * entry.opening:.0f} mm",
         "-" if math.isnan(entry.angle) else f"{math.degrees(entry.angle):.0f}°",
@@ -65,8 +65,8 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     pen.open_page(figure, height)
     pen.write(0.45, height - 0.35, f"{surface.name}: where to cut", 15, fontweight="bold")
     peak = ledger.peaks.words[0] if ledger.peaks.words else "none inside"
-    stored = f"{1e3 * entries[0].energy_before:.0f} mJ" if entries else ""
-    pen.write(0.45, height - 0.64, f"stores {stored}; highest energy density: {peak}", 9.5, color=_GREY)
+    stored = f"strain energy {1e3 * ledger.result.stages[-1].strain_energy_j:.0f} mJ"
+    pen.write(0.45, height - 0.64, f"{stored}; highest density: {peak}", 9.5, color=_GREY)
     scale = energy_scale(density, ledger.result.worn.area)
     drawn = DrawnView(view, left=0.45, bottom=height - 1.15 - float(view.size[1]) * per_metre,
                       inches_per_metre=per_metre, dpi=DPI)  # fmt: skip

@@ -47,7 +47,7 @@ def advise(result: Flattening) -> Flattening:
     the three nearest are named and none is tried.
     """
     found = remedies(result, result.fit, trial=result.wear is not None)
-    return replace(result, remedies=tuple(found)) if found else result
+    return result.with_remedies(found) if found else result
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
@@ -61,7 +61,7 @@ def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Re
         fit: how it sits.
         trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
     """
-    alone = result.alone or result
+    alone = result.unsewn or result
     if fit.fits or alone.fit.fits:
         return []
     found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _TOLD))
@@ -143,7 +143,8 @@ def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy
 
 
 def _tried(result: Flattening, remedy: Remedy) -> Remedy:
-    from warpflat.cutting.cut_piece import CutPlan, cut
+    from warpflat.cutting.cut_piece import cut
+    from warpflat.cutting.cut_plan import CutPlan
 
     options = result.options
     quick = replace(

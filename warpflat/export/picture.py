@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
@@ -80,7 +80,7 @@ def write_picture(
     if not pieces:
         raise ValueError("a picture needs at least one piece")
     require_writable(path)
-    doing(f"drawing {Path(path).name}")
+    report_activity(f"drawing {Path(path).name}")
     called = titles([piece.name for piece in pieces], is_drawn)
     rows = [_prepared(piece, called[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])

@@ -19,7 +19,7 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.applied_cut import AppliedCut
 from warpflat.flattening.datum import datum_extent
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.relax_pieces import Run, relax_runs
+from warpflat.flattening.relax_pieces import RelaxationTask, relax_pieces
 from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.relax import RelaxOptions, given_options
@@ -32,7 +32,7 @@ from warpflat.surface.repair.slivers import degenerate_faces
 from warpflat.surface.repair.validate import checked_positions
 from warpflat.surface.repair.weld import weld_map
 
-__all__ = ["change_fabric", "change_surface", "expect_unsewn", "relax_cut"]
+__all__ = ["change_fabric", "change_surface", "relax_cut", "require_unsewn"]
 
 
 #: A face whose width is no more than this share of the edges around it has no area to be measured by.
@@ -46,7 +46,7 @@ def change_fabric(
     relax: RelaxOptions | None = None,
     callback: Callable[[Progress], None] | None = None,
 ) -> Flattening:
-    """The same piece in another cloth, relaxed from where it lies: a fraction of what `flatten` takes.
+    """Change the cloth of a piece and relax it further from its layout, which takes a fraction of the time of `flatten`.
 
     Args:
         result: the piece, with the cuts it has; it stays as it is.
@@ -59,8 +59,10 @@ def change_fabric(
     """
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     cloth = as_fabric(fabric)
-    run = _later_run(result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback)
-    return replace(_gone_on(result, run, result.positions), fabric=cloth)
+    task = _continuation_task(
+        result, result.network.surface, cloth, f"fabric:{cloth.name}", given_options(relax), callback
+    )
+    return replace(_continue(result, task, result.positions), fabric=cloth)
 
 
 def change_surface(
@@ -70,7 +72,7 @@ def change_surface(
     relax: RelaxOptions | None = None,
     callback: Callable[[Progress], None] | None = None,
 ) -> Flattening:
-    """The same piece with its vertices elsewhere, relaxed from where it lies: after a feature line has been moved, or in another size.
+    """Move the vertices of a piece's surface and relax it further from its layout, as for a moved feature line or another size.
 
     Args:
         result: the piece, with the cuts it has; it stays as it is.
@@ -89,7 +91,7 @@ def change_surface(
     expect(result, Flattening, "result", "a Flattening, as flatten gives it")
     before, options = result.surface, given_options(relax)
     expect_callback(callback)
-    # What the faces tell is known of the ones before.
+    # The faces stay, and with them what has been found out about the mesh.
     surface = replace(_moved(before, surface), faces=before.faces, of_faces=before.of_faces)
     cut = result.network.surface
     origin, used = np.empty(len(cut.vertices), dtype=np.int32), cut.faces >= 0
@@ -104,26 +106,30 @@ def change_surface(
             input_index=surface.input_index[origin],
         )
     inherit_levels(moved, cut)
-    run = _later_run(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
+    task = _continuation_task(result, moved, result.fabric, f"surface:{surface.name}", options, callback)
     cuts = tuple(replace(made, length=path_length(surface, made.paths)) for made in result.cuts)
-    gone_on = _gone_on(result, run, result.positions)
-    # How long the datum is, if it was chosen, is told of the surface as it is now.
+    relaxed = _continue(result, task, result.positions)
+    # A note on a chosen datum has its length, which is another one now.
     chosen, now = (datum_extent(of, result.datum) for of in (before, surface))
-    notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in gone_on.notes)
-    return replace(gone_on, surface=surface, cuts=cuts, notes=notes)
+    notes = tuple(note.removesuffix(chosen) + now if note.endswith(chosen) else note for note in relaxed.notes)
+    return replace(relaxed, surface=surface, cuts=cuts, notes=notes)
 
 
-def expect_unsewn(result: Flattening) -> None:
-    """Raise InputError for a piece that has been sewn or given fullness: what holds it there is not of this piece alone."""
-    if result.alone is not None:
+def require_unsewn(result: Flattening) -> None:
+    """Refuse a piece that has been sewn or given fullness, since other pieces hold it there.
+
+    Raises:
+        InputError: it has been.
+    """
+    if result.unsewn is not None:
         raise InputError(
             f"piece {result.surface.name!r} has been sewn: edited alone it would lose its seams, folds and gathers; run the scene or "
-            "flatten_form again with the change, or edit its `alone`, the piece as it lay before"
+            "flatten_form again with the change, or edit its `unsewn`, the piece as it lay before"
         )
 
 
 def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
-    """The surface that is meant, once it is known to be the one before with its vertices elsewhere."""
+    """Return the surface with the moved vertices, checked to be the mesh before."""
     if isinstance(given, Surface):
         surface = given
         if len(surface.vertices) != len(before.vertices) or not np.array_equal(surface.faces, before.faces):
@@ -208,20 +214,20 @@ def relax_cut(
         callback: called with a `Progress` before the first step and after every step.
     """
     inherit_cells(surface, result.surface)
-    run = _later_run(result, surface, result.fabric, stage, options, callback)
-    return replace(_gone_on(result, run, positions), cuts=tuple(cuts))
+    task = _continuation_task(result, surface, result.fabric, stage, options, callback)
+    return replace(_continue(result, task, positions), cuts=tuple(cuts))
 
 
-def _later_run(
+def _continuation_task(
     result: Flattening,
     surface: Surface,
     fabric: Fabric,
     stage: str,
     options: RelaxOptions,
     callback: Callable[[Progress], None] | None,
-) -> Run:
-    """A run that goes on from a result."""
-    expect_unsewn(result)
+) -> RelaxationTask:
+    """Make the task that relaxes a piece further from a result."""
+    require_unsewn(result)
     expect_callback(callback)
     datum = result.datum
     if surface is not result.surface:
@@ -233,20 +239,22 @@ def _later_run(
             part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
             datum = datum[part_of[datum] == part_of[datum[0]]]
     device, model = result.network.device, result.network.model
-    return Run(
+    return RelaxationTask(
         surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
     )
 
 
-def _gone_on(result: Flattening, run: Run, positions: FloatArray) -> Flattening:
-    """The result of a run from a layout, with what it adds to the history."""
-    (end,) = relax_runs([run], [run.network_at(positions)], [positions], again=[run.measured_again()])
+def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -> Flattening:
+    """Relax a task from a layout (#V by 2 [m]), and return the result with its history continued."""
+    (end,) = relax_pieces(
+        [task], [task.build_network(positions)], [positions], direction_updates=[task.max_direction_updates()]
+    )
     return replace(
         result,
         network=end.network,
         positions=end.positions,
-        stages=(*result.stages, run.stage(run.stage_name, end.network, end.positions, end.outcome)),
-        history=np.concatenate([result.history.reshape(-1, 4), np.array(run.history).reshape(-1, 4)]),
-        notes=(*result.notes, *(note for note in run.notes if note not in result.notes)),
-        options=run.options,
+        stages=(*result.stages, task.make_stage(end.network, end.positions, end.outcome)),
+        history=np.concatenate([result.history.reshape(-1, 4), np.array(task.history).reshape(-1, 4)]),
+        notes=(*result.notes, *(note for note in task.notes if note not in result.notes)),
+        options=task.options,
     )

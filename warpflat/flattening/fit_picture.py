@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.core.sums import weighted_percentile
@@ -100,7 +100,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     from matplotlib.figure import Figure
 
     require_writable(path)
-    doing(f"drawing {Path(path).name}")
+    report_activity(f"drawing {Path(path).name}")
     span = np.ptp(result.positions, axis=0)
     width = 3.4
     height = float(np.clip(width * span[1] / max(float(span[0]), 1e-9), 1.6, 6.5))
@@ -141,7 +141,7 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
     from matplotlib.figure import Figure
 
     require_writable(path)
-    doing(f"drawing {Path(path).name}")
+    report_activity(f"drawing {Path(path).name}")
     spans = np.array([np.ptp(result.positions, axis=0) for result in results])
     inches = min(_COLUMN / max(float(spans[:, 0].max()), 1e-9), _TALLEST / max(float(spans[:, 1].max()), 1e-9))
     column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
@@ -238,9 +238,7 @@ def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y
     if not fit.fits:
         lines.append("")
         lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
-        lines += [
-            help_words(remedy, sewn=result.alone is not None) for remedy in result.measures["wear"]["would_help"][:1]
-        ]
+        lines += [help_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
     figure.text(x, y, title, fontsize=11, weight="bold", va="top")
     y -= 0.22 / float(figure.get_size_inches()[1])
     text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)

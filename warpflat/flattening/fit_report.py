@@ -42,6 +42,10 @@ class Remedy:
     length: float
     outside: float | None = None
 
+    def as_dict(self) -> dict[str, Any]:
+        """The remedy as an entry of `would_help` in `metrics.json`."""
+        return {"cut": self.words, "length_m": self.length, "outside_after": self.outside}
+
 
 def wear_measures(
     fit: WornFit, *, wear: Wear | None = None, unsewn: WornFit | None = None, remedies: Sequence[Remedy] = ()
@@ -57,9 +61,7 @@ def wear_measures(
     measures = {**(asdict(wear) if wear is not None else {}), **fit.as_dict()}
     if unsewn is not None:
         measures["outside_unsewn"] = unsewn.outside
-    measures["would_help"] = [
-        {"cut": remedy.words, "length_m": remedy.length, "outside_after": remedy.outside} for remedy in remedies
-    ]
+    measures["would_help"] = [remedy.as_dict() for remedy in remedies]
     return measures
 
 

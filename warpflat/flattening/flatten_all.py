@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.errors import InputError, expect_callback, expect_each
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.flattening.flatten_piece import Started, check_settings, finish, given_surface, start
+from warpflat.flattening.flatten_piece import DevelopedPiece, as_surface, check_settings, develop_piece, relax_developed
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import Model
@@ -68,12 +68,12 @@ def flatten_all(
         )
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
 
-    def started(number: int, surface: Surface | str | Path) -> Started:
-        own = given_surface(surface, units)
+    def started(number: int, surface: Surface | str | Path) -> DevelopedPiece:
+        own = as_surface(surface, units)
         try:
-            return start(own, datums[number], settings, None if callback is None else partial(callback, number))
+            return develop_piece(own, datums[number], settings, None if callback is None else partial(callback, number))
         except InputError as error:
             named = repr(own.name) in str(error)
             raise InputError(str(error) if named else f"piece {own.name!r} (surface {number}): {error}") from None
 
-    return finish([started(number, surface) for number, surface in enumerate(surfaces)])
+    return relax_developed([started(number, surface) for number, surface in enumerate(surfaces)])

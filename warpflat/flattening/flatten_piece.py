@@ -8,7 +8,6 @@ from contextlib import nullcontext
 from dataclasses import dataclass
 from os import PathLike
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
@@ -22,7 +21,7 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
 from warpflat.flattening.develop import Development, develop
 from warpflat.flattening.progress import Progress, Stage
-from warpflat.flattening.relax_pieces import Relaxed, Run, relax_runs
+from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, relax_pieces
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
@@ -32,9 +31,6 @@ from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.relax import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface, is_large
-
-if TYPE_CHECKING:
-    pass
 
 __all__ = ["flatten", "return_memory_of"]
 
@@ -62,7 +58,7 @@ def flatten(
         grain_angle: of the warp against the datum, degrees; 45 cuts on the bias.
         units: of a mesh file that carries none: "m", "cm", "mm", "in", "ft".
         model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.model.network`); what is
-            minimised is reported as `spring_energy_j` either way.
+            minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         relax: options of the relaxation.
         callback: called with a `Progress` for the development (step 0) and after every step.
@@ -71,25 +67,29 @@ def flatten(
     Raises:
         InputError: what was given cannot be flattened; one line says what, where, and what would be right.
     """
-    surface = given_surface(surface, units)
+    surface = as_surface(surface, units)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
-    started = start(surface, datum, settings, callback)
+    started = develop_piece(surface, datum, settings, callback)
     _refuse_unused_stretch(started)
-    return finish([started])[0]
+    return relax_developed([started])[0]
 
 
-def _refuse_unused_stretch(piece: Started) -> None:
-    """Which threads run around the body is known once a piece is developed; of several pieces each has its own, and a note says so."""
-    wear, notes = piece.run.wear, piece.run.notes
+def _refuse_unused_stretch(piece: DevelopedPiece) -> None:
+    """Refuse a stretch along threads that do not run around the body, which is known once the piece is developed.
+
+    Raises:
+        InputError: there is such a stretch.
+    """
+    wear, notes = piece.task.wear, piece.task.notes
     unused = [] if wear is None else [unused_stretch(wear, around) for around in ("warp", "weft")]
-    for told in unused:
-        if told in notes:
-            raise InputError(f"piece {piece.run.surface.name!r}: wear: {told}; leave it out, or the pressure")
+    for message in unused:
+        if message in notes:
+            raise InputError(f"piece {piece.task.surface.name!r}: wear: {message}; leave it out, or the pressure")
 
 
-def given_surface(surface: Surface | str | Path, units: str | None) -> Surface:
-    """The surface, read if it is a file's path.
+def as_surface(surface: Surface | str | Path, units: str | None) -> Surface:
+    """Return the surface, read from a file if a path is given.
 
     Raises:
         InputError: it is neither, or cannot be read.
@@ -101,8 +101,8 @@ def given_surface(surface: Surface | str | Path, units: str | None) -> Surface:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Settings:
-    """What several pieces that are flattened have in common; as `flatten` takes it, checked."""
+class FlattenSettings:
+    """The checked settings of `flatten` that several pieces have in common."""
 
     fabric: Fabric
     grain_angle: float
@@ -120,7 +120,7 @@ def check_settings(
     wear: Wear | None,
     relax: RelaxOptions | None,
     device: str | None,
-) -> Settings:
+) -> FlattenSettings:
     """Look up what is named, and fill in what is not given.
 
     Raises:
@@ -134,25 +134,25 @@ def check_settings(
     if angle.ndim or angle.dtype.kind not in "iuf" or not np.isfinite(angle):
         raise InputError(f"grain_angle = {grain_angle!r} is not a number of degrees")
     check_model(model)
-    return Settings(
+    return FlattenSettings(
         fabric=cloth, grain_angle=grain_angle, model=model, wear=wear, options=options, device=_device(device)
     )
 
 
 @dataclass(frozen=True, kw_only=True)
-class Started:
+class DevelopedPiece:
     """A piece that has been developed and is to be relaxed.
 
     Attributes:
-        run: what was asked for.
+        task: its relaxation.
         datum_name: its name, or how it was chosen.
-        development: let go of the stretch that is meant.
-        network: measured in it.
+        development: its first layout, shrunk by the stretch with which it is to be worn.
+        network: measured in the development.
         notes: on the datum.
-        seconds: that it took so far.
+        seconds: time spent so far.
     """
 
-    run: Run
+    task: RelaxationTask
     datum_name: str
     development: Development
     network: SpringNetwork
@@ -160,20 +160,20 @@ class Started:
     seconds: float
 
 
-def start(
+def develop_piece(
     surface: Surface,
     datum: str | ArrayLike | None,
-    settings: Settings,
+    settings: FlattenSettings,
     callback: Callable[[Progress], None] | None,
-) -> Started:
-    """The first half of `flatten`: develop the piece from its datum, and measure its network there.
+) -> DevelopedPiece:
+    """Develop a piece from its datum and measure its network there: the first half of `flatten`.
 
     Raises:
         InputError: it cannot be developed.
     """
     line, line_name, notes = resolve_datum(surface, datum)
     begun = time.perf_counter()
-    run = Run(
+    task = RelaxationTask(
         surface,
         settings.fabric,
         settings.grain_angle,
@@ -186,12 +186,12 @@ def start(
     )
     return_memory_of(surface)
     with hierarchy_in_background(surface) if settings.options.solver == "multilevel" else nullcontext():
-        development = run.let_go(develop(surface, line))
+        development = task.shrink_to_rest(develop(surface, line))
         return_memory_of(surface)
-        network = run.network_at(development.positions)
+        network = task.build_network(development.positions)
     return_memory_of(surface)
-    return Started(
-        run=run,
+    return DevelopedPiece(
+        task=task,
         datum_name=line_name,
         development=development,
         network=network,
@@ -200,23 +200,23 @@ def start(
     )
 
 
-def finish(pieces: Sequence[Started]) -> list[Flattening]:
-    """The second half of `flatten`: relax the pieces, of the same settings, side by side."""
-    relaxed = relax_runs(
-        [piece.run for piece in pieces],
+def relax_developed(pieces: Sequence[DevelopedPiece]) -> list[Flattening]:
+    """Relax developed pieces of the same settings side by side: the second half of `flatten`."""
+    relaxed = relax_pieces(
+        [piece.task for piece in pieces],
         [piece.network for piece in pieces],
         [piece.development.positions for piece in pieces],
-        again=[piece.run.measured_again(mended=piece.development.mended) for piece in pieces],
-        needs_isotropic_start=[piece.run.needs_isotropic_start(piece.development) for piece in pieces],
+        direction_updates=[piece.task.max_direction_updates(mended=piece.development.mended) for piece in pieces],
+        needs_isotropic_start=[piece.task.needs_isotropic_start(piece.development) for piece in pieces],
     )
     return [_flattening(piece, end) for piece, end in zip(pieces, relaxed, strict=True)]
 
 
-def _flattening(piece: Started, end: Relaxed) -> Flattening:
-    run, development = piece.run, piece.development
+def _flattening(piece: DevelopedPiece, end: RelaxedPiece) -> Flattening:
+    task, development = piece.task, piece.development
     developed = Stage(
         name="develop",
-        spring_energy_j=end.begin.spring,
+        model_energy_j=end.begin.potential,
         guard_energy_j=end.begin.guard,
         strain_energy_j=strain_energy(piece.network, development.positions),
         steps=0,
@@ -226,19 +226,19 @@ def _flattening(piece: Started, end: Relaxed) -> Flattening:
         residual=None,
     )
     return Flattening(
-        surface=run.surface,
-        fabric=run.fabric,
-        datum=run.datum,
+        surface=task.surface,
+        fabric=task.fabric,
+        datum=task.datum,
         datum_name=piece.datum_name,
-        grain_angle=run.grain_angle,
+        grain_angle=task.grain_angle,
         network=end.network,
         development=development,
         positions=end.positions,
-        stages=(developed, run.stage("relax", end.network, end.positions, end.outcome)),
-        history=np.array(run.history),
-        notes=(*run.surface.notes, *piece.notes, *development.notes, *run.notes),
-        wear=run.wear,
-        options=run.options,
+        stages=(developed, task.make_stage(end.network, end.positions, end.outcome)),
+        history=np.array(task.history),
+        notes=(*task.surface.notes, *piece.notes, *development.notes, *task.notes),
+        wear=task.wear,
+        options=task.options,
     )
 
 
@@ -254,6 +254,6 @@ def _device(name: str | None) -> wp.Device:
 
 
 def return_memory_of(surface: Surface) -> None:
-    """Give back what a part of the way to its relaxation has freed, where that is much: of many triangles."""
+    """Return freed memory to the system if the surface has many triangles, whose development frees much."""
     if is_large(surface) and not surface.is_quad.all():
         return_freed_memory()

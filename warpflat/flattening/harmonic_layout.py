@@ -71,7 +71,7 @@ def refuse_tubes(surface: Surface) -> None:
             raise InputError(
                 f"piece {surface.name!r} is a closed tube (a second border, {100 * size:.0f} cm long, runs around it at "
                 f"vertex {int(surface.input_index[loop[0]])}): cut it open along a line first, in the mesh (its vertices "
-                "doubled there) or by warpflat.cutting.cut_piece.cut_surfaces; [[cuts]] cut what is flat already"
+                "doubled there) or by warpflat.cutting.separate_pieces.cut_surfaces; [[cuts]] cut what is flat already"
             )
 
 

@@ -17,14 +17,22 @@ __all__ = ["Progress", "Stage"]
 
 @dataclass(frozen=True, kw_only=True)
 class Stage:
-    """A line of the history: energies [J] when a stage had ended, and what it took.
+    """An entry of a piece's history: its energies at the end of a stage, and what the stage took.
 
-    `residual` is the largest force on a vertex over the mean spring force; `work_units` counts approximate implicit
-    steps over all vertices.
+    Attributes:
+        name: "develop", "relax", "cut:NAME" and so on.
+        model_energy_j: what is minimised: springs and guard, or membrane and guard [J].
+        guard_energy_j: the part of it that keeps faces unfolded [J].
+        strain_energy_j: strain energy of the cloth as worn, eq. (3) of the paper [J].
+        steps: approximate implicit steps on the piece's own mesh.
+        work_units: all work, in approximate implicit steps over all vertices.
+        seconds: wall time.
+        converged: False if it ended at its step limit.
+        residual: largest force on a vertex over the mean spring force; None if there was no relaxation.
     """
 
     name: str
-    spring_energy_j: float
+    model_energy_j: float
     guard_energy_j: float
     strain_energy_j: float
     steps: int
@@ -32,11 +40,6 @@ class Stage:
     seconds: float
     converged: bool
     residual: float | None
-
-    @property
-    def potential_j(self) -> float:
-        """What is minimised: springs and guard."""
-        return self.spring_energy_j + self.guard_energy_j
 
     def as_dict(self) -> dict[str, Any]:
         """As in `metrics.json`."""
@@ -52,8 +55,9 @@ class Progress:
         step: approximate implicit steps so far, on the piece's own mesh.
         work_units: all work so far, in such steps.
         max_steps: at most so many.
-        spring_energy: [J], of the last look (see `RelaxOptions.check_every`).
-        residual: largest force over mean spring force, likewise.
+        model_energy: springs and guard, or membrane and guard, at the last convergence check (see `RelaxOptions.check_every`) [J].
+        guard_energy: the part of it that keeps faces unfolded [J].
+        residual: largest force over mean spring force, at the same check.
     """
 
     def __init__(
@@ -64,7 +68,7 @@ class Progress:
         self.step = state.steps
         self.work_units = state.work_units
         self.max_steps = max_steps
-        self.spring_energy = energies.spring
+        self.model_energy = energies.potential
         self.guard_energy = energies.guard
         self.residual = residual
         self._state = state

@@ -1,4 +1,8 @@
-"""Runs: from a piece's layout to the network that is measured in it, to its relaxation; those of several pieces side by side."""
+"""Pieces are relaxed here, several side by side: from a layout to the network that is measured in it, to the minimum of its energy.
+
+On triangles and under a stretch the network depends on the layout in which its directions are measured. Such a piece is relaxed in
+rounds, and its directions are updated between them.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric, grain_axes
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.develop import Development
@@ -29,27 +33,36 @@ from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.relax import Relaxation, RelaxOptions, relax
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Relaxed", "Run", "relax_runs"]
+__all__ = ["RelaxationTask", "RelaxedPiece", "relax_pieces"]
 
 
-# Rounds before the last only turn and shape the layout, since directions are measured again after them: tolerances are so many times the
-# others.
-_FIRST_ROUND = 30.0
-# Each round leaves about a fifth of what the one before was off: directions stand once a round has moved the piece by no more than this
-# share of its size, on average, and further rounds than so many would tell little.
-_STANDS = 2e-4
-_MOST_AGAIN = 6
-# And a layout that can be free of strain has told its directions once it is strained by no more than this.
-_FIRST_STRAIN = 1e-6
-# Quads across the grain are worth a note where they are so many times as stiff in shear as the cloth.
-_MUCH_EXCESS = 3.0
-# With levels it is over once a cycle takes no more than this share of the energy away.
-_FIRST_GAIN = 3e-3
+# Tolerances of all rounds but the last are looser by this factor: their layout only serves to update directions.
+_ROUND_TOLERANCE = 30.0
+# Such a round also ends once a multigrid cycle takes no more than this share of the energy away,
+_ROUND_GAIN = 3e-3
+# and once a layout that can be free of strain is strained by no more than this.
+_ROUND_STRAIN = 1e-6
+# Directions are final once a round has moved the piece by no more than this share of its size, on average. Each round leaves about a
+# fifth of the error before it, so that more rounds than this would change little.
+_SETTLED_SHIFT = 2e-4
+_MAX_UPDATES = 6
+# Quads across the grain get a note where they are this many times as stiff in shear as the cloth.
+_NOTED_EXCESS = 3.0
 
 
 @dataclass
-class Run:
-    """A run under way: what it was asked for, and the history it leaves."""
+class RelaxationTask:
+    """A piece that is to be relaxed, and the record of its relaxation.
+
+    Attributes:
+        surface, fabric, grain_angle, model, wear: the piece and its cloth, as `flatten` takes them.
+        device, options: where and how it is relaxed.
+        callback: called with its `Progress`.
+        datum: vertices of the line that stays upright.
+        stage_name: name of the stage in its history.
+        history: a row per convergence check: step, model energy [J], guard energy [J], residual.
+        notes: what was chosen or is worth a warning, one sentence each.
+    """
 
     surface: Surface
     fabric: Fabric
@@ -65,9 +78,9 @@ class Run:
     history: list[tuple[float, float, float, float]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
 
-    def let_go(self, development: Development) -> Development:
-        """The development made smaller by the mean stretch that is meant: the cloth as it was on the body, let go."""
-        stretch, _ = self._meant(development.positions)
+    def shrink_to_rest(self, development: Development) -> Development:
+        """Shrink a development by the mean stretch with which the piece is to be worn; return it as it is without one."""
+        stretch, _ = self._wanted_stretch(development.positions)
         if stretch is None:
             return development
         shrink = sum(
@@ -75,14 +88,14 @@ class Run:
         )
         return replace(development, positions=development.positions @ shrink)
 
-    def _meant(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
+    def _wanted_stretch(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
         if self.wear is None:
             return None, ()
         return meant_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
 
-    def network_at(self, positions: FloatArray) -> SpringNetwork:
-        """The piece's network, with directions measured in a layout."""
-        stretch, notes = self._meant(positions)
+    def build_network(self, positions: FloatArray) -> SpringNetwork:
+        """Build the piece's network, with directions measured in a layout (#V by 2 [m])."""
+        stretch, notes = self._wanted_stretch(positions)
         network = SpringNetwork.build(
             self.surface,
             self.fabric,
@@ -95,47 +108,57 @@ class Run:
         self.notes += [note for note in notes if note not in self.notes]
         return network
 
-    def reference_at(self, positions: FloatArray) -> SpringNetwork:
-        """The piece's network as an isotropic sheet that is worn as it lies: it shears no more easily than it stretches, and so leaves
-        a layout that is far astray by the straight way."""
+    def build_isotropic_network(self, positions: FloatArray) -> SpringNetwork:
+        """Build the network of the piece as an isotropic sheet without a stretch, with directions measured in a layout (#V by 2 [m]).
+
+        Such a sheet does not shear more easily than it stretches, so that it unfolds from a bad start without folds of its threads.
+        """
         reference = as_fabric(DEFAULT_FABRIC)
         return SpringNetwork.build(
             self.surface, reference, positions, grain_angle=self.grain_angle, device=self.device, model=self.model
         )
 
     def needs_isotropic_start(self, development: Development) -> bool:
-        """Whether the piece is relaxed as an isotropic sheet first: a harmonic map is so far off, by kilojoules, that cloth soft in shear
-        would come to rest in folds of its threads."""
+        """Return whether the piece is relaxed as an isotropic sheet first.
+
+        A harmonic map stores so much energy that cloth which is soft in shear would come to rest in folds of its threads.
+        """
         return development.method == "harmonic" and not self.fabric.is_isotropic
 
-    def measured_again(self, *, mended: bool = False) -> int:
-        """How many times at most directions are measured again: until they stand where another layout gives other springs, or other lengths
-        for a stretch that is meant; once where they matter to a membrane's steps alone, or a `mended` layout says little of them."""
+    def max_direction_updates(self, *, mended: bool = False) -> int:
+        """Return how many times directions are updated at most.
+
+        That is several times where springs, or the lengths for a stretch, depend on the layout; once where only the steps of a
+        membrane do, or where the development was repaired; and not at all otherwise.
+
+        Args:
+            mended: whether folds of the development were repaired.
+        """
         springs = self.model == "springs"
         alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
         tight = self.wear is not None and self.wear.is_tight and (springs or bool(self.wear.pressure))
-        return _MOST_AGAIN if tight or (springs and not alike) else int(mended or not alike)
+        return _MAX_UPDATES if tight or (springs and not alike) else int(mended or not alike)
 
-    def tell(self, stage: str, state: Relaxation, piece: int) -> None:
-        """Call back with where this piece of the relaxation stands, by the last look."""
+    def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
+        """Call the callback with the state of this piece at the last convergence check."""
         if self.callback is not None:
-            look = state.last
+            check = state.last
             self.callback(
                 Progress(
                     stage,
                     state,
-                    energies=Energies(*look.energies[piece].tolist()),
-                    residual=float(look.residual[piece]),
+                    energies=Energies(*check.energies[piece].tolist()),
+                    residual=float(check.residual[piece]),
                     max_steps=self.options.max_steps,
                     piece=piece,
                 )
             )
 
-    def stage(self, name: str, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> Stage:
-        """The line of the history for a stage that ended so."""
+    def make_stage(self, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> Stage:
+        """Make the entry of the history for the stage that has ended with an outcome."""
         return Stage(
-            name=name,
-            spring_energy_j=outcome.energies.spring,
+            name=self.stage_name,
+            model_energy_j=outcome.energies.potential,
             guard_energy_j=outcome.energies.guard,
             strain_energy_j=strain_energy(network, positions),
             steps=outcome.steps,
@@ -147,12 +170,12 @@ class Run:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Relaxed:
-    """A piece, relaxed.
+class RelaxedPiece:
+    """A relaxed piece.
 
     Attributes:
         network: with directions as they were measured last.
-        positions: #V by 2 [m].
+        positions: #V by 2, the layout [m].
         begin: energies at the start.
         outcome: how it ended; the seconds are those of all pieces that were relaxed with it.
     """
@@ -163,157 +186,167 @@ class Relaxed:
     outcome: Outcome
 
 
-def _off_grain(network: SpringNetwork) -> list[str]:
-    """What is to be said of quads whose edges lie across the threads."""
+def _grain_notes(network: SpringNetwork) -> list[str]:
+    """Return a note on quads whose edges run across the threads, if they are much too stiff in shear."""
     excess = network.spring_arrays.shear_excess
-    if network.model != "springs" or excess < _MUCH_EXCESS:
+    if network.model != "springs" or excess < _NOTED_EXCESS:
         return []
     return [
-        f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
+        f"the grain tasks aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
         f'{network.fabric.name}; model = "membrane" measures that exactly'
     ]
 
 
-def relax_runs(
-    runs: Sequence[Run],
+def relax_pieces(
+    tasks: Sequence[RelaxationTask],
     networks: Sequence[SpringNetwork],
     starts: Sequence[FloatArray],
     *,
-    again: Sequence[int],
+    direction_updates: Sequence[int],
     needs_isotropic_start: Sequence[bool] | None = None,
-) -> list[Relaxed]:
-    """Relax the pieces of several runs, those of a kind side by side.
+) -> list[RelaxedPiece]:
+    """Relax several pieces; those that are relaxed in the same way lie side by side in one relaxation.
 
     Args:
-        runs: of one fabric, grain, model, device, stage and set of options.
-        networks: of each, measured in its start.
-        starts: of each, #V by 2 [m].
-        again: for each, how many times at most directions are measured again: it is relaxed in rounds, and they are measured in between.
-        astray: for each, whether it is roughly relaxed as an isotropic sheet before; None of none.
+        tasks: of one fabric, grain, model, device, stage and set of options.
+        networks: the network of each piece, measured in its start.
+        starts: the layout of each piece, #V by 2 [m].
+        direction_updates: for each piece, how many times its directions are updated at most.
+        needs_isotropic_start: for each piece, whether it is first relaxed roughly as an isotropic sheet; none is if not given.
     """
+    isotropic = needs_isotropic_start or [False] * len(tasks)
     kinds: dict[tuple[bool, int, bool], list[int]] = {}
-    for number, (run, network) in enumerate(zip(runs, networks, strict=True)):
-        kinds.setdefault(
-            (
-                _has_levels(run, network),
-                again[number],
-                needs_isotropic_start is not None and needs_isotropic_start[number],
-            ),
-            [],
-        ).append(number)
-    relaxed: dict[int, Relaxed] = {}
-    for (levels, times, led), numbers in kinds.items():
-        own = [runs[number] for number in numbers]
-        batch = _Batch(own, [networks[number] for number in numbers], [starts[number] for number in numbers])
-        relaxed |= zip(numbers, batch.relax(levels=levels, again=times, needs_isotropic_start=led), strict=True)
-    for number, run in enumerate(runs):
-        # Of the springs that the pattern has: those of a start that turned out otherwise are gone.
-        run.notes += _off_grain(relaxed[number].network)
-    return [relaxed[number] for number in range(len(runs))]
+    for number, (task, network) in enumerate(zip(tasks, networks, strict=True)):
+        kind = _has_levels(task, network), direction_updates[number], isotropic[number]
+        kinds.setdefault(kind, []).append(number)
+    relaxed: dict[int, RelaxedPiece] = {}
+    for (levels, updates, isotropic_start), numbers in kinds.items():
+        batch = _Batch(
+            [tasks[number] for number in numbers],
+            [networks[number] for number in numbers],
+            [starts[number] for number in numbers],
+        )
+        results = batch.relax(levels=levels, direction_updates=updates, isotropic_start=isotropic_start)
+        relaxed |= zip(numbers, results, strict=True)
+    for number, task in enumerate(tasks):
+        # The springs of earlier rounds are gone: only those that the pattern has count.
+        task.notes += _grain_notes(relaxed[number].network)
+    return [relaxed[number] for number in range(len(tasks))]
 
 
-def _has_levels(run: Run, network: SpringNetwork) -> bool:
-    return run.options.solver == "multilevel" and multigrid_pays(network) and has_coarser(network.surface)
+def _has_levels(task: RelaxationTask, network: SpringNetwork) -> bool:
+    return task.options.solver == "multilevel" and multigrid_pays(network) and has_coarser(network.surface)
 
 
 class _Batch:
-    """Runs of one kind, and the relaxation in which their pieces lie side by side."""
+    """The relaxation in which the pieces of several tasks lie side by side."""
 
-    def __init__(self, runs: Sequence[Run], networks: Sequence[SpringNetwork], starts: Sequence[FloatArray]) -> None:
-        self._runs = runs
-        self._options = runs[0].options
-        self._first = begins([net.vertex_count for net in networks]).tolist()
+    def __init__(
+        self, tasks: Sequence[RelaxationTask], networks: Sequence[SpringNetwork], starts: Sequence[FloatArray]
+    ) -> None:
+        self._tasks = tasks
+        self._options = tasks[0].options
+        self._first = range_offsets([net.vertex_count for net in networks]).tolist()
         self._put(networks, np.concatenate(starts))
 
     def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
         upright = [
             GrainAlignment(
-                lower=first + int(run.datum[0]), upper=first + int(run.datum[-1]), vertices=slice(first, end)
+                lower=first + int(task.datum[0]), upper=first + int(task.datum[-1]), vertices=slice(first, end)
             )
-            for run, (first, end) in zip(self._runs, pairwise(self._first), strict=True)
+            for task, (first, end) in zip(self._tasks, pairwise(self._first), strict=True)
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
 
-    def relax(self, *, levels: bool, again: int, needs_isotropic_start: bool) -> list[Relaxed]:
-        """Relax them, in rounds between which directions are measured again, so many times at most; as isotropic sheets first where
-        they are astray."""
-        begun = time.perf_counter()
+    def relax(self, *, levels: bool, direction_updates: int, isotropic_start: bool) -> list[RelaxedPiece]:
+        """Relax the pieces in rounds, between which their directions are updated.
+
+        Args:
+            levels: whether multigrid is used.
+            direction_updates: how many times directions are updated at most.
+            isotropic_start: whether the pieces are relaxed roughly as isotropic sheets first.
+        """
+        started = time.perf_counter()
         begin = self._state.begin().energies
-        stage = self._runs[0].stage_name
-        self._tell(self._state, "develop" if stage == "relax" else stage)
-        if needs_isotropic_start:
+        stage = self._tasks[0].stage_name
+        self._report(self._state, "develop" if stage == "relax" else stage)
+        if isotropic_start:
             own, start = self._state.vertices, self._state.positions()
-            self._put([run.reference_at(start[at]) for run, at in zip(self._runs, own, strict=True)], start)
-            self._measure_again(levels)
-        for _ in range(again):
-            if self._measure_again(levels) <= _STANDS:
+            self._put(
+                [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
+            )
+            self._update_directions(levels)
+        for _ in range(direction_updates):
+            if self._update_directions(levels) <= _SETTLED_SHIFT:
                 break
-        outcome, state = replace(self._round(levels), seconds=time.perf_counter() - begun), self._state
-        layout, look = state.positions(), state.last
+        outcome, state = replace(self._round(levels), seconds=time.perf_counter() - started), self._state
+        layout, check = state.positions(), state.last
         return [
-            Relaxed(
+            RelaxedPiece(
                 network=net,
                 positions=layout[own],
                 begin=Energies(*begin[piece].tolist()),
                 outcome=replace(
                     outcome,
-                    converged=bool(look.at_rest[piece]),
-                    steps=int(look.steps[piece]),
-                    work_units=float(look.work_units[piece]),
-                    energy_change=float(look.change[piece]),
-                    residual=float(look.residual[piece]),
-                    energies=Energies(*look.energies[piece].tolist()),
+                    converged=bool(check.at_rest[piece]),
+                    steps=int(check.steps[piece]),
+                    work_units=float(check.work_units[piece]),
+                    energy_change=float(check.change[piece]),
+                    residual=float(check.residual[piece]),
+                    energies=Energies(*check.energies[piece].tolist()),
                 ),
             )
             for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertices, strict=True))
         ]
 
-    def _measure_again(self, levels: bool) -> float:
-        """Relax them roughly, and measure directions where they then lie; by how much of its size a piece has moved, at most."""
+    def _update_directions(self, levels: bool) -> float:
+        """Relax the pieces roughly and measure directions there; return the largest mean shift of a piece as a share of its size."""
         state = self._state
         state.options = replace(
             self._options,
-            energy_tolerance=_FIRST_ROUND * self._options.energy_tolerance,
-            residual_tolerance=_FIRST_ROUND * self._options.residual_tolerance,
+            energy_tolerance=_ROUND_TOLERANCE * self._options.energy_tolerance,
+            residual_tolerance=_ROUND_TOLERANCE * self._options.residual_tolerance,
         )
-        state.least_strain = _FIRST_STRAIN
+        state.least_strain = _ROUND_STRAIN
         before = state.positions()
-        self._round(levels, enough=_FIRST_GAIN)
+        self._round(levels, enough=_ROUND_GAIN)
         layout = state.positions()
-        self._put([run.network_at(layout[own]) for run, own in zip(self._runs, state.vertices, strict=True)], layout)
+        self._put(
+            [task.build_network(layout[own]) for task, own in zip(self._tasks, state.vertices, strict=True)], layout
+        )
         after = self._state
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
         return max(_moved(before[own], layout[own]) for own in state.vertices)
 
     def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
-        told = any(run.callback is not None for run in self._runs)
-        each_step = self._each_step if told else None
+        listens = any(task.callback is not None for task in self._tasks)
+        each_step = self._each_step if listens else None
         if not levels and self._options.solver == "multilevel" and gauss_newton_pays(self._state.network):
             return relax_gauss_newton(self._state, enough=enough, watch=self._watch, each_step=each_step)
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
-        # After an edit the layout is near the minimum already; a grid is nearer once it has been carried up from its coarser levels.
+        # After an edit the layout is near the minimum; only a grid comes nearer by nested iteration from its coarser levels.
         nested = self._state.steps == 0 and (
-            self._runs[0].stage_name == "relax"
-            or all(coarser_surfaces(run.surface)[0].smooth_carry is not None for run in self._runs)
+            self._tasks[0].stage_name == "relax"
+            or all(coarser_surfaces(task.surface)[0].smooth_carry is not None for task in self._tasks)
         )
         return relax_multilevel(self._state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
         for piece, number in enumerate(state.numbers):
             spring, guard, _ = state.last.energies[piece].tolist()
-            run = self._runs[number]
-            run.history.append((float(state.steps), spring, guard, float(state.last.residual[piece])))
+            task = self._tasks[number]
+            task.history.append((float(state.steps), spring + guard, guard, float(state.last.residual[piece])))
 
     def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        self._tell(state, self._runs[0].stage_name)
+        self._report(state, self._tasks[0].stage_name)
 
-    def _tell(self, state: Relaxation, stage: str) -> None:
+    def _report(self, state: Relaxation, stage: str) -> None:
         for piece, number in enumerate(state.numbers):
-            self._runs[number].tell(stage, state, piece)
+            self._tasks[number].report_progress(stage, state, piece)
 
 
 def _moved(before: FloatArray, after: FloatArray) -> float:
-    """How far a layout (#V by 2 [m]) has moved in itself, on average, as a share of its size."""
+    """Return how far a layout (#V by 2 [m]) has moved on average, apart from a shift of the whole, as a share of its size."""
     way = after - before
     return float(np.sqrt(np.var(way, axis=0).sum()) / np.linalg.norm(np.ptp(after, axis=0)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -13,7 +13,7 @@ import numpy as np
 import warp as wp
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.applied_cut import AppliedCut, measure_cut
 from warpflat.flattening.develop import Development
@@ -31,10 +31,10 @@ from warpflat.surface.mesh import Surface
 if TYPE_CHECKING:
     from warpflat.export.picture import PicturePiece
 
-if TYPE_CHECKING:
-    pass
+__all__ = ["Flattening", "run_metrics", "write_files"]
 
-__all__ = ["Flattening", "metrics_of", "write_results"]
+# What is measured of a layout, and does not change with the advice on it.
+_MEASURED = ("vertex_origin", "_errors", "worn", "fit", "stretched_faces", "layout_measures")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,12 +48,12 @@ class Flattening:
         datum_name: its name, or how it was chosen.
         positions: #P by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
         stages: development and relaxation, with their energies.
-        history: #K by 4, step, spring energy [J], guard energy [J], residual, at every look.
+        history: #K by 4, step, model energy [J], guard energy [J], residual, at every convergence check.
         notes: what was mended or chosen on the way, one sentence each.
-        cuts: made since the first relaxation, see `warpflat.cutting.cut_piece`.
+        cuts: what `warpflat.cut` has cut since the first relaxation.
         wear: how it is meant to be worn, if that was asked for.
         options: of its last relaxation.
-        alone: the piece as it lay before it was sewn or given fullness; None of one that was not.
+        unsewn: the piece as it lay before it was sewn or given fullness; None if it was not.
         remedies: cuts that may help where it does not fit, once `warpflat.advise` has looked for them.
     """
 
@@ -71,7 +71,7 @@ class Flattening:
     cuts: tuple[AppliedCut, ...] = ()
     wear: Wear | None = None
     options: RelaxOptions = field(default_factory=RelaxOptions)
-    alone: Flattening | None = None
+    unsewn: Flattening | None = None
     remedies: tuple[Remedy, ...] = ()
 
     @property
@@ -117,54 +117,77 @@ class Flattening:
         return self.worn.energy_density
 
     @cached_property
-    def opened(self) -> StretchedFaces | None:
+    def stretched_faces(self) -> StretchedFaces | None:
         """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
         if any(stage.name == "fullness" for stage in self.stages):
             return None
         return find_stretched_faces(self.network, self.positions)
 
     @property
-    def told(self) -> tuple[str, ...]:
-        """`notes`, and what is to be said of the pattern as it lies."""
-        return self.notes if self.opened is None else (*self.notes, self.opened.words(self.network.model))
+    def messages(self) -> tuple[str, ...]:
+        """The notes, and a warning about faces that the pattern has stretched."""
+        stretched = self.stretched_faces
+        return self.notes if stretched is None else (*self.notes, stretched.message(self.network.model))
 
     @cached_property
-    def measures(self) -> dict[str, Any]:
-        """The piece's entry in `metrics.json`."""
+    def layout_measures(self) -> dict[str, Any]:
+        """The measures that are single numbers: counts, errors, energies [J] and the flat area [m2]."""
         errors, last = self._errors, self.stages[-1]
         return {
             "vertices": len(self.surface.vertices),
             "faces": len(self.surface.faces),
             "springs": self.network.spring_count,
-            "fabric": self.fabric.name,
-            "model": self.network.model,
-            "datum": self.datum_name,
-            "development": self.development.method,
             "flipped_faces": errors.flipped_faces,
             "length_error": errors.length_error,
             "area_error": errors.area_error,
             "boundary_error": errors.boundary_error,
             "strain_energy_j": last.strain_energy_j,
-            "spring_energy_j": last.spring_energy_j,
+            "model_energy_j": last.model_energy_j,
             "guard_energy_j": last.guard_energy_j,
             "area_m2": float(self.worn.area.sum()),
+            "converged": self.converged,
+        }
+
+    @cached_property
+    def measures(self) -> dict[str, Any]:
+        """The piece's entry in `metrics.json`."""
+        return self.measure()
+
+    def measure(self, *, regions: Mapping[str, BoolArray] | None = None) -> dict[str, Any]:
+        """Build the piece's entry in `metrics.json`.
+
+        Args:
+            regions: sets of faces by name, #F each, such as the bricks of a form; their strain energies are reported, too.
+        """
+        return {
+            **self.layout_measures,
+            "fabric": self.fabric.name,
+            "model": self.network.model,
+            "datum": self.datum_name,
+            "development": self.development.method,
             "wear": wear_measures(
                 self.fit,
                 wear=self.wear,
-                unsewn=None if self.alone is None else self.alone.fit,
+                unsewn=None if self.unsewn is None else self.unsewn.fit,
                 remedies=self.remedies,
             ),
-            "converged": self.converged,
             "stages": [stage.as_dict() for stage in self.stages],
             "cuts": [measure_cut(self.network.surface, self.positions, cut) for cut in self.cuts],
-            "energy": energy_report(self.network.surface, self.worn.energy),
-            "opened": None if self.opened is None else self.opened.as_dict(),
-            "notes": list(self.told),
+            "energy": energy_report(self.network.surface, self.worn.energy, regions=regions),
+            "opened": None if self.stretched_faces is None else self.stretched_faces.as_dict(),
+            "notes": list(self.messages),
         }
+
+    def with_remedies(self, remedies: Sequence[Remedy]) -> Flattening:
+        """Return the piece with these cuts as `remedies`; what has been measured of its layout is kept."""
+        advised = replace(self, remedies=tuple(remedies))
+        kept = {name: self.__dict__[name] for name in _MEASURED if name in self.__dict__}
+        advised.__dict__.update(kept)
+        return advised
 
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
-        return metrics_of([self])
+        return run_metrics({self.surface.name: self.measures}, self.network.device)
 
     def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
         """Write `metrics.json`, `NAME.obj`, `picture.png` and `frames.usdc` (development and pattern), all of them or none.
@@ -172,7 +195,7 @@ class Flattening:
         Args:
             folder: made if need be.
             picture: whether to draw one.
-            frames: whether to write a USD file; a run that streams its own frames does not want this one.
+            frames: whether to write a USD file.
 
         Returns:
             The names of the files.
@@ -180,7 +203,15 @@ class Flattening:
         Raises:
             InputError: the folder cannot be written, or the surface was read from a file there that would be replaced.
         """
-        return write_results([self], folder, picture=picture, frames=frames)
+        from warpflat.core.atomic_files import output_folder
+        from warpflat.core.manifest import require_own_metrics, write_metrics
+
+        others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
+        with output_folder(folder, others, sources=self.surface.sources) as to:
+            require_own_metrics(to)
+            files = write_files([self], to, picture=picture, frames=frames)
+            write_metrics(to, self.metrics())
+        return [*files, "metrics.json"]
 
     def write_obj(self, folder: Path) -> str:
         """Write `NAME.obj` and return its name."""
@@ -197,7 +228,7 @@ class Flattening:
 
     def captions(self) -> dict[str, str]:
         """The key measures as short texts."""
-        m = self.measures
+        m = self.layout_measures
         captions = {
             "fabric": self.fabric.name,
             "strain energy": f"{1e3 * m['strain_energy_j']:.3g} mJ",
@@ -211,54 +242,48 @@ class Flattening:
         return captions
 
 
-def metrics_of(results: Sequence[Flattening], more: Mapping[str, Any] | None = None) -> dict[str, Any]:
-    """All of `metrics.json` for pieces of different names, and what more there is to say of them together."""
-    device = results[0].network.device
+def run_metrics(
+    pieces: Mapping[str, Mapping[str, Any]], device: wp.Device, more: Mapping[str, Any] | None = None
+) -> dict[str, Any]:
+    """Assemble all of `metrics.json`.
+
+    Args:
+        pieces: the entries of the pieces by name, each of `Flattening.measure`.
+        device: on which they were relaxed.
+        more: entries besides the pieces.
+    """
     return {
         "schema": 1,
         "warpflat": __version__,
         "warp": wp.config.version,
         "device": platform.machine() + " cpu" if device.is_cpu else str(device.name),
-        "pieces": {result.surface.name: result.measures for result in results},
+        "pieces": dict(pieces),
         **(more or {}),
     }
 
 
-def write_results(
-    results: Sequence[Flattening],
-    folder: str | Path,
-    *,
-    picture: bool = True,
-    frames: bool = True,
-    more: Mapping[str, Any] | None = None,
-) -> list[str]:
-    """Write the files of all pieces, together or not at all, and return their names.
+def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool) -> list[str]:
+    """Write the files of several pieces, but not `metrics.json`, and return their names.
 
     Args:
         results: the pieces, of different names.
-        folder: made if need be.
+        folder: an existing one, in a block of :func:`warpflat.core.atomic_files.output_folder`.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
-        more: entries of `metrics.json` besides the pieces.
 
     Raises:
-        InputError: the folder cannot be written, or a piece was read from a file that would be replaced.
+        InputError: the folder cannot be written.
     """
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.manifest import require_own_metrics, write_metrics
     from warpflat.export.picture import write_picture
 
-    others = [*(["frames.usdc"] if frames else []), *(["picture.png"] if picture else []), "metrics.json"]
-    sources = [source for result in results for source in result.surface.sources]
-    with output_folder(folder, others, sources=sources) as to:
-        require_own_metrics(to)
-        files = [result.write_obj(to) for result in results]
-        if frames:
-            _write_frames(to / "frames.usdc", results)
-        if picture:
-            write_picture(to / "picture.png", [result.picture_piece() for result in results])
-        write_metrics(to, metrics_of(results, more))
-    return [*files, *others]
+    files = [result.write_obj(folder) for result in results]
+    if frames:
+        files.append("frames.usdc")
+        _write_frames(folder / files[-1], results)
+    if picture:
+        files.append("picture.png")
+        write_picture(folder / files[-1], [result.picture_piece() for result in results])
+    return files
 
 
 def _picture_piece(result: Flattening) -> PicturePiece:

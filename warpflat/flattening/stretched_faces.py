@@ -1,4 +1,4 @@
-"""Faces that the pattern has opened: far larger flat than on the body, where the cloth shears too easily to hold them."""
+"""Stretched faces: far larger in the pattern than on the body, where the cloth shears too easily."""
 
 from __future__ import annotations
 
@@ -14,9 +14,10 @@ from warpflat.model.strain import face_areas
 
 __all__ = ["StretchedFaces", "find_stretched_faces"]
 
-# Faces so many times as large as on the body are told of, if they take up this share of the body's area too much.
-_OPENED = 2.0
-_MATTERS = 1e-3
+# A face is stretched from this many times its area on the body.
+_STRETCHED = 2.0
+# The area that stretched faces take up too much is reported from this share of the body's area.
+_LEAST_SHARE = 1e-3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,13 +25,13 @@ class StretchedFaces:
     """Faces that are more than twice as large in the pattern as on the body.
 
     Attributes:
-        faces: how many.
-        area_m2: theirs on the body.
-        flat_area_m2: theirs in the pattern.
-        times: how many times as large the worst one is.
-        face: its number, from 0.
-        at: the worst one's middle on the body [m].
-        in_pattern: and in the pattern [m].
+        faces: their number.
+        area_m2: their area on the body.
+        flat_area_m2: their area in the pattern.
+        times: flat area over body area of the worst face.
+        face: index of the worst face, from 0.
+        at: middle of the worst face on the body [m].
+        in_pattern: middle of the worst face in the pattern [m].
     """
 
     faces: int
@@ -41,23 +42,28 @@ class StretchedFaces:
     at: tuple[float, float, float]
     in_pattern: tuple[float, float]
 
-    def words(self, model: str) -> str:
-        """A note on them, and what may help."""
+    def message(self, model: str) -> str:
+        """Return a warning about the faces, with what may help.
+
+        Args:
+            model: the mechanical model of the piece, "springs" or "membrane".
+        """
         body, flat = ", ".join(f"{100 * x:.1f}" for x in self.at), ", ".join(f"{1e3 * x:.0f}" for x in self.in_pattern)
         springs = 'model = "springs" or ' if model == "membrane" else ""
         return (
-            f"{counted(self.faces, 'face')} of {1e4 * self.area_m2:.3g} cm2 on the body take up {1e4 * self.flat_area_m2:.3g} cm2 of "
-            f"the pattern: face {self.face} around ({body}) cm, in the pattern ({flat}) mm, {self.times:.3g} times its area; the cloth "
-            f"would have to shear so far there: make a dart or a seam, or take {springs}a fabric that shears less"
+            f"{counted(self.faces, 'face')} of {1e4 * self.area_m2:.3g} cm2 on the body take up "
+            f"{1e4 * self.flat_area_m2:.3g} cm2 of the pattern: face {self.face} around ({body}) cm, "
+            f"in the pattern ({flat}) mm, {self.times:.3g} times its area; the cloth would have to shear so far "
+            f"there: make a dart or a seam, or take {springs}a fabric that shears less"
         )
 
     def as_dict(self) -> dict[str, Any]:
-        """The entry `opened` in `metrics.json`."""
+        """Return the entry `opened` of `metrics.json`."""
         return {**vars(self), "at": list(self.at), "in_pattern": list(self.in_pattern)}
 
 
 def find_stretched_faces(network: SpringNetwork, positions: FloatArray) -> StretchedFaces | None:
-    """Find the faces of a pattern that are more than twice as large as on the body; None where they make up next to nothing.
+    """Find the faces of a pattern that are more than twice as large as on the body; None if they take up hardly any area.
 
     Args:
         network: the piece's springs, with its cuts made.
@@ -65,8 +71,8 @@ def find_stretched_faces(network: SpringNetwork, positions: FloatArray) -> Stret
     """
     surface = network.surface
     flat, body = face_areas(network, positions)
-    chosen = np.flatnonzero(flat > _OPENED * body)
-    if (flat - body)[chosen].sum() <= _MATTERS * body.sum():
+    chosen = np.flatnonzero(flat > _STRETCHED * body)
+    if (flat - body)[chosen].sum() <= _LEAST_SHARE * body.sum():
         return None
     worst = int(chosen[np.argmax((flat / np.maximum(body, 1e-300))[chosen])])
     corners = surface.faces[worst][surface.faces[worst] >= 0]

@@ -77,7 +77,7 @@ def give_fullness(
     positions = state.positions()
     stage = Stage(
         name="fullness",
-        spring_energy_j=outcome.energies.spring,
+        model_energy_j=outcome.energies.potential,
         guard_energy_j=outcome.energies.guard,
         strain_energy_j=strain_energy(network, positions),
         steps=outcome.steps,
@@ -95,7 +95,7 @@ def give_fullness(
         positions=positions,
         stages=(*piece.stages, stage),
         notes=notes,
-        alone=piece.alone or piece,
+        unsewn=piece.unsewn or piece,
     )
 
 
@@ -118,7 +118,7 @@ def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
 
 def _missed(stage: Stage) -> float:
     """What the cloth stores and springs do not tell of [J]."""
-    return stage.strain_energy_j - stage.potential_j
+    return stage.strain_energy_j - stage.model_energy_j
 
 
 def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:

@@ -16,7 +16,7 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.result import Flattening
+from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.ease import SeamWish, wished_seams
 from warpflat.garment.fullness import FullEdge, give_fullness
@@ -26,7 +26,6 @@ from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece, FormSeam
 from warpflat.solver.relax import RelaxOptions
-from warpflat.surface.energy_map import energy_report
 
 __all__ = ["Garment", "flatten_form"]
 
@@ -89,7 +88,7 @@ class Garment:
     @property
     def notes(self) -> tuple[str, ...]:
         """What was completed, mended or chosen, one sentence each."""
-        of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.told)
+        of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 
     def _measured(self, seam: FormSeam, ratio: float, price: float | None) -> SeamLengths:
@@ -106,25 +105,23 @@ class Garment:
             price=price,
         )
 
-    def _measures(self, name: str) -> dict[str, Any]:
-        """The piece's measures, its energy also brick by brick."""
-        piece, brick = self.pieces[name], np.array(self.form.pieces[name].face_brick)
-        bricks = {each: brick == each for each in dict.fromkeys(brick.tolist())}
-        return {**piece.measures, "energy": energy_report(piece.network.surface, piece.worn.energy, regions=bricks)}
+    def _measure(self, name: str) -> dict[str, Any]:
+        """Build the piece's entry in `metrics.json`, with its strain energy brick by brick."""
+        brick = np.array(self.form.pieces[name].face_brick)
+        return self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
 
     def metrics(self) -> dict[str, Any]:
         """All of `metrics.json`."""
         first = next(iter(self.pieces.values()))
-        pieces = {name: self._measures(name) for name in self.pieces}
-        return {
-            **first.metrics(),
-            "pieces": pieces,
+        pieces = {name: self._measure(name) for name in self.pieces}
+        more = {
             "wear": garment_wear(pieces),
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
             **({} if self.sewn is None else self._sewing()),
         }
+        return run_metrics(pieces, first.network.device, more)
 
     def summary(self) -> dict[str, Any]:
         """What `metrics.json` says of it as another size: whether its pieces came to rest and lie without flips, and its seams."""
@@ -156,16 +153,21 @@ class Garment:
         """
         from warpflat.core.atomic_files import output_folder
         from warpflat.core.manifest import require_own_metrics, write_metrics
-        from warpflat.export.picture import write_picture
 
         others = [*(["picture.png"] if picture else []), "metrics.json"]
         with output_folder(folder, others, sources=self.mannequin.sources) as to:
             require_own_metrics(to)
-            files = [piece.write_obj(to) for piece in self.pieces.values()]
-            if picture:
-                write_picture(to / "picture.png", [piece.picture_piece() for piece in self.pieces.values()])
+            files = self.write_files(to, picture=picture)
             write_metrics(to, self.metrics())
-        return [*files, *others]
+        return [*files, "metrics.json"]
+
+    def write_files(self, folder: Path, *, picture: bool) -> list[str]:
+        """Write an OBJ per piece and `picture.png`, but not `metrics.json`, and return their names.
+
+        Raises:
+            InputError: the folder cannot be written.
+        """
+        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False)
 
 
 def flatten_form(

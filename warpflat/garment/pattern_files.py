@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import counted
 from warpflat.garment.edge_rules import EdgeRules
@@ -171,7 +171,7 @@ def _drawn(
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
-    doing("drafting the pattern")
+    report_activity("drafting the pattern")
     try:
         pattern, notes = make()
         drafted, told = _drafted(pattern, options.tolerance)
@@ -247,7 +247,7 @@ def _write(
     from warpflat.export.svg import write_svg
 
     file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
-    doing(f"writing {file.name}")
+    report_activity(f"writing {file.name}")
     if kind == "dxf":
         write_dxf(drafted, file, dialect=dialect, sizes=sizes)
     elif kind == "svg":
@@ -268,7 +268,7 @@ def _marker(
     from warpflat.export.svg import write_marker_svg
     from warpflat.pattern.marker import make_marker
 
-    doing(f"laying the marker, {seconds} s at most")
+    report_activity(f"laying the marker, {seconds} s at most")
     try:
         marker = make_marker(drafted, cloth, seconds=seconds)
     except InputError as error:

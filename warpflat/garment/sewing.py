@@ -20,7 +20,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.result import Flattening
@@ -236,14 +236,14 @@ def _relax_in_rounds(
     if seams is None:
         return relax(state), np.zeros(0), True, False
     amiss: list[float] = []
-    doing("sewing")
+    report_activity("sewing")
     while True:
         steps = _ROUND + len(amiss) // _LONGER * _ROUND // 4
         state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
         outcome, misses = relax(state), _misses(state)
         amiss.append(ties.amiss(misses))
         furthest = np.abs(np.where(ties.soft > 0, 0.0, misses)).max(initial=0.0)
-        doing(f"sewing, step {state.steps}, {1e3 * furthest:.2g} mm amiss")
+        report_activity(f"sewing, step {state.steps}, {1e3 * furthest:.2g} mm amiss")
         done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
         contradictory = not done and _contradict(amiss)
         if done or contradictory or state.steps >= options.max_steps:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from warpflat.core.arrays import IntArray
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.flattening.progress import Stage
 from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
@@ -34,7 +34,7 @@ class SewingNetwork:
     def __init__(self, pieces: Mapping[str, Flattening]) -> None:
         """Put the pieces, of one fabric, side by side."""
         self.pieces = pieces
-        first = begins([len(piece.positions) for piece in pieces.values()])
+        first = range_offsets([len(piece.positions) for piece in pieces.values()])
         self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
         self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
         self.upright = {
@@ -65,7 +65,7 @@ class SewingNetwork:
             energies = Relaxation(piece.network, state.options, start=own).energies()
             stage = Stage(
                 name="sew",
-                spring_energy_j=energies.spring,
+                model_energy_j=energies.potential,
                 guard_energy_j=energies.guard,
                 strain_energy_j=strain_energy(piece.network, own),
                 steps=state.steps,
@@ -74,7 +74,7 @@ class SewingNetwork:
                 converged=converged,
                 residual=residual,
             )
-            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), alone=piece.alone or piece)
+            sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), unsewn=piece.unsewn or piece)
         return sewn
 
 

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, SpringsAround
 from warpflat.surface.cells import CellArrays
@@ -20,7 +20,7 @@ __all__ = ["join_networks", "join_surfaces"]
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
     """One surface of several, without their lines: the vertices and faces of the first one, then of the next."""
     vertices = np.concatenate([surface.vertices for surface in surfaces])
-    first = begins([len(surface.vertices) for surface in surfaces])
+    first = range_offsets([len(surface.vertices) for surface in surfaces])
     return Surface(
         vertices=vertices,
         faces=np.concatenate(
@@ -41,7 +41,7 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
     first = networks[0]
     if len(networks) == 1:
         return first
-    vertex = begins([net.vertex_count for net in networks])
+    vertex = range_offsets([net.vertex_count for net in networks])
     stretches = [net.stretch for net in networks if net.stretch is not None]
     held = [net.held for net in networks if net.held is not None]
     hold = np.concatenate([np.broadcast_to(net.shear_hold, net.face_count) for net in networks])
@@ -73,8 +73,8 @@ def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> 
 def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> SpringArrays:
     """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
     springs = [net.spring_arrays for net in networks]
-    edge = begins([s.edge_count for s in springs])
-    diagonal = edge[-1] + begins([s.count - s.edge_count for s in springs])
+    edge = range_offsets([s.edge_count for s in springs])
+    diagonal = edge[-1] + range_offsets([s.count - s.edge_count for s in springs])
     around = [s.around for s in springs]
 
     def numbers() -> IntArray:
@@ -101,7 +101,7 @@ def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> Spring
 
 def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArrays:
     cells = [net.cell_arrays for net in networks]
-    face, cell = begins([len(c.faces) for c in cells]), begins([len(c.laid) for c in cells])
+    face, cell = range_offsets([len(c.faces) for c in cells]), range_offsets([len(c.laid) for c in cells])
     around = [c.around for c in cells]
     return CellArrays(
         faces=np.concatenate(
@@ -117,5 +117,5 @@ def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArra
 
 
 def _join_offsets(offsets: Sequence[IntArray]) -> IntArray:
-    first = begins([int(offset[-1]) for offset in offsets])
+    first = range_offsets([int(offset[-1]) for offset in offsets])
     return np.concatenate([*(offset[:-1] + at for offset, at in zip(offsets, first, strict=False)), first[-1:]])

@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.scene.comparison import Comparison
-from warpflat.scene.cuts import CutStory
+from warpflat.scene.cuts import CutSequence
 from warpflat.scene.load import Scene, scene_fabric
 from warpflat.scene.run import flatten_scene, scene_cuts
 
@@ -53,9 +53,9 @@ def compare_fabrics(
             raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
         dressed[fabric.name] = one
     # Cuts are the scene's, found once, and all of them made, so that all patterns have the same points.
-    story = None
+    sequence = None
     if scene.settings.mannequin is None:
-        story = replace(scene_cuts(scene, device=device), auto=None)
+        sequence = replace(scene_cuts(scene, device=device), auto=None)
     results: dict[str, Mapping[str, Flattening]] = {}
     sewing: dict[str, Mapping[str, Any]] = {}
     for name, one in dressed.items():
@@ -64,7 +64,7 @@ def compare_fabrics(
             if on_progress is not None:
                 on_progress(name, progress)
 
-        results[name], sewing[name] = _run(one, story, told, device)
+        results[name], sewing[name] = _run(one, sequence, told, device)
     first = next(iter(results.values()))
     layouts = {
         name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
@@ -74,20 +74,20 @@ def compare_fabrics(
 
 
 def _run(
-    scene: Scene, story: CutStory | None, told: Callable[[Progress], None], device: str | None
+    scene: Scene, sequence: CutSequence | None, told: Callable[[Progress], None], device: str | None
 ) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
     """The pieces as a run of the scene gives them, and how they were sewn."""
-    from warpflat.cutting.cut_piece import separate
     from warpflat.cutting.remedies import advise
+    from warpflat.cutting.separate_pieces import separate
     from warpflat.scene.run_garment import plan_garment
 
-    if story is None:
+    if sequence is None:
         garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: told(progress))
         how = garment.summary()
         return {name: advise(piece) for name, piece in garment.pieces.items()}, {
             key: how[key] for key in how if key != "pieces"
         }
-    result, sewn = flatten_scene(scene, story, callback=told, device=device)
+    result, sewn = flatten_scene(scene, sequence, callback=told, device=device)
     return {piece.surface.name: advise(piece) for piece in separate(result)}, {} if sewn is None else sewn.metrics()
 
 
@@ -130,9 +130,7 @@ def comparison_table(comparison: Comparison) -> str:
         for name in borders[0]:
             rows.append((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]))
         rows.append(("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]))
-        rows.append(
-            ("minimised energy [mJ]", [f"{1e3 * (m['spring_energy_j'] + m['guard_energy_j']):.4g}" for m in measures])
-        )
+        rows.append(("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]))
         rows.append(("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]))
         for thread in ("warp", "weft"):
             worst = [m["wear"][f"strain_{thread}"] for m in measures]

@@ -10,18 +10,18 @@ from warpflat.core.arrays import IntArray
 from warpflat.scene.schema import AutoCutTable, CutTable
 
 if TYPE_CHECKING:
-    from warpflat.cutting.cut_piece import CutPlan
+    from warpflat.cutting.cut_plan import CutPlan
     from warpflat.cutting.ledger import AutoCut, Ledger
     from warpflat.flattening.result import Flattening
     from warpflat.solver.relax import RelaxOptions
     from warpflat.surface.mesh import Surface
     from warpflat.surface.paths.trace import SurfacePath
 
-__all__ = ["CutStory", "plan_automatic_cuts", "plan_cuts", "story_of_entry"]
+__all__ = ["CutSequence", "cuts_of_entry", "plan_automatic_cuts", "plan_cuts"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class CutStory:
+class CutSequence:
     """What is to be cut, worked into the surface so that no face changes on the way.
 
     Attributes:
@@ -42,18 +42,18 @@ class CutStory:
         """How many of the cuts may be made in the end."""
         return range(len(self.plans) if self.auto is None else self.first_auto, len(self.plans) + 1)
 
-    def goes_on(self, result: Flattening, number: int) -> bool:
+    def is_needed(self, result: Flattening, number: int) -> bool:
         """Whether the cut of that number is made on the piece as it is by then."""
         return self.auto is None or number < self.first_auto or not self.auto.is_enough(result)
 
 
-def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
+def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
     """The surface with the paths of all cuts worked into its edges, and the cuts.
 
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
     """
-    from warpflat.cutting.cut_piece import CutPlan, draw_line, line_part
+    from warpflat.cutting.cut_plan import CutPlan, draw_line, line_part
     from warpflat.scene.load import errors_named
 
     names = [table.name or table.line or f"cut {number}" for number, table in enumerate(tables, start=1)]
@@ -76,7 +76,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutStory:
         paths.setdefault(name, []).append(row)
         tip_back[name] = max(tip_back.get(name, 0.0), table.tip_back)
     plans = tuple(CutPlan(name=name, paths=tuple(rows), tip_back=tip_back[name]) for name, rows in paths.items())
-    return CutStory(surface=surface, plans=plans, first_auto=len(plans))
+    return CutSequence(surface=surface, plans=plans, first_auto=len(plans))
 
 
 def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:
@@ -110,16 +110,16 @@ def _path(surface: Surface, table: CutTable) -> SurfacePath:
 
 
 def plan_automatic_cuts(
-    story: CutStory,
+    sequence: CutSequence,
     table: AutoCutTable,
     *,
     flatten: Callable[[Surface, RelaxOptions], Flattening],
     relax: RelaxOptions,
-) -> tuple[CutStory, tuple[Ledger, ...]]:
+) -> tuple[CutSequence, tuple[Ledger, ...]]:
     """Look for the best cuts, coarsely; which of them are needed is decided once each has been relaxed fully.
 
     Args:
-        story: what is cut before.
+        sequence: what is cut before.
         table: the settings.
         flatten: flattens a surface with the scene's other settings.
         relax: the scene's options.
@@ -131,49 +131,49 @@ def plan_automatic_cuts(
         InputError: a cut that is made before is refused.
     """
     from warpflat.core.errors import InputError
-    from warpflat.cutting.cut_piece import replace_paths
-    from warpflat.cutting.ledger import AutoCut, coarse, cut_automatically
+    from warpflat.cutting.cut_plan import CutPlan
+    from warpflat.cutting.ledger import AutoCut, coarse_options, cut_automatically
 
     auto = AutoCut(**table.model_dump())
     # Energies are a little higher while the relaxation is coarse: whether a cut is needed is for the full one to say.
     search = replace(auto, stop_below=0.0, stop_below_strain=0.0)
-    result = flatten_and_cut(story, flatten=flatten, relax=coarse(relax))
+    result = flatten_and_cut(sequence, flatten=flatten, relax=coarse_options(relax))
     why = "none would release energy without overlapping"
     try:
         result, ledgers = cut_automatically(result, search, relax=relax, fully=False)
     except InputError as nowhere:
         ledgers, why = (), str(nowhere)
-    plans = tuple(replace_paths(made, made.paths) for made in result.cuts)
-    found = [plan.name for plan in plans[len(story.plans) :]]
+    plans = tuple(CutPlan.from_applied(made) for made in result.cuts)
+    found = [plan.name for plan in plans[len(sequence.plans) :]]
     note = f"cuts found: {'; '.join(found)}" if found else f"no cut was found: {why}"
-    planned = CutStory(
-        surface=result.surface, plans=plans, auto=auto, first_auto=len(story.plans), notes=(*story.notes, note)
+    planned = CutSequence(
+        surface=result.surface, plans=plans, auto=auto, first_auto=len(sequence.plans), notes=(*sequence.notes, note)
     )
     return planned, ledgers
 
 
 def flatten_and_cut(
-    story: CutStory, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
+    sequence: CutSequence, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
 ) -> Flattening:
-    """The piece after all cuts of a story."""
+    """The piece after all cuts of a sequence."""
     from warpflat.cutting.cut_piece import cut
 
-    result = flatten(story.surface, relax)
-    for plan in story.plans:
+    result = flatten(sequence.surface, relax)
+    for plan in sequence.plans:
         result = cut(result, plan, relax=relax)
     return result
 
 
-def story_of_entry(ledger: Ledger, number: int) -> CutStory:
+def cuts_of_entry(ledger: Ledger, number: int) -> CutSequence:
     """The cuts that a ledger's piece has, and its candidate of that number, from 1.
 
     Raises:
         InputError: there is no such number.
     """
     from warpflat.core.errors import InputError
-    from warpflat.cutting.cut_piece import replace_paths
+    from warpflat.cutting.cut_plan import CutPlan
 
     if not 1 <= number <= len(ledger.entries):
         raise InputError(f"there is no candidate {number}; valid: 1 to {len(ledger.entries)}")
     result = ledger.entries[number - 1].result
-    return CutStory(surface=result.surface, plans=tuple(replace_paths(made, made.paths) for made in result.cuts))
+    return CutSequence(surface=result.surface, plans=tuple(CutPlan.from_applied(made) for made in result.cuts))

@@ -1,4 +1,4 @@
-"""The story of a piece as frames: development, relaxation, the line of a cut, the crack as it opens."""
+"""Frames of a run: the development, the relaxation, the line of a cut, and the crack as it opens."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
-    from warpflat.cutting.cut_piece import CutPlan
+    from warpflat.cutting.cut_plan import CutPlan
     from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Film", "FrameSchedule", "path_in_pattern"]
+__all__ = ["FrameRecorder", "FrameSchedule", "path_in_pattern"]
 
 
 class Schedule(Protocol):
@@ -37,7 +37,7 @@ class Schedule(Protocol):
         ...
 
 
-class Film:
+class FrameRecorder:
     """Writes frames of one piece while it runs; a callback of `flatten` and of `cut`."""
 
     def __init__(self, writer: FrameWriter | None, surface: Surface, new_schedule: Callable[[], Schedule]) -> None:
@@ -70,22 +70,21 @@ class Film:
             faces=cut_surface.faces if opened else None,
             lines=cut_surface.lines if opened else None,
             cuts=self._cut_lines() if opened else None,
-            measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
+            measures={"step": progress.step, "model_energy_j": progress.model_energy},
         )
 
-    def last(self, result: Flattening) -> None:
+    def record_result(self, result: Flattening) -> None:
         """The frame of a finished result, with its measures."""
         if self._writer is None:
             return
-        numbers = {key: value for key, value in result.measures.items() if isinstance(value, (int, float))}
         self._writer.write(
             self._surface.name,
             positions=result.positions,
             face_energy_density=result.face_energy_density,
-            measures={"step": result.stages[-1].steps, **numbers},
+            measures={"step": result.stages[-1].steps, **result.layout_measures},
         )
 
-    def mark(self, result: Flattening, plan: CutPlan) -> None:
+    def record_cut_line(self, result: Flattening, plan: CutPlan) -> None:
         """The frame in which the line of the next cut is drawn on the piece; the next stage begins."""
         self._plans.append(plan)
         self._schedule = self._new_schedule()
@@ -96,7 +95,7 @@ class Film:
             positions=result.positions,
             face_energy_density=result.face_energy_density,
             cuts=self._cut_lines(),
-            measures={"step": 0, "spring_energy_j": result.stages[-1].spring_energy_j},
+            measures={"step": 0, "model_energy_j": result.stages[-1].model_energy_j},
         )
 
     def _cut_lines(self) -> dict[str, list[IntArray]]:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_run
-from warpflat.scene.cuts import CutStory
+from warpflat.scene.cuts import CutSequence
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import (
     Scene,
@@ -30,7 +30,7 @@ if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
     from warpflat.garment.edge_rules import EdgeRules
     from warpflat.garment.sew_surface import SewnSurface
-    from warpflat.scene.frames import Film
+    from warpflat.scene.frames import FrameRecorder
 
 __all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
 
@@ -41,7 +41,7 @@ def run_scene(
     *,
     on_progress: Callable[[Progress], None] | None = None,
     device: str | None = None,
-    cuts: CutStory | None = None,
+    cuts: CutSequence | None = None,
 ) -> SceneResult:
     """Flatten the scene's surface, or the pieces of its form, and write the result.
 
@@ -55,7 +55,7 @@ def run_scene(
         out: folder for the files, made if need be.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
-        cuts: to be made instead of the scene's own (see `warpflat.scene.cuts.story_of_entry`).
+        cuts: to be made instead of the scene's own (see `warpflat.scene.cuts.cuts_of_entry`).
 
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
@@ -80,12 +80,12 @@ def _run_surface(
     *,
     on_progress: Callable[[Progress], None] | None,
     device: str | None,
-    cuts: CutStory | None,
+    cuts: CutSequence | None,
 ) -> SceneResult:
-    from warpflat.cutting.cut_piece import separate
     from warpflat.cutting.remedies import advise
+    from warpflat.cutting.separate_pieces import separate
     from warpflat.export.usd import FrameWriter
-    from warpflat.scene.frames import Film
+    from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
 
@@ -94,20 +94,20 @@ def _run_surface(
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
-    story = cuts or scene_cuts(scene, device=device)
-    _check_edges(scene, story, drawing.rules)
+    sequence = cuts or scene_cuts(scene, device=device)
+    _check_edges(scene, sequence, drawing.rules)
     wanted = FrameSchedule(settings.output).wanted
-    require_memory_for_run(len(story.surface.vertices), frames=wanted)
+    require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
     with ExitStack() as stack:
         writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
-        film = Film(writer, story.surface, lambda: FrameSchedule(settings.output))
+        recorder = FrameRecorder(writer, sequence.surface, lambda: FrameSchedule(settings.output))
 
         def each_step(progress: Progress) -> None:
-            film(progress)
+            recorder(progress)
             if on_progress is not None:
                 on_progress(progress)
 
-        result, sewn = flatten_scene(scene, story, film=film, callback=each_step, device=device)
+        result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
     pieces = [advise(piece) for piece in separate(result)]
     return write_surface(
         scene,
@@ -117,7 +117,7 @@ def _run_surface(
         seams=seams,
         more={} if sewn is None else sewn.metrics(),
         frames=wanted,
-        notes=(*result.told, *story.notes),
+        notes=(*result.messages, *sequence.notes),
     )
 
 
@@ -143,9 +143,9 @@ def files_of_run(scene: Scene) -> list[str]:
 
 def flatten_scene(
     scene: Scene,
-    story: CutStory,
+    sequence: CutSequence,
     *,
-    film: Film | None = None,
+    recorder: FrameRecorder | None = None,
     callback: Callable[[Progress], None] | None = None,
     device: str | None = None,
 ) -> tuple[Flattening, SewnSurface | None]:
@@ -153,8 +153,8 @@ def flatten_scene(
 
     Args:
         scene: with its fabric and settings.
-        story: what is cut, of :func:`scene_cuts`.
-        film: takes the last frame of every stage.
+        sequence: what is cut, of :func:`scene_cuts`.
+        recorder: takes the last frame of every stage.
         callback: called after each step.
         device: Warp device, before the scene's own.
 
@@ -163,43 +163,45 @@ def flatten_scene(
     """
     from warpflat.cutting.cut_piece import cut
     from warpflat.garment.sew_surface import sew_surface
-    from warpflat.scene.frames import Film
+    from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.seams import scene_constraints, scene_surface_seams
 
     settings, relax = scene.settings, scene_relax_options(scene)
-    film = film or Film(None, story.surface, lambda: FrameSchedule(settings.output))
+    recorder = recorder or FrameRecorder(None, sequence.surface, lambda: FrameSchedule(settings.output))
     with errors_named(scene.where):
         seams = scene_surface_seams(settings.seams, scene.name)
-        result = _flatten(scene, story.surface, relax, callback=callback, device=device)
-        film.last(result)
-        for number, plan in enumerate(story.plans):
-            if story.goes_on(result, number):
-                film.mark(result, plan)
+        result = _flatten(scene, sequence.surface, relax, callback=callback, device=device)
+        recorder.record_result(result)
+        for number, plan in enumerate(sequence.plans):
+            if sequence.is_needed(result, number):
+                recorder.record_cut_line(result, plan)
                 result = cut(result, plan, relax=relax, callback=callback)
-                film.last(result)
+                recorder.record_result(result)
         lines = {result.surface.name: result.network.surface.lines}
         sewn = sew_surface(result, scene_constraints(settings.constraints, lines), seams=seams, options=relax)
     if sewn is None:
         return result, None
-    film.last(sewn.result)
+    recorder.record_result(sewn.result)
     return sewn.result, sewn
 
 
-def _check_edges(scene: Scene, story: CutStory, rules: EdgeRules) -> None:
+def _check_edges(scene: Scene, sequence: CutSequence, rules: EdgeRules) -> None:
     """See that the pattern's kinds and allowances are of edges, whichever of the automatic cuts will be made.
 
     Raises:
         InputError: a name that no piece can have, or a cut that cannot be made.
     """
-    from warpflat.cutting.cut_piece import cut_surfaces
+    from warpflat.cutting.separate_pieces import cut_surfaces
     from warpflat.garment.surface_to_pattern import check_edge_names
 
     if not (rules.kinds or rules.allowances):
         return
     with errors_named(scene.where):
-        surfaces = [piece for count in story.counts for piece in cut_surfaces(story.surface, list(story.plans[:count]))]
+        surfaces = [
+            piece for count in sequence.counts for piece in cut_surfaces(sequence.surface, list(sequence.plans[:count]))
+        ]
     with errors_named(f"{scene.where}: pattern"):
-        check_edge_names(surfaces, rules, cuts=[plan.name for plan in story.plans])
+        check_edge_names(surfaces, rules, cuts=[plan.name for plan in sequence.plans])
 
 
 def _flatten(
@@ -226,7 +228,7 @@ def _flatten(
     )
 
 
-def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
+def scene_cuts(scene: Scene, *, device: str | None = None) -> CutSequence:
     """The scene's surface with the paths of its cuts worked in, and the cuts; looks for those of `auto_cut`.
 
     Raises:
@@ -237,15 +239,15 @@ def scene_cuts(scene: Scene, *, device: str | None = None) -> CutStory:
     settings = scene.settings
     surface = scene_surface(scene)
     with errors_named(scene.where):
-        story = plan_cuts(surface, settings.cuts)
+        sequence = plan_cuts(surface, settings.cuts)
         if settings.auto_cut is not None:
-            story, _ = plan_automatic_cuts(
-                story,
+            sequence, _ = plan_automatic_cuts(
+                sequence,
                 settings.auto_cut,
                 flatten=lambda piece, options: _flatten(scene, piece, options, device=device),
                 relax=scene_relax_options(scene),
             )
-    return story
+    return sequence
 
 
 def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", device: str | None = None) -> Ledger:
@@ -260,10 +262,10 @@ def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", 
     if scene.settings.mannequin is not None:
         raise InputError(f"{scene.where}: cuts are compared on a [surface], not on the pieces of a form")
     relax = scene_relax_options(scene)
-    story = scene_cuts(scene, device=device)
+    sequence = scene_cuts(scene, device=device)
     with errors_named(scene.where):
         result = flatten_and_cut(
-            story, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
+            sequence, flatten=lambda piece, options: _flatten(scene, piece, options, device=device), relax=relax
         )
         ledger = make_ledger(result, relax=relax, by=by)
     asked = [key for key in ("seams", "constraints") if getattr(scene.settings, key)]

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from warpflat.core.activity import doing
+from warpflat.core.activity import report_activity
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
@@ -100,7 +100,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     """
     settings = scene.settings
     relax, fabric = scene_relax_options(scene), scene_fabric(scene)
-    doing("building the mannequin")
+    report_activity("building the mannequin")
     mannequin, form = scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
@@ -141,7 +141,7 @@ def run_garment(
     on_progress: Callable[[Progress], None] | None = None,
     device: str | None = None,
 ) -> SceneResult:
-    """As :func:`warpflat.scene.run.run_scene`, for a garment: an OBJ per piece, one film, one picture, the seams measured."""
+    """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     from warpflat.core.atomic_files import expect_files
     from warpflat.cutting.remedies import advise
     from warpflat.export.letters import note_on_names
@@ -168,13 +168,13 @@ def run_garment(
                     name,
                     positions=progress.positions(),
                     face_energy_density=progress.face_energy_density(),
-                    measures={"step": progress.step, "spring_energy_j": progress.spring_energy},
+                    measures={"step": progress.step, "model_energy_j": progress.model_energy},
                 )
             if on_progress is not None:
                 on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
-        doing("measuring how it fits")
+        report_activity("measuring how it fits")
         garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
         told = on_progress or (lambda progress: None)
         graded = {
@@ -183,7 +183,7 @@ def run_garment(
         }
         if writer is not None:
             _last_frames(writer, garment)
-    files = garment.save(out, picture=settings.output.picture)
+    files = [*garment.write_files(out, picture=settings.output.picture), "metrics.json"]
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_sheet
 
@@ -238,10 +238,9 @@ def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
 
 def _last_frames(writer: Any, garment: Garment) -> None:
     for name, piece in garment.pieces.items():
-        numbers = {key: value for key, value in piece.measures.items() if isinstance(value, (int, float))}
         writer.write(
             name,
             positions=piece.positions,
             face_energy_density=piece.face_energy_density,
-            measures={"step": piece.stages[-1].steps, **numbers},
+            measures={"step": piece.stages[-1].steps, **piece.layout_measures},
         )

@@ -43,7 +43,6 @@ __all__ = [
     "PlaneTable",
     "Point",
     "PointOrVertex",
-    "RelaxTable",
     "SceneTable",
     "SeamTable",
     "ShapeSurface",
@@ -387,8 +386,8 @@ class AutoCutTable(Table):
     max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
     """At most so many; a mirrored pair counts as one."""
     stop_below: Annotated[float, Field(ge=0.0)] = 0.0
-    """What is minimised, springs and guard, that is low enough, [J]."""
+    """A piece of at most this model energy needs no further cut [J]."""
     stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
-    """Worn strain along warp or weft that is low enough on 98 % of the cloth."""
+    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
     by: Literal["released", "per_cm"] = "released"
     """What makes a cut the best: the energy it releases in all, or per centimetre."""

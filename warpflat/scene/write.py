@@ -42,7 +42,7 @@ def write_surface(
     frames: bool,
     notes: Sequence[str],
 ) -> SceneResult:
-    """Write all files of a flattened surface but its film, and remove what earlier runs have left.
+    """Write all files of a flattened surface but its frames, and remove what earlier runs have left.
 
     Args:
         scene: whose surface it is.
@@ -60,11 +60,12 @@ def write_surface(
     from warpflat.core.atomic_files import file_in
     from warpflat.core.manifest import remove_stale
     from warpflat.export.letters import note_on_names
-    from warpflat.flattening.result import metrics_of, write_results
+    from warpflat.flattening.result import run_metrics, write_files
     from warpflat.garment.pattern_files import surface_files
 
     settings = scene.settings
-    files = write_results(pieces, folder, picture=settings.output.picture, frames=False, more=more)
+    files = write_files(pieces, folder, picture=settings.output.picture, frames=False)
+    files.append("metrics.json")
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_picture
 
@@ -75,9 +76,10 @@ def write_surface(
     if frames:
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
+    entries = {piece.surface.name: piece.measures for piece in pieces}
     metrics, settled = remove_stale(
         folder,
-        {**metrics_of(pieces, more), **pattern.metrics},
+        {**run_metrics(entries, pieces[0].network.device, more), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
     )

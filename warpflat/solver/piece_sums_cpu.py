@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Mark
 from warpflat.solver.grain_alignment import GrainAlignment, hold_grain, remove_rotation
@@ -27,8 +27,8 @@ class HostPieceSums:
     def __init__(self, network: SpringNetwork, buffers: StepBuffers) -> None:
         """Of a network and what its steps leave behind."""
         self._network, self._buffers = network, buffers
-        self._vertex_begin = begins([net.vertex_count for net in network.pieces])
-        self._face_begin = begins([net.face_count for net in network.pieces])
+        self._vertex_begin = range_offsets([net.vertex_count for net in network.pieces])
+        self._face_begin = range_offsets([net.face_count for net in network.pieces])
         self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
 
     def guard_acts(self) -> bool:

@@ -16,7 +16,7 @@ from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.device_sums import DeviceSums
 from warpflat.core.launch import Launch, launch_each, record
 from warpflat.core.launch import Sequence as LaunchSequence
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.kernels.implicit import count_braked, stop_braked
 from warpflat.kernels.prolongation import inject
 from warpflat.kernels.reduce import subtract
@@ -36,7 +36,7 @@ class DevicePieceSums:
         """Of a network and what its steps leave behind."""
         self._network, self._buffers, self._device = network, buffers, network.device
         counts = [net.vertex_count for net in network.pieces]
-        begin = begins(counts)
+        begin = range_offsets(counts)
         self.vertices = [slice(*ends) for ends in pairwise(begin.tolist())]
         self._of_vertices = DeviceSums(counts, self._device)
         self._of_faces = DeviceSums([net.face_count for net in network.pieces], self._device)

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.kernels.constraints import evaluate_seams
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.line_solve import go_along_lines, solve_lines
@@ -249,7 +249,7 @@ class StepBuffers:
 
     @cached_property
     def _pieces(self) -> list[slice]:
-        ends = begins([net.vertex_count for net in self.network.pieces]).tolist()
+        ends = range_offsets([net.vertex_count for net in self.network.pieces]).tolist()
         return [slice(*pair) for pair in pairwise(ends)]
 
     @cached_property

@@ -26,7 +26,7 @@ from scipy.sparse import csr_array
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import record
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.core.threads import thread_count
 from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
 from warpflat.model.springs import unweighed_springs
@@ -319,7 +319,7 @@ def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArra
     ring.vertices = _given(vertices, wp.vec3d)
     ring.layout = _given(np.zeros((0, 2)) if layout is None else layout, wp.vec2d)
     around = np.bincount(triangles.ravel(), minlength=count)
-    room, sides = (begins(places) for places in (np.maximum(around + 2, _ROOM), around))
+    room, sides = (range_offsets(places) for places in (np.maximum(around + 2, _ROOM), around))
     ring.offset = _given(room, wp.int32)
     ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
     ring.neighbor = wp.empty(int(room[-1]), dtype=wp.int32, device="cpu")

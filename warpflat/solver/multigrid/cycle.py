@@ -15,7 +15,7 @@ from scipy.sparse import block_diag, csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.launch import Launch, launch_each, record
-from warpflat.core.sums import begins
+from warpflat.core.sums import range_offsets
 from warpflat.kernels.prolongation import Transpose, Weights, coarse_difference, coarse_load, inject, transfer
 from warpflat.kernels.reduce import subtract
 from warpflat.model.join import join_networks
@@ -118,7 +118,7 @@ def _weights(blocks: Sequence[csr_array], device: wp.Device) -> Weights:
 
 def _transpose(blocks: Sequence[csr_array], device: wp.Device) -> Transpose:
     """Of the same matrix; blocks: of each the transpose, with the numbers of the entries."""
-    transpose, first = Transpose(), begins([block.nnz for block in blocks])
+    transpose, first = Transpose(), range_offsets([block.nnz for block in blocks])
     matrix = _diagonal(
         [csr_array((b.data + at, b.indices, b.indptr), shape=b.shape) for b, at in zip(blocks, first, strict=False)]
         if len(blocks) > 1
@@ -233,7 +233,7 @@ class Levels:
     @staticmethod
     def _way(fine: Relaxation, steps: Sequence[Coarser], coarse: Relaxation) -> _Way:
         device, n, c = coarse.network.device, fine.network.vertex_count, coarse.network.vertex_count
-        first = begins([net.vertex_count for net in fine.network.pieces])
+        first = range_offsets([net.vertex_count for net in fine.network.pieces])
         ids = [step.kept + at if at else step.kept for step, at in zip(steps, first, strict=False)]
         kept = wp.array(ids[0] if len(ids) == 1 else np.concatenate(ids), dtype=wp.int32, device=device, copy=False)
         prolongation = _weights([step.prolongation for step in steps], device)

@@ -1,0 +1,104 @@
+"""`warpflat flatten`: one mesh is flattened as a scene that the options describe."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import click
+
+from warpflat.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.run import run_and_report
+from warpflat.core.errors import InputError
+from warpflat.core.text import plain_letters
+
+__all__ = ["flatten"]
+
+
+@click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
+@click.argument("mesh", type=click.Path(path_type=Path))
+@click.option("--units", metavar="UNIT", help="Unit of the file: m, cm, mm, in ... Needed unless the file says (USD).")
+@click.option("--component", metavar="WHICH", help="Which connected part: largest, or 0, 1, ... by size.")
+@click.option("--prim", metavar="PATH", help="Which mesh of a USD file.")
+@click.option("--name", metavar="NAME", help="Name of the piece and its files.  [default: the file's]")
+@click.option("--fabric", metavar="NAME", help="A fabric of the library; warpflat fabrics lists them.")
+@click.option("--fabric-file", "fabric_files", multiple=True, metavar="FILE", help="A fabric file of your own.")
+@click.option(
+    "--datum",
+    metavar="LINE",
+    help="The line laid straight first: two vertices A,B, counted from 0 (the shortest path between them), a side "
+    "of the piece (bottom, left, right, top), or a line of the file (a USD curve).  [default: a long line through the "
+    "middle]",
+)
+@click.option("--grain-angle", type=float, metavar="DEGREES", help="Turns the warp from the datum; 45 is the bias.")
+@click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
+@click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
+@click.option("--stretch-weft", type=float, metavar="SHARE", help="The same along the weft.")
+@click.option("--pressure", type=float, metavar="PA", help="On the skin; sets the stretch that runs around the body.")
+@click.option(
+    "--solver",
+    type=click.Choice(["multilevel", "plain"]),
+    help="Plain: the paper's steps alone.  [default: multilevel]",
+)
+@click.option("--max-steps", type=int, metavar="N", help="Give up after the work of so many steps.")
+@click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
+@click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
+@click.option("--no-picture", is_flag=True, help="Write no picture.png.")
+@output_options()
+def flatten(
+    mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
+) -> int:
+    """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
+
+    \b
+    Examples:
+      warpflat flatten front.obj --units cm
+      warpflat flatten scan.ply --units mm --component largest --fabric jersey
+      warpflat flatten dress.usdc --prim /World/front --datum /World/centre_front
+      warpflat flatten front.obj --units m --datum 120,2087 --out front
+    """
+    from warpflat.scene.load import make_scene
+
+    tables: dict[str, Any] = {"surface": {"file": str(mesh)}, "relax": {}, "output": {}}
+    places = {
+        "units": ("surface", "units"),
+        "component": ("surface", "component"),
+        "prim": ("surface", "prim"),
+        "solver": ("relax", "solver"),
+        "max_steps": ("relax", "max_steps"),
+        "time_step": ("relax", "time_step"),
+        "frames": ("output", "frames"),
+        "stretch_warp": ("wear", "stretch_warp"),
+        "stretch_weft": ("wear", "stretch_weft"),
+        "pressure": ("wear", "pressure"),
+    }
+    for option, (table, key) in places.items():
+        if options[option] is not None:
+            tables.setdefault(table, {})[key] = options[option]
+    if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
+        tables["surface"]["component"] = int(options["component"])
+    for key in ("name", "fabric", "grain_angle", "model"):
+        if options[key] is not None:
+            tables[key] = options[key]
+    tables["fabric_files"] = list(options["fabric_files"])
+    tables["output"]["picture"] = not options["no_picture"]
+    if datum is not None and re.fullmatch(r"[0-9]{1,18}(,[0-9]{1,18})+", datum):
+        vertices = [int(vertex) for vertex in datum.split(",")]
+        ends = {"from": vertices[0], "to": vertices[1]}
+        tables["datum"] = "datum"
+        tables["lines"] = {"datum": ends if len(vertices) == 2 else {"vertices": vertices}}
+    elif datum is not None:
+        # A USD curve becomes a line of its name.
+        tables["datum"] = datum.rstrip("/").rpartition("/")[2]
+    scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
+    try:
+        return run_and_report(scene, out, quiet=quiet, as_json=as_json, device=device)
+    except InputError as error:
+        raise InputError(str(error).replace('component = "largest"', "--component largest")) from None
+
+
+def _safe_name(mesh: Path) -> str:
+    """The file's name as a name for a piece and its files: "Ärmel (1).obj" gives "Armel_1"."""
+    name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-")
+    return name or "piece"

@@ -1,0 +1,85 @@
+"""`warpflat run`: a scene file is run, and what came out is reported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, ComputingCommand, output_options
+
+if TYPE_CHECKING:
+    from warpflat.scene.load import Scene
+    from warpflat.scene.write import SceneResult
+
+__all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
+
+
+@click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
+@click.argument("scene", type=click.Path(path_type=Path))
+@output_options()
+def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None) -> int:
+    """Run a scene file.
+
+    A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
+
+    \b
+    Examples:
+      warpflat run scenes/dome.toml
+      warpflat run scenes/bodice.toml --out bodice --json
+    """
+    from warpflat.scene.load import load_scene
+
+    return run_and_report(load_scene(scene), out, quiet=quiet, as_json=as_json, device=device)
+
+
+def run_and_report(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:
+    from warpflat.cli.progress_bar import ProgressBar
+    from warpflat.scene.run import run_scene
+
+    start_warp_silently()
+    folder = out if out is not None else Path("out") / scene.name
+    with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
+        result = run_scene(scene, folder, on_progress=bar, device=device)
+    return report_run(result, folder, quiet=quiet, as_json=as_json)
+
+
+def start_warp_silently() -> None:
+    """Start Warp without its greeting: standard output is for results, and a mistake is one line on standard error.
+
+    That a machine has no CUDA driver is printed by Warp's native part straight to the file descriptor, whatever the log
+    level; anything else that it says there is passed on.
+    """
+    import warp
+
+    from warpflat.core.compile import start_warp
+    from warpflat.core.native_output import native_errors
+
+    warp.config.log_level = warp.LOG_ERROR
+    with native_errors() as lines:
+        start_warp()
+    for line in lines:
+        if "Could not find or load the NVIDIA CUDA driver" not in line:
+            click.echo(line, err=True)
+
+
+def report_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool) -> int:
+    """Print what a run has come to, and return the exit code."""
+    from warpflat.cli.tables import run_summary, warnings_of
+    from warpflat.flattening.fit_report import fit_lines
+
+    warnings = warnings_of(result.metrics)
+    if not (quiet or as_json):
+        for note in result.notes:
+            if note not in warnings:
+                click.echo(f"warpflat: note: {note}", err=True)
+    for warning in warnings:
+        click.echo(f"warpflat: {warning}", err=True)
+    if as_json:
+        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        click.echo(run_summary(result.metrics, result.files, str(folder)))
+        for line in fit_lines(result.metrics):
+            click.echo(line)
+    return NOT_CONVERGED if warnings else DONE
