@@ -25,7 +25,8 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
-from warpflat.solver.relax import Relaxation, RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cut.cut_mesh import Cut, Seam, cut_along_many
 from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.cut.pieces import Piece, apply_cut, split_pieces

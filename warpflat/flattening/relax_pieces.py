@@ -24,9 +24,11 @@ from warpflat.model.wear import Wear, meant_stretch
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.coarsen import coarser_surfaces, has_coarser
+from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 
 __all__ = ["Relaxed", "Run", "relax_runs"]
@@ -119,7 +121,7 @@ class Run:
     def tell(self, stage: str, state: Relaxation, piece: int) -> None:
         """Call back with where this piece of the relaxation stands, by the last look."""
         if self.callback is not None:
-            look = state.last
+            look = state.status
             self.callback(
                 Progress(
                     stage,
@@ -213,7 +215,7 @@ def relax_runs(
 
 
 def _has_levels(run: Run, network: SpringNetwork) -> bool:
-    return run.options.solver == "multilevel" and multigrid_pays(network) and has_coarser(network.surface)
+    return run.options.solver == "multilevel" and multigrid_pays(network) and can_coarsen(network.surface)
 
 
 class _Batch:
@@ -226,30 +228,30 @@ class _Batch:
         self._put(networks, np.concatenate(starts))
 
     def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
-        upright = [
+        alignments = [
             GrainAlignment(
                 lower=first + int(run.datum[0]), upper=first + int(run.datum[-1]), vertices=slice(first, end)
             )
             for run, (first, end) in zip(self._runs, pairwise(self._first), strict=True)
         ]
-        self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
+        self._state = Relaxation(join_networks(networks), self._options, start=start, alignments=alignments)
 
     def relax(self, *, levels: bool, again: int, needs_isotropic_start: bool) -> list[Relaxed]:
         """Relax them, in rounds between which directions are measured again, so many times at most; as isotropic sheets first where
         they are astray."""
         begun = time.perf_counter()
-        begin = self._state.begin().energies
+        begin = self._state.check_start().energies
         stage = self._runs[0].stage_name
         self._tell(self._state, "develop" if stage == "relax" else stage)
         if needs_isotropic_start:
-            own, start = self._state.vertices, self._state.positions()
+            own, start = self._state.vertex_ranges, self._state.positions()
             self._put([run.reference_at(start[at]) for run, at in zip(self._runs, own, strict=True)], start)
             self._measure_again(levels)
         for _ in range(again):
             if self._measure_again(levels) <= _STANDS:
                 break
         outcome, state = replace(self._round(levels), seconds=time.perf_counter() - begun), self._state
-        layout, look = state.positions(), state.last
+        layout, look = state.positions(), state.status
         return [
             Relaxed(
                 network=net,
@@ -265,7 +267,7 @@ class _Batch:
                     energies=Energies(*look.energies[piece].tolist()),
                 ),
             )
-            for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertices, strict=True))
+            for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertex_ranges, strict=True))
         ]
 
     def _measure_again(self, levels: bool) -> float:
@@ -278,38 +280,42 @@ class _Batch:
         )
         state.least_strain = _FIRST_STRAIN
         before = state.positions()
-        self._round(levels, enough=_FIRST_GAIN)
+        self._round(levels, least_gain=_FIRST_GAIN)
         layout = state.positions()
-        self._put([run.network_at(layout[own]) for run, own in zip(self._runs, state.vertices, strict=True)], layout)
+        self._put(
+            [run.network_at(layout[own]) for run, own in zip(self._runs, state.vertex_ranges, strict=True)], layout
+        )
         after = self._state
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
-        return max(_moved(before[own], layout[own]) for own in state.vertices)
+        return max(_moved(before[own], layout[own]) for own in state.vertex_ranges)
 
-    def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
+    def _round(self, levels: bool, *, least_gain: float | None = None) -> Outcome:
         told = any(run.callback is not None for run in self._runs)
         each_step = self._each_step if told else None
         if not levels and self._options.solver == "multilevel" and gauss_newton_pays(self._state.network):
-            return relax_gauss_newton(self._state, enough=enough, watch=self._watch, each_step=each_step)
+            return relax_gauss_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
         # After an edit the layout is near the minimum already; a grid is nearer once it has been carried up from its coarser levels.
         nested = self._state.steps == 0 and (
             self._runs[0].stage_name == "relax"
-            or all(coarser_surfaces(run.surface)[0].smooth_carry is not None for run in self._runs)
+            or all(coarsenings_of(run.surface)[0].smooth_interpolation is not None for run in self._runs)
         )
-        return relax_multilevel(self._state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
+        return relax_multilevel(
+            self._state, nested=nested, least_gain=least_gain, watch=self._watch, each_step=each_step
+        )
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        for piece, number in enumerate(state.numbers):
-            spring, guard, _ = state.last.energies[piece].tolist()
+        for piece, number in enumerate(state.piece_numbers):
+            spring, guard, _ = state.status.energies[piece].tolist()
             run = self._runs[number]
-            run.history.append((float(state.steps), spring, guard, float(state.last.residual[piece])))
+            run.history.append((float(state.steps), spring, guard, float(state.status.residual[piece])))
 
     def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
         self._tell(state, self._runs[0].stage_name)
 
     def _tell(self, state: Relaxation, stage: str) -> None:
-        for piece, number in enumerate(state.numbers):
+        for piece, number in enumerate(state.piece_numbers):
             self._runs[number].tell(stage, state, piece)
 
 

@@ -25,7 +25,7 @@ from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece, FormSeam
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.energy_map import energy_report
 
 __all__ = ["Garment", "flatten_form"]

@@ -12,7 +12,7 @@ from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths, polyline_length
 from warpflat.garment.sewing import SeamPair, Sewn, sew
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams
 
 __all__ = ["SewnSurface", "sew_surface"]
