@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 from warpflat import Fabric, flatten
 from warpflat.flattening.result import Flattening
 from warpflat.scene.compare import laid_upon
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]

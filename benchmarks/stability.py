@@ -22,7 +22,9 @@ from numpy.typing import NDArray
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]
@@ -59,7 +61,7 @@ Energies = Iterator[tuple[float, float]]
 
 
 def approximate_implicit(case: Case, time_step: float, *, damped: bool) -> Energies:
-    """`warpflat.solver.relax`, step by step."""
+    """`warpflat.solver.relaxation`, step by step."""
     state = Relaxation(case.network, RelaxOptions(time_step=time_step, kinetic_damping=damped), start=case.start)
     while True:
         state.step()

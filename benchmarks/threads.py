@@ -23,7 +23,8 @@ from numpy.typing import NDArray
 from warpflat.fabric.fabric import Fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FloatArray = NDArray[np.float64]

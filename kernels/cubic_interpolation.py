@@ -94,7 +94,7 @@ def weigh_cubics(
 
 
 @wp.kernel
-def carry_along(
+def interpolate_along(
     column: wp.array(dtype=wp.vec4i),
     weight: wp.array(dtype=wp.vec4d),
     values: wp.array(dtype=wp.vec2d),
@@ -110,7 +110,7 @@ def carry_along(
 
 
 @wp.kernel
-def carry_along_rows(
+def interpolate_along_rows(
     values: wp.array2d(dtype=wp.vec2d),
     grid: wp.array2d(dtype=wp.int32),
     column: wp.array2d(dtype=wp.int32),

@@ -54,7 +54,7 @@ if TYPE_CHECKING:
     from warpflat.scene.compare import compare_fabrics, save_comparison
     from warpflat.scene.load import load_scene, make_scene
     from warpflat.scene.run import run_scene
-    from warpflat.solver.relax import RelaxOptions
+    from warpflat.solver.options import RelaxOptions
     from warpflat.surface.io.read import read_surface
     from warpflat.surface.mesh import Surface
     from warpflat.surface.paths.lines import line_between, line_from_curve, line_on_plane, with_lines
@@ -97,7 +97,7 @@ _HOME = {
     "Mannequin": "mannequin.mannequin",
     "PatternOptions": "garment.pattern_files",
     "Progress": "flattening.progress",
-    "RelaxOptions": "solver.relax",
+    "RelaxOptions": "solver.options",
     "Remedy": "flattening.fit_report",
     "ScanOptions": "mannequin.scan_pose",
     "SeamWish": "garment.ease",

@@ -17,7 +17,8 @@ from warpflat.core.threads import thread_count
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.shapes import bodice
 
 

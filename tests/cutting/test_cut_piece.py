@@ -26,7 +26,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.model.network import SpringNetwork
 from warpflat.scene.cuts import plan_cuts
 from warpflat.scene.schema import CutTable
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface import half_edges as mesh_half_edges
 from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.cut.cut_mesh import cut_along

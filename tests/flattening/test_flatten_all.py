@@ -23,9 +23,11 @@ from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.model.wear import Wear
-from warpflat.solver.multigrid.cycle import Levels
-from warpflat.solver.multigrid.solve import _Cycles, _Pace, multigrid_pays, relax_multilevel
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.multigrid.levels import Levels
+from warpflat.solver.multigrid.solve import _CycledPieces, _PieceProgress, multigrid_pays, relax_multilevel
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cells import cells_of
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
@@ -269,7 +271,7 @@ def test_a_joined_network_has_the_energies_and_forces_of_its_parts(model: str, s
     alone = [Relaxation(part, RelaxOptions(), start=start) for part, start in zip(parts, starts, strict=True)]
     forces = joined.forces()
     for piece, state in enumerate(alone):
-        np.testing.assert_array_equal(forces[joined.vertices[piece]], state.forces())
+        np.testing.assert_array_equal(forces[joined.vertex_ranges[piece]], state.forces())
         np.testing.assert_allclose(joined.piece_energies()[piece], state.piece_energies()[0], rtol=1e-12)
         np.testing.assert_allclose(joined.residuals()[piece], state.residuals()[0], rtol=1e-12)
     if model == "springs":
@@ -290,7 +292,7 @@ def test_pieces_brake_each_on_its_own():
     joined.sweep(60)
     for piece, state in enumerate(alone):
         state.sweep(60)
-        np.testing.assert_allclose(joined.positions()[joined.vertices[piece]], state.positions(), atol=1e-14)
+        np.testing.assert_allclose(joined.positions()[joined.vertex_ranges[piece]], state.positions(), atol=1e-14)
     assert len({state.restarts for state in alone}) > 1
 
 
@@ -312,18 +314,18 @@ def test_pieces_that_leave_are_given_back():
     whole = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
     outcome = relax(whole)
     assert outcome.converged
-    assert whole.last.at_rest.all()
-    assert len(set(whole.last.steps.tolist())) == 2
+    assert whole.status.at_rest.all()
+    assert len(set(whole.status.steps.tolist())) == 2
     for piece, (part, start) in enumerate(zip(parts, starts, strict=True)):
         state = Relaxation(part, RelaxOptions(), start=start)
         alone = relax(state)
-        assert whole.last.steps[piece] == alone.steps
-        assert whole.last.residual[piece] == pytest.approx(alone.residual, rel=1e-9)
-        np.testing.assert_allclose(whole.positions()[whole.vertices[piece]], state.positions(), atol=1e-12)
-    kept = whole.keep([1])
-    np.testing.assert_array_equal(kept.positions(), whole.positions()[whole.vertices[1]])
-    assert kept.numbers == [1]
-    assert kept.last.total == whole.last.of([1]).total
+        assert whole.status.steps[piece] == alone.steps
+        assert whole.status.residual[piece] == pytest.approx(alone.residual, rel=1e-9)
+        np.testing.assert_allclose(whole.positions()[whole.vertex_ranges[piece]], state.positions(), atol=1e-12)
+    kept = whole.extract([1])
+    np.testing.assert_array_equal(kept.positions(), whole.positions()[whole.vertex_ranges[1]])
+    assert kept.piece_numbers == [1]
+    assert kept.status.total == whole.status.select([1]).total
 
 
 def test_pieces_that_are_done_are_cycled_no_more():
@@ -331,13 +333,13 @@ def test_pieces_that_are_done_are_cycled_no_more():
     parts = [SpringNetwork.build(each, CLOTH, each.vertices[:, :2], device=DEVICE) for each in surfaces]
     start = np.concatenate([each.vertices[:, :2] for each in surfaces])
     state = Relaxation(join_networks(parts), RelaxOptions(), start=start)
-    state.begin()
-    cycles = _Cycles(state=state, levels=Levels(state), paces=[_Pace() for _ in parts])
-    assert cycles.without_done() is None
-    cycles.paces[1].near = cycles.paces[2].near = True
-    left = cycles.without_done()
-    assert list(left.state.numbers) == [0, 3]
-    assert left.paces == [cycles.paces[0], cycles.paces[3]]
+    state.check_start()
+    cycles = _CycledPieces(state=state, levels=Levels(state), progress=[_PieceProgress() for _ in parts])
+    assert cycles.without_finished() is None
+    cycles.progress[1].gains_little = cycles.progress[2].gains_little = True
+    left = cycles.without_finished()
+    assert list(left.state.piece_numbers) == [0, 3]
+    assert left.progress == [cycles.progress[0], cycles.progress[3]]
     assert left.levels.sizes[0] == left.state.network.vertex_count == 2 * 13**2
     np.testing.assert_array_equal(left.state.positions(), start.reshape(4, -1, 2)[[0, 3]].reshape(-1, 2))
 
@@ -351,11 +353,11 @@ def test_what_is_cycled_apart_comes_to_the_same_minimum(monkeypatch: pytest.Monk
     ]
     energies = []
     for share in (0.01, 2.0):  # leave as soon as they can, and never
-        monkeypatch.setattr("warpflat.solver.relax._LEAVE", share)
+        monkeypatch.setattr("warpflat.solver.relaxation._REMOVED_SHARE", share)
         state = Relaxation(join_networks(parts), RelaxOptions(), start=np.concatenate(starts))
         outcome = relax_multilevel(state)
         assert outcome.converged
-        assert len(set(state.last.steps.tolist())) == (1 if share > 1.0 else 3)
-        np.testing.assert_allclose(state.last.energies, state.piece_energies(), atol=1e-9)
-        energies.append(state.last.potential)
+        assert len(set(state.status.steps.tolist())) == (1 if share > 1.0 else 3)
+        np.testing.assert_allclose(state.status.energies, state.piece_energies(), atol=1e-9)
+        energies.append(state.status.potential)
     np.testing.assert_allclose(*energies, rtol=1e-5)

@@ -28,7 +28,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.scene.compare import laid_upon
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
-from warpflat.solver.relax import RelaxOptions, Solver
+from warpflat.solver.options import RelaxOptions, Solver
 from warpflat.surface.half_edges import border_edges, mesh_edges
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface

@@ -16,7 +16,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
 from warpflat.garment.sewing import Sewn, sew
 from warpflat.model.constraint_equations import smooth_equations
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.shapes import make_shape
 
 FINE = RelaxOptions(energy_tolerance=1e-9, residual_tolerance=2e-4)

@@ -18,7 +18,8 @@ from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.membrane import Model
 from warpflat.pattern.draft import draft_garment
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.shapes import make_shape
 
 

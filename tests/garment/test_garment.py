@@ -28,7 +28,7 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.model.wear import Wear
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.shapes import make_shape
 
 

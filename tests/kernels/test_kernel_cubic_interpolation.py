@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import warp as wp
 from devices import DEVICE
-from warpflat.kernels.cubic_interpolation import carry_along, carry_along_rows, sample_grid, weigh_cubics
+from warpflat.kernels.cubic_interpolation import interpolate_along, interpolate_along_rows, sample_grid, weigh_cubics
 from warpflat.kernels.grid_lists import number_faces
 
 from warpflat.core.launch import launch_each
@@ -58,7 +58,7 @@ def test_values_are_summed_by_weight() -> None:
         rng.normal(size=(50, 2)),
     )
     result = np.empty((50, 2))
-    launch_each(carry_along, 50, [column, weight, values], [result])
+    launch_each(interpolate_along, 50, [column, weight, values], [result])
     np.testing.assert_allclose(result, np.einsum("ik,ikj->ij", weight, values[column]), atol=1e-14)
 
 
@@ -79,7 +79,7 @@ def test_values_along_the_rows_of_a_grid_are_summed_by_weight() -> None:
     grid = rng.permutation(5 * 7).reshape(5, 7).astype(np.int32)
     values, column = rng.normal(size=(5, 4, 2)), rng.integers(4, size=(7, 3)).astype(np.int32)
     weight, result = rng.normal(size=(7, 3)), np.empty((35, 2))
-    launch_each(carry_along_rows, 35, [values, grid, column, weight], [result])
+    launch_each(interpolate_along_rows, 35, [values, grid, column, weight], [result])
     expected = np.einsum("jk,ijkd->ijd", weight, values[:, column])
     np.testing.assert_allclose(result[grid], expected, rtol=1e-13)
 

@@ -21,7 +21,9 @@ from warpflat.model.strain import worn_strain
 from warpflat.scene.load import load_scene
 from warpflat.scene.surface import scene_surface
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -85,7 +87,7 @@ def test_the_pattern_does_not_depend_on_the_start():
     network = SpringNetwork.build(surface, fabric, start, model="membrane", device=DEVICE)
     datum = surface.lines["centre"]
     state = Relaxation(
-        network, options, start=start, upright=[GrainAlignment(lower=int(datum[0]), upper=int(datum[-1]))]
+        network, options, start=start, alignments=[GrainAlignment(lower=int(datum[0]), upper=int(datum[-1]))]
     )
     assert relax(state).converged
     assert apart(first.positions, state.positions()).max() < 1.5e-3

@@ -18,7 +18,8 @@ from warpflat.flattening.flatten_piece import flatten
 from warpflat.model.membrane import MODELS, Model
 from warpflat.model.network import SpringNetwork, _repeated
 from warpflat.model.springs import quad_stiffness, springs_of
-from warpflat.solver.relax import Relaxation, RelaxOptions
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cells import cells_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface

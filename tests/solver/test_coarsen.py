@@ -1,4 +1,4 @@
-"""Coarser levels: what they keep, how layouts go up from them, and that nothing is glued."""
+"""Coarsening levels: what they keep, how layouts go up from them, and that nothing is glued."""
 
 from __future__ import annotations
 
@@ -15,12 +15,12 @@ from scipy.spatial import Delaunay
 
 from warpflat.model.springs import unweighed_springs
 from warpflat.solver.multigrid.coarsen import (
-    Coarser,
+    Coarsening,
     _prepare_levels,
     _prolongation,
-    coarser,
-    coarser_surfaces,
-    has_coarser,
+    can_coarsen,
+    coarsen,
+    coarsenings_of,
     hierarchy_in_background,
     inherit_levels,
     is_coarsest,
@@ -57,8 +57,8 @@ def flat(surface: Surface) -> FloatArray:
     return surface.vertices[:, :2]
 
 
-def made(surface: Surface, layout: FloatArray | None = None) -> Coarser:
-    step = coarser(surface, flat(surface) if layout is None else layout)
+def made(surface: Surface, layout: FloatArray | None = None) -> Coarsening:
+    step = coarsen(surface, flat(surface) if layout is None else layout)
     assert step is not None
     return step
 
@@ -143,7 +143,7 @@ def test_any_mesh_becomes_a_mesh_without_mirrored_triangles(seed: int, relief: f
     points = rng.uniform(size=(rng.integers(40, 300), 2))
     surface = make_surface(np.column_stack([points, relief * rng.normal(size=len(points))]), Delaunay(points).simplices)
     layout = surface.vertices[:, :2]
-    step = coarser(surface, layout)
+    step = coarsen(surface, layout)
     if step is None:
         return
     assert not len(non_manifold_edges(step.surface.faces))
@@ -186,7 +186,7 @@ def normals(surface: Surface) -> FloatArray:
 def test_each_level_has_about_a_quarter_of_the_vertices_and_good_triangles(planned: bool):
     surface = jittered(71)
     while not is_coarsest(surface):
-        step = coarser(surface, flat(surface) if planned else None)
+        step = coarsen(surface, flat(surface) if planned else None)
         assert step is not None
         assert 0.18 * len(surface.vertices) < len(step.kept) < 0.28 * len(surface.vertices)
         surface = step.surface
@@ -197,7 +197,7 @@ def test_each_level_has_about_a_quarter_of_the_vertices_and_good_triangles(plann
 def test_corners_and_holes_stay():
     surface = jittered(51, hole=True)
     corners = {tuple(place) for place in np.array([[0, 0], [0, 1], [1, 0], [1, 1]], dtype=float)}
-    steps = coarser_surfaces(surface)
+    steps = coarsenings_of(surface)
     assert len(steps) >= 2
     for step in steps:
         assert len(border_loops(step.surface.faces)) == 2
@@ -206,21 +206,21 @@ def test_corners_and_holes_stay():
 
 def test_levels_of_a_surface_are_made_once_the_finest_first():
     surface = jittered(51)
-    steps = coarser_surfaces(surface)
-    assert steps is coarser_surfaces(surface)
-    assert coarser_surfaces(steps[-1].surface) == ()
+    steps = coarsenings_of(surface)
+    assert steps is coarsenings_of(surface)
+    assert coarsenings_of(steps[-1].surface) == ()
     assert is_coarsest(steps[-1].surface)
     for finer, step in zip([surface, *(step.surface for step in steps)], steps, strict=False):
         assert not is_coarsest(finer)
         np.testing.assert_array_equal(step.surface.vertices, finer.vertices[step.kept])
-        again = coarser(finer)
+        again = coarsen(finer)
         assert again is not None
         np.testing.assert_array_equal(again.surface.faces, step.surface.faces)
         assert (again.prolongation != step.prolongation).nnz == 0
 
 
 def test_levels_of_a_grid_go_down_to_fewer_vertices():
-    steps = coarser_surfaces(sheet(65, 65))
+    steps = coarsenings_of(sheet(65, 65))
     assert [len(step.kept) for step in steps] == [33**2, 17**2, 9**2]
 
 
@@ -254,8 +254,8 @@ def test_whether_there_is_a_coarser_level_is_told_before_it_is_made(
     columns: int, rows: int, quads: bool, triangles: bool
 ):
     for surface, wished in ((sheet(columns, rows), quads), (sheet(columns, rows, triangles=True), triangles)):
-        assert has_coarser(surface) == wished
-        assert bool(coarser_surfaces(surface)) == wished
+        assert can_coarsen(surface) == wished
+        assert bool(coarsenings_of(surface)) == wished
 
 
 def test_stiff_cloth_has_a_coarser_one():
@@ -264,7 +264,7 @@ def test_stiff_cloth_has_a_coarser_one():
     for kind in KINDS:
         found = resampled_surface(surface, kind)
         assert found is not None
-        sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarser_surfaces(found[0]))])
+        sizes.append([len(found[0].vertices), *(len(step.kept) for step in coarsenings_of(found[0]))])
     assert sizes == [[57**2, 29**2, 15**2, 8**2], [49**2, 25**2, 13**2, 7**2], [49**2, 17**2, 9**2]]
 
 
@@ -274,7 +274,7 @@ def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape:
     surface = sheet(*shape)
     found = resampled_surface(surface, "thirds")
     assert found is not None
-    step = coarser_surfaces(found[0])[0]
+    step = coarsenings_of(found[0])[0]
     fine, coarse = (rows_and_columns(of) for of in (found[0], step.surface))
     assert fine is not None
     assert coarse is not None
@@ -282,8 +282,8 @@ def test_small_grids_for_stiff_cloth_have_every_third_row_and_column_next(shape:
         step.kept.reshape(coarse.shape), fine[::3, ::3] if min(shape) > 21 else fine[::2, ::2]
     )
     np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(found[0]), atol=1e-12)
-    assert step.smooth_carry is not None
-    np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(found[0]), atol=1e-12)
+    assert step.smooth_interpolation is not None
+    np.testing.assert_allclose(step.smooth_interpolation(flat(step.surface)), flat(found[0]), atol=1e-12)
 
 
 def test_rows_much_farther_apart_than_columns_all_stay():
@@ -294,13 +294,13 @@ def test_rows_much_farther_apart_than_columns_all_stay():
     for points in (np.stack([x, y, 0 * x], axis=-1), np.stack([y, -x, 0 * x], axis=-1)):
         surface = make_surface(points.reshape(-1, 3), faces)
         shapes = []
-        for step in coarser_surfaces(surface):
+        for step in coarsenings_of(surface):
             grid = rows_and_columns(step.surface)
             assert grid is not None
             shapes.append(tuple(sorted(grid.shape)))
             np.testing.assert_allclose(step.prolongation @ flat(step.surface), flat(surface), atol=1e-12)
-            assert step.smooth_carry is not None
-            np.testing.assert_allclose(step.smooth_carry(flat(step.surface)), flat(surface), atol=1e-12)
+            assert step.smooth_interpolation is not None
+            np.testing.assert_allclose(step.smooth_interpolation(flat(step.surface)), flat(surface), atol=1e-12)
             surface = step.surface
         assert shapes == [(9, 33), (9, 17), (5, 9)]
 
@@ -311,7 +311,7 @@ def test_what_surfaces_share_by_their_faces_is_not_how_long_their_quads_are():
     long = replace(square, vertices=square.vertices * [8.0, 1.0, 1.0])
     shapes = []
     for surface in (long, square, replace(long)):
-        grid = rows_and_columns(coarser_surfaces(surface)[0].surface)
+        grid = rows_and_columns(coarsenings_of(surface)[0].surface)
         assert grid is not None
         shapes.append(grid.shape)
     assert shapes == [(17, 33), (17, 17), (17, 33)]
@@ -329,7 +329,7 @@ def test_without_a_layout_faces_lie_like_those_of_the_body(triangles: bool):
     x, y = np.meshgrid(np.linspace(0.0, 0.9 * 2 * np.pi, 81), np.linspace(0.0, 4.0, 41))
     flat_faces = sheet(81, 41, triangles=triangles).faces[:-1]  # without its last face it is no grid
     surface = make_surface(np.stack([np.cos(x), np.sin(x), y], axis=-1).reshape(-1, 3), flat_faces)
-    for step in coarser_surfaces(surface):
+    for step in coarsenings_of(surface):
         outward = step.surface.vertices[step.surface.faces[:, :3]].mean(axis=1) * [1.0, 1.0, 0.0]
         outward /= np.linalg.norm(outward, axis=1, keepdims=True)
         assert (np.einsum("ij,ij->i", normals(step.surface), outward) > 0.5).all()
@@ -342,7 +342,7 @@ def test_a_layout_keeps_triangles_from_being_mirrored_in_it():
     x, y = flat(surface).T
     layout = np.column_stack([x, y + 0.25 * np.sin(16.0 * x)])
     assert (signed_cell_areas(surface.faces[:, :3], layout) > 0).all()
-    heedless, heedful = coarser(surface), coarser(surface, layout)
+    heedless, heedful = coarsen(surface), coarsen(surface, layout)
     assert heedless is not None
     assert heedful is not None
     assert (signed_cell_areas(heedless.surface.faces[:, :3], layout[heedless.kept]) <= 0).any()
@@ -358,7 +358,7 @@ def test_a_thin_tube_stays_one(around: int):
     j = np.roll(i, -1, axis=1)
     lower, upper = [i[:-1], j[:-1], j[1:]], [i[:-1], j[1:], i[1:]]
     surface = make_surface(vertices, np.vstack([np.stack(half, axis=-1).reshape(-1, 3) for half in (lower, upper)]))
-    step = coarser(surface)
+    step = coarsen(surface)
     coarse = surface if step is None else step.surface
     assert not len(non_manifold_edges(coarse.faces))
     assert not len(non_manifold_vertices(coarse.faces))
@@ -431,12 +431,12 @@ def test_sheets_that_touch_in_one_vertex_have_no_coarser_level():
         input_vertices=vertices,
         input_index=np.arange(len(vertices), dtype=np.int32),
     )
-    assert coarser(touching) is None
+    assert coarsen(touching) is None
 
 
 def test_what_cannot_be_made_coarser_says_so():
     triangle = make_surface([[0, 0, 0], [1, 0, 0], [0, 1, 0]], [[0, 1, 2]])
-    assert coarser(triangle, flat(triangle)) is None
+    assert coarsen(triangle, flat(triangle)) is None
 
 
 def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
@@ -456,7 +456,7 @@ def test_levels_made_meanwhile_are_the_same(monkeypatch: pytest.MonkeyPatch):
         pass
     assert len(threads) == 1
     assert threads[0] is not threading.current_thread()
-    for apart, here in zip(coarser_surfaces(pieces[0]), coarser_surfaces(pieces[1]), strict=True):
+    for apart, here in zip(coarsenings_of(pieces[0]), coarsenings_of(pieces[1]), strict=True):
         np.testing.assert_array_equal(apart.kept, here.kept)
         np.testing.assert_array_equal(apart.surface.faces, here.surface.faces)
     with pytest.raises(ZeroDivisionError), hierarchy_in_background(sheet(80, 70, triangles=True)):
@@ -470,7 +470,7 @@ def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkey
         pass
     for made_once in ("surface.cells.lay_cells", "model.springs.measure_edges"):
         monkeypatch.setattr(f"warpflat.{made_once}", None)
-    for step in coarser_surfaces(piece):
+    for step in coarsenings_of(piece):
         assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
         assert unweighed_springs(step.surface).edge_count == len(half_edges_of(step.surface).edges)
 
@@ -482,18 +482,18 @@ def test_levels_are_inherited_by_a_surface_that_has_moved(kind: str, monkeypatch
         column = np.arange(41 * 41, dtype=np.int32).reshape(41, 41)[:23, 8]
         cut = cut_along(surface.faces, column, vertex_count=len(surface.vertices))
         surface = make_surface(surface.vertices[cut.vertex_origin], cut.faces)
-    steps = coarser_surfaces(surface)
+    steps = coarsenings_of(surface)
     assert len(steps) > 1
     moved = replace(surface, vertices=surface.vertices * np.array([1.1, 1.0, 0.9]), faces=surface.faces)
     inherit_levels(moved, surface)
     # Nothing is collapsed again.
-    monkeypatch.setattr("warpflat.solver.multigrid.coarsen._collapsed", None)
-    inherited = coarser_surfaces(moved)
+    monkeypatch.setattr("warpflat.solver.multigrid.coarsen._collapse_edges", None)
+    inherited = coarsenings_of(moved)
     assert len(inherited) == len(steps)
     fine = moved
     for mine, step in zip(inherited, steps, strict=True):
         np.testing.assert_array_equal(mine.surface.vertices, fine.vertices[step.kept])
         np.testing.assert_array_equal(mine.surface.faces, step.surface.faces)
         assert mine.transfer is step.transfer
-        assert (mine.smooth_carry is None) == (step.smooth_carry is None)
+        assert (mine.smooth_interpolation is None) == (step.smooth_interpolation is None)
         fine = mine.surface

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, cubic_interpolation_between, places_of_rows
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, cubic_interpolation_between, row_places
 
 
 def every_second(count: int) -> np.ndarray:
@@ -19,7 +19,7 @@ def in_space(across: np.ndarray, up: np.ndarray) -> np.ndarray:
 
 
 def grid_carry(vertices: np.ndarray, grid: np.ndarray, lines: tuple[np.ndarray, np.ndarray]) -> GridProlongation:
-    return GridProlongation(grid, [places_of_rows(vertices, of) for of in (grid, grid.T)], lines)
+    return GridProlongation(grid, [row_places(vertices, of) for of in (grid, grid.T)], lines)
 
 
 @pytest.mark.parametrize("even", [True, False], ids=["even", "uneven"])

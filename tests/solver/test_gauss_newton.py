@@ -1,4 +1,4 @@
-"""Whole implicit steps: their matrix against differences, and soft cloth between triangles, which they bring to rest."""
+"""Gauss-Newton steps: their matrix against finite differences, and soft cloth on triangles, which they bring to rest."""
 
 from __future__ import annotations
 
@@ -19,7 +19,9 @@ from warpflat.model.network import SpringNetwork
 from warpflat.solver.gauss_newton import GaussNewtonSteps, gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.multigrid.solve import relax_multilevel
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -108,7 +110,7 @@ def test_soft_cloth_between_triangles_comes_to_rest(name: str, fabric: str):
     assert flat.converged
     assert flat.flipped_faces == 0
     # Ten thousands of the paper's steps would take next to nothing more away.
-    state = Relaxation(flat.network, RelaxOptions(max_steps=3000), start=flat.positions, upright=held(flat))
+    state = Relaxation(flat.network, RelaxOptions(max_steps=3000), start=flat.positions, alignments=held(flat))
     before = state.piece_energies()[:, :2].sum()
     relax(state)
     after = state.piece_energies()[:, :2].sum()
@@ -143,16 +145,16 @@ def test_pieces_side_by_side_come_where_they_come_alone():
     for part, start in zip(parts, starts, strict=True):
         state = Relaxation(part, RelaxOptions(), start=start)
         assert relax_gauss_newton(state).converged
-        alone.append(state.last.potential[0])
-    np.testing.assert_allclose(together.last.potential, alone, rtol=5e-3)
+        alone.append(state.status.potential[0])
+    np.testing.assert_allclose(together.status.potential, alone, rtol=5e-3)
 
 
 def test_the_chord_of_the_datum_stays_upright_and_what_is_at_rest_stays():
     surface = triangles("bodice", 17)
     network, start = developed(surface, find_fabric("silk"))
     line = surface.lines["centre"]
-    upright = [GrainAlignment(lower=int(line[0]), upper=int(line[-1]))]
-    state = Relaxation(network, RelaxOptions(), start=start, upright=upright)
+    alignments = [GrainAlignment(lower=int(line[0]), upper=int(line[-1]))]
+    state = Relaxation(network, RelaxOptions(), start=start, alignments=alignments)
     assert relax_gauss_newton(state).converged
     chord = state.positions()[line[-1]] - state.positions()[line[0]]
     assert abs(chord[0]) < 1e-9 * chord[1]

@@ -21,10 +21,12 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.cascade import cascade_up
-from warpflat.solver.multigrid.cycle import Levels
+from warpflat.solver.multigrid.cascade import start_from_cascade
+from warpflat.solver.multigrid.levels import Levels
 from warpflat.solver.multigrid.solve import relax_multilevel
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface import mesh
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.mesh import Surface
@@ -74,7 +76,7 @@ def both(surface: Surface, shear: float, **options: object) -> tuple[Flattening,
         **options,
     )
     ends = GrainAlignment(lower=int(plain.datum[0]), upper=int(plain.datum[-1]))
-    state = Relaxation(plain.network, LEVELS, start=plain.development.positions, upright=[ends])
+    state = Relaxation(plain.network, LEVELS, start=plain.development.positions, alignments=[ends])
     return plain, state, relax_multilevel(state)
 
 
@@ -223,54 +225,54 @@ def test_soft_cloth_and_strips_take_half_of_the_work_that_steps_take_to_a_thousa
 def start_of(piece: Flattening) -> Relaxation:
     """Its relaxation, before the first step."""
     ends = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
-    state = Relaxation(piece.network, LEVELS, start=piece.development.positions, upright=[ends])
-    state.begin()
+    state = Relaxation(piece.network, LEVELS, start=piece.development.positions, alignments=[ends])
+    state.check_start()
     return state
 
 
 @pytest.mark.parametrize("side", [72, 100, 101, 200])
 @pytest.mark.parametrize(("shape", "most"), [("dome", 3e-5), ("bodice", 5e-4)])
 def test_a_large_grid_is_relaxed_as_soon_as_a_small_one_is(shape: str, most: float, side: int):
-    """What cubics leave is a few hundredths of a per cent of the energy at most, whether rows and columns can be halved or not."""
+    """Cubic interpolation leaves at most some hundredths of a per cent of the energy, whether lines can be halved or not."""
     done = flatten(make_shape(shape, resolution=side), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
-    assert cascade_up(state) is not None
-    assert state.last.potential[0] < (1.0 + most) * minimum(done)
+    assert start_from_cascade(state) is not None
+    assert state.status.potential[0] < (1.0 + most) * minimum(done)
     assert state.work_units < 24.0 * (72 / side) ** 2
 
 
 def test_the_levels_of_a_small_lattice_are_those_of_the_large_one_too():
-    """Beside a crack a coarser level is one that cycles use; of that in between no network is made."""
+    """Beside a crack the small lattice is one of the levels that cycles use; no network is made of those in between."""
     done = flatten(cracked(101, column=34), fabric=cloth(375.0), datum="centre", device=DEVICE)
     state = start_of(done)
-    below = cascade_up(state)
-    assert below is not None
-    sizes = [rung.network.vertex_count for rung in below.coarse_levels.values()]
+    cascade = start_from_cascade(state)
+    assert cascade is not None
+    sizes = [level.network.vertex_count for level in cascade.coarse_levels.values()]
     assert 2_500 < max(sizes) < 5_000
-    levels = Levels(state, below=below)
-    assert levels.sizes == [done.network.vertex_count, *below.sizes]
-    assert [level.state for level in levels._levels[1:]] == [level.state for level in below._levels]
+    levels = Levels(state, known=cascade)
+    assert levels.sizes == [done.network.vertex_count, *cascade.sizes]
+    assert [level.state for level in levels.all[1:]] == [level.state for level in cascade.all]
 
 
-def test_small_grids_and_triangles_rise_level_by_level():
+def test_small_grids_and_triangles_start_by_nested_iteration():
     for surface in (make_shape("dome", resolution=33), make_shape("dome", resolution=81, triangles=True)):
         state = start_of(flatten(surface, fabric=cloth(375.0), datum="centre", device=DEVICE))
-        assert cascade_up(state) is None
+        assert start_from_cascade(state) is None
 
 
 def test_a_large_grid_that_a_coarser_one_would_not_lower_stays_where_it_is():
-    """Where it is relaxed already, all that could be carried up lies higher."""
+    """Where it is relaxed already, all that could be interpolated has a higher energy."""
     done = flatten(make_shape("bodice", resolution=75), fabric=cloth(375.0), datum="centre", device=DEVICE)
     ends = GrainAlignment(lower=int(done.datum[0]), upper=int(done.datum[-1]))
-    state = Relaxation(done.network, LEVELS, start=done.positions, upright=[ends])
-    before, load = state.begin(), np.random.default_rng(0).normal(size=done.positions.shape)
+    state = Relaxation(done.network, LEVELS, start=done.positions, alignments=[ends])
+    before, load = state.check_start(), np.random.default_rng(0).normal(size=done.positions.shape)
     state.load.assign(load)
-    assert cascade_up(state) is None
+    assert start_from_cascade(state) is None
     np.testing.assert_array_equal(state.positions(), done.positions)
     np.testing.assert_array_equal(state.load.numpy(), load)
     np.testing.assert_array_equal(state.velocity.numpy(), 0.0)
     state.load.zero_()
-    assert state.last is before
+    assert state.status is before
     outcome = relax_multilevel(state)
     assert outcome.converged
     assert outcome.energies.potential <= minimum(done) * (1.0 + 1e-12)
@@ -359,17 +361,17 @@ def test_steps_along_lines_bring_soft_cloth_to_the_same_minimum_in_less_work(kin
 
 
 @pytest.mark.parametrize("shear", [100.0, 10.0, 2.0])
-def test_a_step_along_lines_never_raises_the_energy_and_mirrors_nothing(shear: float):
+def test_astep_along_lines_never_raises_the_energy_and_mirrors_nothing(shear: float):
     surface = make_shape("bodice", resolution=33)
     piece = flatten(surface, fabric=cloth(shear), datum="centre", device=DEVICE, relax=RelaxOptions(max_steps=1))
     state = Relaxation(piece.network, LEVELS, start=piece.development.positions)
-    made = Levels(state, mend=True)
+    made = Levels(state, repair=True)
     rng = np.random.default_rng(5)
     for strained in (1.0, 0.98, 1.03):
         state.position.assign(strained * piece.development.positions + rng.normal(scale=1e-4, size=(33 * 33, 2)))
         for _ in range(12):
             before = state.energies().potential
-            (after,) = made._step_along_lines(0)
+            (after,) = made.step_along_lines(0)
             assert after <= before
             assert after == pytest.approx(state.energies().potential)
         state.evaluate_at_rest()
@@ -391,12 +393,12 @@ def test_steps_go_along_lines_that_carry_the_threads_only():
         flat = surface.vertices[:, :2]
         network = SpringNetwork.build(surface, cloth(10.0), flat, grain_angle=grain_angle, device=DEVICE)
         assert (network.line_arrays is not None) == expected
-        made = Levels(Relaxation(network, LEVELS, start=flat), mend=True)
-        assert [level.lines for level in made._levels] == [expected] * len(made.sizes)
+        made = Levels(Relaxation(network, LEVELS, start=flat), repair=True)
+        assert [level.has_lines for level in made.all] == [expected] * len(made.sizes)
 
 
 @pytest.mark.parametrize("kind", ["grid", "crack", "triangles"])
-def test_what_large_pieces_let_go_of_is_made_again_as_it_was(kind: str, monkeypatch: pytest.MonkeyPatch):
+def test_caches_dropped_from_large_pieces_are_made_again_as_they_were(kind: str, monkeypatch: pytest.MonkeyPatch):
     def piece() -> Surface:
         return make_shape("dome", resolution=16) if kind == "grid" else cracked(16, triangles=kind == "triangles")
 

@@ -14,7 +14,9 @@ from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.flattening.develop import develop
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Energies
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.shapes import make_shape
@@ -224,11 +226,11 @@ def test_a_repeat_is_equal_bit_for_bit():
 def test_a_run_into_its_step_limit_says_so_and_can_go_on():
     network, start = developed(make_shape("dome", resolution=17), 200.0)
     state = Relaxation(network, RelaxOptions(max_steps=13, check_every=5), start=start)
-    looks: list[int] = []
-    outcome = relax(state, watch=lambda s, energies, residual: looks.append(s.steps))
+    checks: list[int] = []
+    outcome = relax(state, watch=lambda s, energies, residual: checks.append(s.steps))
     assert not outcome.converged
     assert outcome.steps == state.steps == 13
-    assert looks == [5, 10, 13]
+    assert checks == [5, 10, 13]
     assert outcome.residual > state.options.residual_tolerance
     state.options = RelaxOptions()
     on = relax(state)
@@ -243,18 +245,18 @@ def test_a_run_into_its_step_limit_says_so_and_can_go_on():
 def test_callbacks_come_after_every_step_and_every_look():
     network, start = developed(make_shape("saddle", resolution=9), 200.0)
     state = Relaxation(network, RelaxOptions(check_every=7), start=start)
-    looks: list[tuple[int, float, float]] = []
+    checks: list[tuple[int, float, float]] = []
     steps: list[tuple[int, float]] = []
     outcome = relax(
         state,
-        watch=lambda s, energies, residual: looks.append((s.steps, energies.potential, residual)),
+        watch=lambda s, energies, residual: checks.append((s.steps, energies.potential, residual)),
         each_step=lambda s, energies, residual: steps.append((s.steps, energies.potential)),
     )
     assert [number for number, _ in steps] == list(range(1, outcome.steps + 1))
-    assert [number for number, _, _ in looks] == list(range(7, outcome.steps + 1, 7))
-    # between looks the last look's energy stands
-    assert steps[7][1] == steps[12][1] == looks[0][1]
-    assert looks[-1][1:] == (outcome.energies.potential, outcome.residual)
+    assert [number for number, _, _ in checks] == list(range(7, outcome.steps + 1, 7))
+    # between checks the last look's energy stands
+    assert steps[7][1] == steps[12][1] == checks[0][1]
+    assert checks[-1][1:] == (outcome.energies.potential, outcome.residual)
 
 
 def test_convergence_asks_for_the_energy_and_for_the_residual():

@@ -8,8 +8,10 @@ from devices import DEVICE
 
 from warpflat.fabric.library import as_fabric
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
-from warpflat.solver.smoother import smoother_coefficients
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.smoother import chebyshev_coefficients
 from warpflat.surface.shapes import make_shape
 
 
@@ -18,7 +20,7 @@ def test_what_is_left_is_the_chebyshev_polynomial_of_the_fourth_kind(steps: int)
     eigenvalue = np.linspace(1e-3, 1.0, 500)
     way, left = np.zeros_like(eigenvalue), np.ones_like(eigenvalue)
     for number in range(steps):
-        viscosity, carried, push = smoother_coefficients(number)
+        viscosity, carried, push = chebyshev_coefficients(number)
         assert viscosity == 0.0
         way = carried * way - push * eigenvalue * left
         left = left + way
@@ -57,9 +59,9 @@ def test_a_few_steps_leave_less_of_what_is_rough_than_as_many_that_swing(at_rest
 def test_looking_at_all_cells_less_often_changes_nothing_where_none_acts(at_rest) -> None:
     network, rest = at_rest
     layouts = []
-    for watch_every in (1, 3):
+    for check_interval in (1, 3):
         state = Relaxation(network, RelaxOptions(), start=1.001 * rest)
-        state.smooth(6, watch_every=watch_every)
+        state.smooth(6, check_interval=check_interval)
         layouts.append(state.positions())
     np.testing.assert_allclose(layouts[0], layouts[1], atol=1e-14)
 

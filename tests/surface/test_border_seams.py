@@ -18,7 +18,7 @@ from warpflat.garment.surface_to_pattern import pattern_of_surface
 from warpflat.pattern.draft import draft_garment
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, surface_seams
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import with_lines

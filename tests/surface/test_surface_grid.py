@@ -9,7 +9,7 @@ import pytest
 from numpy.typing import NDArray
 from surface_meshes import numbered_grid as grid
 
-from warpflat.solver.multigrid.coarsen import coarser, coarser_surfaces
+from warpflat.solver.multigrid.coarsen import coarsen, coarsenings_of
 from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 from warpflat.surface.cut.cut_mesh import cut_along
@@ -128,7 +128,7 @@ def test_what_lies_on_no_lattice(surface: Surface) -> None:
 @pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
 def test_a_coarser_lattice_has_the_same_border_and_half_the_rows(name: str) -> None:
     fine = PIECES[name]
-    step = coarser(fine)
+    step = coarsen(fine)
     assert step is not None
     coarse = step.surface
     assert coarse.is_quad.all()
@@ -165,9 +165,9 @@ def border_length(surface: Surface) -> float:
 @pytest.mark.parametrize("name", ["L", "hole", "crack", "slit", "crooked crack"])
 def test_cubics_are_carried_up_whole(name: str) -> None:
     fine = PIECES[name]
-    step = coarser(fine)
+    step = coarsen(fine)
     assert step is not None
-    assert isinstance(step.smooth_carry, LatticeProlongation)
+    assert isinstance(step.smooth_interpolation, LatticeProlongation)
     x, y = 10.0 * fine.vertices[:, 0], 10.0 * fine.vertices[:, 1]
     layout = np.column_stack([x**3 - x * y + 0.5, x * x * y**2 - y**3 + x])
     lattice = lattice_of(fine)
@@ -175,18 +175,18 @@ def test_cubics_are_carried_up_whole(name: str) -> None:
     exact = np.ones(len(layout), dtype=bool)
     if name in ("L", "hole", "crooked crack"):
         # Between two lines that stay there may be fewer than four.
-        exact = np.abs(step.smooth_carry(layout[step.kept]) - layout).max(axis=1) < 1e-12
+        exact = np.abs(step.smooth_interpolation(layout[step.kept]) - layout).max(axis=1) < 1e-12
         assert exact.mean() > 0.6
-    np.testing.assert_allclose(step.smooth_carry(layout[step.kept])[exact], layout[exact], atol=1e-12)
+    np.testing.assert_allclose(step.smooth_interpolation(layout[step.kept])[exact], layout[exact], atol=1e-12)
     straight = np.column_stack([1.0 + 2.0 * x - y, 0.5 * y])
-    np.testing.assert_allclose(step.smooth_carry(straight[step.kept]), straight, atol=1e-12)
+    np.testing.assert_allclose(step.smooth_interpolation(straight[step.kept]), straight, atol=1e-12)
 
 
 def test_nothing_is_carried_across_a_crack() -> None:
     fine = PIECES["crack"]
-    step = coarser(fine)
+    step = coarsen(fine)
     assert step is not None
-    assert step.smooth_carry is not None
+    assert step.smooth_interpolation is not None
     x, y = fine.vertices[:, 0], fine.vertices[:, 1]
     at_crack = np.isclose(x, 0.08) & (y < 0.1299)
     # Of the two sides of the crack, which belongs to faces on the right.
@@ -195,7 +195,7 @@ def test_nothing_is_carried_across_a_crack() -> None:
     of_right[fine.faces[face_x > 0.08]] = True
     right = ((x > 0.0801) | (at_crack & of_right)) & (y < 0.1199)
     opened = np.where(right[:, None], 1.0, 0.0) * np.ones(2)
-    carried = step.smooth_carry(opened[step.kept])
+    carried = step.smooth_interpolation(opened[step.kept])
     left = ((x < 0.0799) | (at_crack & ~of_right)) & (y < 0.1201)
     assert np.count_nonzero(left) > 100
     np.testing.assert_array_equal(carried[left], 0.0)
@@ -205,7 +205,7 @@ def test_nothing_is_carried_across_a_crack() -> None:
 def test_a_narrow_strip_keeps_its_lines_and_the_rest_is_thinned() -> None:
     """A crack three columns from the border: with a single quad between them a coarser lattice would bend too stiffly there."""
     surface = piece(np.ones((20, 24), dtype=bool), crack=[(row, 3) for row in range(13)])
-    step = coarser(surface)
+    step = coarsen(surface)
     assert step is not None
     x, y = (np.unique(np.rint(100.0 * step.surface.vertices[:, k])) for k in range(2))
     np.testing.assert_array_equal(x, [0, 1, 2, 3, *range(6, 25, 2)])
@@ -217,7 +217,7 @@ def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level()
     solid = np.ones((90, 40), dtype=bool)
     solid[76:, :6] = solid[76:, 34:] = False
     solid[86:, 16:24] = False
-    steps = coarser_surfaces(piece(solid))
+    steps = coarsenings_of(piece(solid))
     assert len(steps) >= 3
     for step in steps:
         assert step.surface.is_quad.all()
@@ -244,7 +244,7 @@ def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
 
 @pytest.mark.parametrize("name", PIECES)
 def test_coarser_lattices_are_known_from_the_finer_ones(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    steps = coarser_surfaces(PIECES[name])
+    steps = coarsenings_of(PIECES[name])
     lattices = [step for step in steps if step.surface.is_quad.all()]
     assert len(lattices) > 0
     for step in lattices:

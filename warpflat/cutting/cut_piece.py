@@ -13,7 +13,7 @@ from warpflat.cutting.cut_plan import CutPlan, carry_layout, line_part, make_cut
 from warpflat.flattening.edit import relax_cut, require_unsewn
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
-from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
 
 __all__ = ["cut"]
 

@@ -16,7 +16,7 @@ from warpflat.flattening.develop import develop
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
-from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cut.cut_mesh import Seam
 from warpflat.surface.cut.dart import dart_measure
 from warpflat.surface.half_edges import mesh_edges

@@ -19,7 +19,7 @@ from warpflat.flattening.applied_cut import seam_kind
 from warpflat.flattening.edit import relax_cut
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
-from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cut.dart import dart_measure, fish_eye_measure
 from warpflat.surface.paths.edge_paths import path_length
 

@@ -22,7 +22,7 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.relax_pieces import RelaxationTask, relax_pieces
 from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
-from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cells import inherit_cells
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.mesh import Surface

@@ -16,7 +16,7 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import Model
 from warpflat.model.wear import Wear
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
 
 __all__ = ["flatten_all"]

@@ -28,7 +28,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, unused_stretch
 from warpflat.solver.multigrid.coarsen import hierarchy_in_background
-from warpflat.solver.relax import RelaxOptions, given_options
+from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.mesh import Surface, is_large
 

@@ -9,7 +9,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
 from warpflat.solver.convergence import Energies
-from warpflat.solver.relax import Relaxation
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 
 __all__ = ["Progress", "Stage"]
@@ -81,7 +81,7 @@ class Progress:
 
     def positions(self) -> FloatArray:
         """#V by 2, the layout [m], a copy."""
-        return self._state.positions()[self._state.vertices[self._piece]]
+        return self._state.positions()[self._state.vertex_ranges[self._piece]]
 
     def face_energy_density(self) -> FloatArray:
         """#F, strain energy per flat area [J/m2]."""

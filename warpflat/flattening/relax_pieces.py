@@ -28,9 +28,11 @@ from warpflat.model.wear import Wear, meant_stretch
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.coarsen import coarser_surfaces, has_coarser
+from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
-from warpflat.solver.relax import Relaxation, RelaxOptions, relax
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 
 __all__ = ["RelaxationTask", "RelaxedPiece", "relax_pieces"]
@@ -142,7 +144,7 @@ class RelaxationTask:
     def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
         """Call the callback with the state of this piece at the last convergence check."""
         if self.callback is not None:
-            check = state.last
+            check = state.status
             self.callback(
                 Progress(
                     stage,
@@ -235,7 +237,7 @@ def relax_pieces(
 
 
 def _has_levels(task: RelaxationTask, network: SpringNetwork) -> bool:
-    return task.options.solver == "multilevel" and multigrid_pays(network) and has_coarser(network.surface)
+    return task.options.solver == "multilevel" and multigrid_pays(network) and can_coarsen(network.surface)
 
 
 class _Batch:
@@ -250,13 +252,13 @@ class _Batch:
         self._put(networks, np.concatenate(starts))
 
     def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
-        upright = [
+        alignments = [
             GrainAlignment(
                 lower=first + int(task.datum[0]), upper=first + int(task.datum[-1]), vertices=slice(first, end)
             )
             for task, (first, end) in zip(self._tasks, pairwise(self._first), strict=True)
         ]
-        self._state = Relaxation(join_networks(networks), self._options, start=start, upright=upright)
+        self._state = Relaxation(join_networks(networks), self._options, start=start, alignments=alignments)
 
     def relax(self, *, levels: bool, direction_updates: int, isotropic_start: bool) -> list[RelaxedPiece]:
         """Relax the pieces in rounds, between which their directions are updated.
@@ -267,11 +269,11 @@ class _Batch:
             isotropic_start: whether the pieces are relaxed roughly as isotropic sheets first.
         """
         started = time.perf_counter()
-        begin = self._state.begin().energies
+        begin = self._state.check_start().energies
         stage = self._tasks[0].stage_name
         self._report(self._state, "develop" if stage == "relax" else stage)
         if isotropic_start:
-            own, start = self._state.vertices, self._state.positions()
+            own, start = self._state.vertex_ranges, self._state.positions()
             self._put(
                 [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
             )
@@ -280,7 +282,7 @@ class _Batch:
             if self._update_directions(levels) <= _SETTLED_SHIFT:
                 break
         outcome, state = replace(self._round(levels), seconds=time.perf_counter() - started), self._state
-        layout, check = state.positions(), state.last
+        layout, check = state.positions(), state.status
         return [
             RelaxedPiece(
                 network=net,
@@ -296,7 +298,7 @@ class _Batch:
                     energies=Energies(*check.energies[piece].tolist()),
                 ),
             )
-            for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertices, strict=True))
+            for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertex_ranges, strict=True))
         ]
 
     def _update_directions(self, levels: bool) -> float:
@@ -309,40 +311,43 @@ class _Batch:
         )
         state.least_strain = _ROUND_STRAIN
         before = state.positions()
-        self._round(levels, enough=_ROUND_GAIN)
+        self._round(levels, least_gain=_ROUND_GAIN)
         layout = state.positions()
         self._put(
-            [task.build_network(layout[own]) for task, own in zip(self._tasks, state.vertices, strict=True)], layout
+            [task.build_network(layout[own]) for task, own in zip(self._tasks, state.vertex_ranges, strict=True)],
+            layout,
         )
         after = self._state
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
-        return max(_moved(before[own], layout[own]) for own in state.vertices)
+        return max(_moved(before[own], layout[own]) for own in state.vertex_ranges)
 
-    def _round(self, levels: bool, *, enough: float | None = None) -> Outcome:
+    def _round(self, levels: bool, *, least_gain: float | None = None) -> Outcome:
         listens = any(task.callback is not None for task in self._tasks)
         each_step = self._each_step if listens else None
         if not levels and self._options.solver == "multilevel" and gauss_newton_pays(self._state.network):
-            return relax_gauss_newton(self._state, enough=enough, watch=self._watch, each_step=each_step)
+            return relax_gauss_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
         if not levels:
             return relax(self._state, watch=self._watch, each_step=each_step)
         # After an edit the layout is near the minimum; only a grid comes nearer by nested iteration from its coarser levels.
         nested = self._state.steps == 0 and (
             self._tasks[0].stage_name == "relax"
-            or all(coarser_surfaces(task.surface)[0].smooth_carry is not None for task in self._tasks)
+            or all(coarsenings_of(task.surface)[0].smooth_interpolation is not None for task in self._tasks)
         )
-        return relax_multilevel(self._state, nested=nested, enough=enough, watch=self._watch, each_step=each_step)
+        return relax_multilevel(
+            self._state, nested=nested, least_gain=least_gain, watch=self._watch, each_step=each_step
+        )
 
     def _watch(self, state: Relaxation, energies: Energies, residual: float) -> None:
-        for piece, number in enumerate(state.numbers):
-            spring, guard, _ = state.last.energies[piece].tolist()
+        for piece, number in enumerate(state.piece_numbers):
+            spring, guard, _ = state.status.energies[piece].tolist()
             task = self._tasks[number]
-            task.history.append((float(state.steps), spring + guard, guard, float(state.last.residual[piece])))
+            task.history.append((float(state.steps), spring + guard, guard, float(state.status.residual[piece])))
 
     def _each_step(self, state: Relaxation, energies: Energies, residual: float) -> None:
         self._report(state, self._tasks[0].stage_name)
 
     def _report(self, state: Relaxation, stage: str) -> None:
-        for piece, number in enumerate(state.numbers):
+        for piece, number in enumerate(state.piece_numbers):
             self._tasks[number].report_progress(stage, state, piece)
 
 

@@ -24,7 +24,7 @@ from warpflat.model.fit import WornFit, assess_fit
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import LayoutErrors, WornStrain, layout_errors, worn_strain
 from warpflat.model.wear import Wear
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.energy_map import energy_report
 from warpflat.surface.mesh import Surface
 

@@ -23,7 +23,9 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.model.strain import strain_energy
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
+from warpflat.solver.options import RelaxOptions, given_options
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.cells import CellArrays, first_of_faces
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.falloff import falloff_weights
@@ -71,8 +73,8 @@ def give_fullness(
     warp, weft = grain_axes(piece.grain_angle)
     mean = full.mean(axis=0)
     spread = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
-    upright = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
-    state = Relaxation(network, options, start=piece.positions @ spread, upright=[upright])
+    alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
+    state = Relaxation(network, options, start=piece.positions @ spread, alignments=[alignment])
     outcome = relax(state)
     positions = state.positions()
     stage = Stage(

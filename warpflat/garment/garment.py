@@ -25,7 +25,7 @@ from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece, FormSeam
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 
 __all__ = ["Garment", "flatten_form"]
 

@@ -13,7 +13,7 @@ from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams
 
 __all__ = ["SewnSurface", "sew_surface"]

@@ -36,7 +36,9 @@ from warpflat.model.constraint_equations import (
 )
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.relax import Relaxation, RelaxOptions, given_options, relax
+from warpflat.solver.options import RelaxOptions, given_options
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.falloff import falloff_weights
 
 __all__ = ["Held", "SeamPair", "Sewn", "sew"]
@@ -180,8 +182,8 @@ def sew(
         hold = np.where(ties.soft > 0, ties.soft * thread, _STIFFNESS * median)
         network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
     # A piece with a guided line needs no other hold: the line cannot turn.
-    upright = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
-    state = Relaxation(network, options, start=start, upright=upright)
+    alignments = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
+    state = Relaxation(network, options, start=start, alignments=alignments)
     outcome, misses, kept, contradictory = _relax_in_rounds(state, ties, options)
     seconds = time.perf_counter() - begun
     converged = outcome.converged and kept

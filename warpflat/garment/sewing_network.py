@@ -15,7 +15,7 @@ from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.relax import Relaxation
+from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.connectivity import components
 
 __all__ = ["SewingNetwork"]

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan
     from warpflat.cutting.ledger import AutoCut, Ledger
     from warpflat.flattening.result import Flattening
-    from warpflat.solver.relax import RelaxOptions
+    from warpflat.solver.options import RelaxOptions
     from warpflat.surface.mesh import Surface
     from warpflat.surface.paths.trace import SurfacePath
 

@@ -16,7 +16,7 @@ from warpflat.core.toml_file import check_table, read_toml
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.file import FabricTable, fabric_from_table
 from warpflat.fabric.library import find_fabric, load_library
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 
 if TYPE_CHECKING:
     from warpflat.model.wear import Wear

@@ -21,7 +21,7 @@ from warpflat.scene.load import (
 )
 from warpflat.scene.surface import scene_surface
 from warpflat.scene.write import SceneResult, write_surface
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:

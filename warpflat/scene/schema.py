@@ -11,14 +11,14 @@ from warpflat.core.toml_file import Table
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 
 if TYPE_CHECKING:
     pass
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from warpflat.solver.relax import RelaxOptions
+    from warpflat.solver.options import RelaxOptions
 
 import dataclasses
 from typing import TYPE_CHECKING, get_type_hints
@@ -27,7 +27,7 @@ from pydantic import BeforeValidator, ConfigDict, create_model
 
 from warpflat.core.errors import is_number
 from warpflat.core.text import shown
-from warpflat.solver.relax import RelaxOptions
+from warpflat.solver.options import RelaxOptions
 
 __all__ = [
     "AutoCutTable",

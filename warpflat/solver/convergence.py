@@ -1,4 +1,4 @@
-"""What a relaxation says of itself: energies, a look in between, and how it ended."""
+"""What a relaxation reports: its energies, its convergence from check to check, and its outcome."""
 
 from __future__ import annotations
 
@@ -11,12 +11,24 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
 
-__all__ = ["ConvergenceStatus", "Energies", "Mark", "Outcome", "Vectors"]
+__all__ = ["ConvergenceStatus", "Energies", "Iterate", "Outcome", "Vectors"]
+
+Vectors = Any
+"""#V by 2 vectors: a NumPy array, or a Warp array of #V vec2d on a device."""
+
+Iterate = tuple[Vectors, Vectors]
+"""A layout [m] and the forces on its vertices [N]."""
 
 
 @dataclass(frozen=True)
 class Energies:
-    """[J]: of the springs (of the membrane, where that is the model), of the guard (see `warpflat.model.network`), of the motion."""
+    """The energies of a state [J].
+
+    Attributes:
+        spring: of the springs, or of the membrane where that is the model.
+        guard: of the guard (see `warpflat.model.network`).
+        kinetic: of the motion.
+    """
 
     spring: float
     guard: float
@@ -24,26 +36,27 @@ class Energies:
 
     @property
     def potential(self) -> float:
-        """What is minimised: springs and guard."""
+        """The energy that is minimised: springs and guard."""
         return self.spring + self.guard
 
     @property
     def total(self) -> float:
-        """Potential and kinetic."""
+        """Potential and kinetic energy."""
         return self.spring + self.guard + self.kinetic
 
 
 @dataclass(frozen=True, kw_only=True)
 class ConvergenceStatus:
-    """What a look at a running relaxation says of each of its pieces.
+    """The result of a convergence check, piece by piece.
 
     Attributes:
-        energies: #P by 3, of the springs or the membrane, of the guard, of the motion [J].
-        residual: #P, largest force on a vertex over the mean force of the springs; infinite before it is known.
-        gain: #P, what the springs' and the guard's energy has lost since the look before [J].
-        change: #P, eq. (11), that over the energy and the steps in between.
+        energies: #P by 3, energies of the springs or the membrane, of the guard, of the motion [J].
+        residual: #P, largest force on a vertex over the mean force of the springs; infinite before the first
+            evaluation.
+        gain: #P, the potential energy lost since the last check [J].
+        change: #P, eq. (11): the gain over the energy and over the steps in between.
         at_rest: #P, whether change and residual are within the tolerances, or the piece is free of strain.
-        steps, work_units: #P, what it has taken so far.
+        steps, work_units: #P, steps taken and work spent so far.
     """
 
     energies: FloatArray
@@ -56,22 +69,27 @@ class ConvergenceStatus:
 
     @property
     def potential(self) -> FloatArray:
-        """#P, what is minimised [J]."""
+        """The energy of each piece that is minimised, #P [J]."""
         return self.energies[:, 0] + self.energies[:, 1]
 
     @property
     def total(self) -> Energies:
-        """Of all pieces."""
+        """The energies of all pieces together."""
         return Energies(*self.energies.sum(axis=0).tolist())
 
-    def of(self, pieces: Sequence[int]) -> ConvergenceStatus:
-        """What it says of some of them."""
+    @property
+    def worst_residual(self) -> float:
+        """The largest residual of any piece."""
+        return float(self.residual.max())
+
+    def select(self, pieces: Sequence[int]) -> ConvergenceStatus:
+        """Return the status of these pieces alone."""
         return ConvergenceStatus(**{name: values[list(pieces)] for name, values in vars(self).items()})
 
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a relaxation ended; of several pieces, the energies of all and the worst of what is left.
+    """How a relaxation ended; for several pieces, the sum of their energies and the worst of their residuals.
 
     Attributes:
         converged: false if it ran into its step limit.
@@ -92,7 +110,3 @@ class Outcome:
     residual: float
     energies: Energies
     seconds: float
-
-
-Vectors = Any
-Mark = tuple[Vectors, Vectors]

@@ -1,11 +1,12 @@
-"""Whole implicit steps: all vertices of a piece at once, by a sparse factor, where cloth is soft in shear and lies on triangles.
+"""Gauss-Newton steps: all vertices of a piece at once, by a sparse factorisation, for soft cloth on triangle meshes.
 
-Eq. (10) holds each vertex by its own springs. Along a thread of such cloth these are up to a thousand times as stiff as what the
-thread may shear against, and between triangles threads run across the edges: neither lines nor coarser meshes carry a vertex' neighbours
-along, and steps creep for ten thousands. A whole step solves the implicit equation (Baraff and Witkin 1998) as if its time step were
-infinite, with the stiffness J^T J of springs and guard in the present layout; the force across compressed springs, which would push
-vertices off a thread, is left out of that, so that each way leads down. Some of the paper's steps after it take what is local: what it
-presses in slivers, say.
+Eq. (10) holds each vertex by its own springs. Along a thread of soft cloth these are up to a thousand times as stiff as
+the shear against which the thread may move, and on triangle meshes the threads run across the edges. Then neither line
+relaxation nor coarser meshes move a vertex together with its neighbours, and the paper's steps creep for tens of
+thousands. A Gauss-Newton step solves the implicit equation (Baraff and Witkin 1998) in the limit of an infinite time
+step, with the stiffness J^T J of springs and guard in the present layout. It leaves out the negative stiffness across
+compressed springs, so that each direction is one of descent. Some of the paper's steps after it reduce the local
+errors, as in slivers.
 """
 
 from __future__ import annotations
@@ -25,29 +26,32 @@ from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.relax import Relaxation, Watch
+from warpflat.solver.relax import Watch
+from warpflat.solver.relaxation import Relaxation
 
 __all__ = ["GaussNewtonSteps", "gauss_newton_pays", "relax_gauss_newton"]
 
 
-# K/G from which they pay, on triangles, and the most vertices: a factor's entries grow faster than the mesh.
+# K/G from which Gauss-Newton steps pay on triangles, and the most vertices: a factor's entries grow faster than the
+# mesh.
 _SOFT = 35.0
 _MOST_VERTICES = 100_000
-# A whole step takes as long as so many of the paper's, times the root of the number of vertices.
+# Work units of a Gauss-Newton step, over the square root of the number of vertices.
 _WORK = 1.5
-# So many of the paper's steps come after each; twice as many after one that led no further than this share of its way, and so on.
+# Smoothing steps of the paper's after each. Their number doubles after a Gauss-Newton step of less than the fraction
+# `_SHORT_STEP`.
 _STEPS = 40
 _MOST_STEPS = 1_280
-_LITTLE_WAY = 0.05
-_LEAST_SHARE = 1e-3
-# At rest, too, is what forces could release no more of than this share of the energy.
-_LITTLE_LEFT = 1e-5
-# What holds vertices that nothing else holds, over the mean of the diagonal.
-_FLOOR = 1e-9
+_SHORT_STEP = 0.05
+_LEAST_FRACTION = 1e-3
+# A layout also counts as at rest when its forces could release at most this share of its energy.
+_NEGLIGIBLE_RELEASE = 1e-5
+# Stiffness added to hold vertices that nothing else holds, over the mean of the diagonal.
+_REGULARISATION = 1e-9
 
 
 def gauss_newton_pays(network: SpringNetwork) -> bool:
-    """Whether whole steps may take less time than others: with springs of a soft cloth between triangles, nothing sewn."""
+    """Return whether Gauss-Newton steps may be the fastest: for springs of soft cloth on triangles, nothing sewn."""
     return (
         network.model == "springs"
         and network.seams is None
@@ -58,10 +62,10 @@ def gauss_newton_pays(network: SpringNetwork) -> bool:
 
 
 class GaussNewtonSteps:
-    """The stiffness of a network of springs between triangles, with its guard, and where forces lead by it."""
+    """The Gauss-Newton stiffness of a spring network on triangles, with its guard, and its directions of descent."""
 
-    def __init__(self, network: SpringNetwork, upright: Sequence[GrainAlignment]) -> None:
-        """Of a network and those of its pieces that are held upright."""
+    def __init__(self, network: SpringNetwork, alignments: Sequence[GrainAlignment]) -> None:
+        """Prepare the steps of a network, some of whose pieces may have their grain held."""
         springs, cells, fabric = network.spring_arrays, network.cell_arrays, network.fabric
         self._count = network.vertex_count
         self._ends, self._length, self._stiffness = springs.ends, springs.rest_length, springs.stiffness
@@ -74,41 +78,46 @@ class GaussNewtonSteps:
             )
         ]
         self._free = diags_array(network.bonds.freedom.numpy().ravel())
-        self._chords = np.array([[piece.lower, piece.upper] for piece in upright], dtype=np.int32).reshape(-1, 2)
+        self._chords = np.array([[each.lower, each.upper] for each in alignments], dtype=np.int32).reshape(-1, 2)
 
-    def way(self, positions: FloatArray, force: FloatArray) -> FloatArray:
-        """#V by 2, where the forces (#V by 2 [N]) in a layout (#V by 2 [m], no cell mirrored) lead [m]."""
+    def direction(self, positions: FloatArray, force: FloatArray) -> FloatArray:
+        """Return the full step, #V by 2 [m].
+
+        Args:
+            positions: #V by 2, a layout without mirrored cells [m].
+            force: #V by 2, the forces there [N].
+        """
         stiffness = self.matrix(positions)
         diagonal = stiffness.diagonal()
-        stiffness.setdiag(diagonal + _FLOOR * diagonal.mean())
+        stiffness.setdiag(diagonal + _REGULARISATION * diagonal.mean())
         factor = splu(stiffness, permc_spec="COLAMD", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
         return np.asarray(factor.solve(force.ravel()).reshape(-1, 2))
 
     def matrix(self, positions: FloatArray) -> csc_array:
-        """2 #V by 2 #V, J^T J in a layout (#V by 2 [m]) [N/m]."""
-        rows = vstack([*self._of_springs(positions), *self._of_cells(positions), self._of_chords()]) @ self._free
+        """Return J^T J in a layout (#V by 2 [m]), 2 #V by 2 #V [N/m]."""
+        rows = vstack([*self._spring_rows(positions), *self._cell_rows(positions), self._chord_rows()]) @ self._free
         return csc_array(rows.T @ rows)
 
-    def _rows(self, vertices: IntArray, along: FloatArray) -> csr_array:
-        """A row of J for each of some vertices (#R by #K): the sum of their ways along vectors (#R by #K by 2)."""
+    def _rows(self, vertices: IntArray, gradient: FloatArray) -> csr_array:
+        """Return rows of J from their gradients (#R by #K by 2) by the places of some vertices (#R by #K)."""
         columns = 2 * vertices[:, :, None] + np.arange(2, dtype=np.int32)
         offset = np.arange(len(vertices) + 1, dtype=np.int32) * np.int32(2 * vertices.shape[1])
-        return csr_array((along.ravel(), columns.ravel(), offset), shape=(len(vertices), 2 * self._count))
+        return csr_array((gradient.ravel(), columns.ravel(), offset), shape=(len(vertices), 2 * self._count))
 
-    def _of_springs(self, positions: FloatArray) -> list[csr_array]:
-        """Along each spring, and across those that are stretched."""
+    def _spring_rows(self, positions: FloatArray) -> list[csr_array]:
+        """Return the rows along each spring, and across those that are stretched."""
         d = positions[self._ends[:, 1]] - positions[self._ends[:, 0]]
         length = np.sqrt(np.einsum("ij,ij->i", d, d))
         along = d * (np.sqrt(self._stiffness) / length)[:, None]
         stretched = np.flatnonzero(length > self._length)
         across = _turned(along[stretched]) * np.sqrt(1.0 - self._length[stretched] / length[stretched])[:, None]
         return [
-            self._rows(ends, np.stack([-way, way], axis=1))
-            for ends, way in ((self._ends, along), (self._ends[stretched], across))
+            self._rows(ends, np.stack([-vector, vector], axis=1))
+            for ends, vector in ((self._ends, along), (self._ends[stretched], across))
         ]
 
-    def _of_cells(self, positions: FloatArray) -> list[csr_array]:
-        """Along and across each worn thread, in the cells in which the guard acts on it."""
+    def _cell_rows(self, positions: FloatArray) -> list[csr_array]:
+        """Return the rows along and across each worn thread, in the cells in which the guard acts on it."""
         p0, p1, p2 = positions[self._corner].transpose(1, 0, 2)
         a, b = p1 - p0, p2 - p0
         det = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
@@ -132,8 +141,8 @@ class GaussNewtonSteps:
                 rows.append(self._rows(corner, of_corner[:, :, None] * back[:, None, :]))
         return rows
 
-    def _of_chords(self) -> csr_array:
-        """That the chords of the pieces' datums stay upright."""
+    def _chord_rows(self) -> csr_array:
+        """Return the rows that keep the chords of the aligned pieces upright."""
         sideways = np.array([[[-1.0, 0.0], [1.0, 0.0]]]) * np.sqrt(self._stiffness.max())
         return self._rows(self._chords, np.repeat(sideways, len(self._chords), axis=0))
 
@@ -141,50 +150,58 @@ class GaussNewtonSteps:
 def relax_gauss_newton(
     state: Relaxation,
     *,
-    most: float | None = None,
-    enough: float | None = None,
+    max_work: float | None = None,
+    least_gain: float | None = None,
     watch: Watch | None = None,
     each_step: Watch | None = None,
 ) -> Outcome:
-    """Whole steps, some of the paper's after each, until the energy and the residual force have come to rest, or by the stiffness in the
-    layout next to nothing is left to release, or the step limit is reached.
+    """Alternate Gauss-Newton steps and some of the paper's until a piece is at rest, or the step limit is reached.
+
+    A piece is at rest when its energy and its residual force are, or when by the Gauss-Newton stiffness next to nothing
+    is left to release.
 
     Args:
         state: where to start, no cell mirrored; holds the relaxed layout afterwards.
-        most: work units that may be taken; the options' `max_steps` if not given.
-        enough: it is over, at rest or not, once a whole step takes no more than this share of the energy away; if given.
-        watch: called after every whole step and those after it, with the state, its energies and the residual.
-        each_step: called after every step, with the energies and the residual of the last look.
+        max_work: limit of the work units; the options' `max_steps` if not given.
+        least_gain: stop, at rest or not, once a Gauss-Newton step releases no more than this share of the energy; if
+            given.
+        watch: called after every Gauss-Newton step and the smoothing after it, with the state, its energies and the
+            residual.
+        each_step: called after every step, with the energies and the residual of the last check.
     """
-    begun, first, start = time.perf_counter(), state.steps, state.work_units
-    if not state.looked:
-        state.begin()
-    most = state.options.max_steps if most is None else most
-    whole, near = GaussNewtonSteps(state.network, state.upright), np.zeros(len(state.vertices), dtype=bool)
+    began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
+    if not state.has_status:
+        state.check_start()
+    max_work = state.options.max_steps if max_work is None else max_work
+    newton = GaussNewtonSteps(state.network, state.alignments)
+    gains_little = np.zeros(len(state.vertex_ranges), dtype=bool)
 
-    def tell(call: Watch | None) -> None:
+    def notify(call: Watch | None) -> None:
         if call is not None:
-            call(state, state.last.total, float(state.last.residual.max()))
+            call(state, state.status.total, state.status.worst_residual)
 
-    if not state.last.at_rest.all():
+    if not state.status.at_rest.all():
         state.hold_grain()
         state.evaluate_at_rest()
-    work, steps, left = _WORK * math.sqrt(state.network.vertex_count), _STEPS, np.full(len(near), np.inf)
-    while not (done := state.last.at_rest | near).all() and (room := most - (state.work_units - start)) > 0.0:
-        if room > work:
-            left, share = _go(state, whole, ~done)
+    work, steps, releasable = _WORK * math.sqrt(state.network.vertex_count), _STEPS, np.full(len(gains_little), np.inf)
+    while not (done := state.status.at_rest | gains_little).all():
+        work_left = max_work - (state.work_units - work_before)
+        if work_left <= 0.0:
+            break
+        if work_left > work:
+            releasable, fraction = _line_search(state, newton, ~done)
             state.work_units += work
-            steps = _STEPS if share > _LITTLE_WAY else min(2 * steps, _MOST_STEPS)
-        _smooth(state, min(steps, math.ceil(room)), None if each_step is None else lambda: tell(each_step))
+            steps = _STEPS if fraction > _SHORT_STEP else min(2 * steps, _MOST_STEPS)
+        _smooth(state, min(steps, math.ceil(work_left)), None if each_step is None else lambda: notify(each_step))
         state.hold_grain()
         state.evaluate_at_rest()
-        look = state.look(1.0)
-        at_rest = look.at_rest | (left <= _LITTLE_LEFT * look.potential)
-        state.last = replace(look, at_rest=at_rest)
-        if enough is not None:
-            near = look.gain <= enough * look.potential
-        tell(watch)
-    return state.outcome(first, start, begun=begun)
+        status = state.check_convergence(1.0)
+        at_rest = status.at_rest | (releasable <= _NEGLIGIBLE_RELEASE * status.potential)
+        state.status = replace(status, at_rest=at_rest)
+        if least_gain is not None:
+            gains_little = status.gain <= least_gain * status.potential
+        notify(watch)
+    return state.make_outcome(steps_before, work_before, began_at=began_at)
 
 
 def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None] | None) -> None:
@@ -193,28 +210,29 @@ def _smooth(state: Relaxation, steps: int, each_step: Callable[[], None] | None)
     state.work_units += steps
 
 
-def _go(state: Relaxation, whole: GaussNewtonSteps, which: BoolArray) -> tuple[FloatArray, float]:
-    """Let these pieces (#P) go where the forces lead, or a half of the way, a quarter ..., so that their energy is not higher.
+def _line_search(state: Relaxation, newton: GaussNewtonSteps, pieces: BoolArray) -> tuple[FloatArray, float]:
+    """Move these pieces (#P) by a full step, or by a half, a quarter ... of it, so that their energy does not rise.
 
     Returns:
-        #P, what the forces could still release before, by the stiffness there [J]; the least share that was taken of the way.
+        #P, the energy that the forces could still release before, by the Gauss-Newton stiffness [J]; the least fraction
+        of the step taken.
     """
 
     def energy() -> FloatArray:
         return np.asarray(state.potentials().sum(axis=1) - state.work_of_load())
 
     start, force = state.positions(), np.array(state.force.numpy())
-    way, before, share = whole.way(start, force), energy(), 1.0
-    left = 0.5 * np.array([np.einsum("ij,ij->", way[own], force[own]) for own in state.vertices])
-    base, by = (wp.array(values, dtype=wp.vec2d, device=state.network.device) for values in (start, way))
+    step, before, fraction = newton.direction(start, force), energy(), 1.0
+    releasable = 0.5 * np.array([np.einsum("ij,ij->", step[own], force[own]) for own in state.vertex_ranges])
+    base, direction = (wp.array(values, dtype=wp.vec2d, device=state.network.device) for values in (start, step))
     while True:
-        state.move(base, by, share, which)
-        which = which & ~(energy() <= before)
-        if share == 0.0 or not which.any():
-            return left, share
-        share = 0.5 * share if share > _LEAST_SHARE else 0.0
+        state.move_along(base, direction, fraction, pieces)
+        pieces = pieces & ~(energy() <= before)
+        if fraction == 0.0 or not pieces.any():
+            return releasable, fraction
+        fraction = 0.5 * fraction if fraction > _LEAST_FRACTION else 0.0
 
 
 def _turned(vectors: FloatArray) -> FloatArray:
-    """#N by 2, to the left."""
+    """Return vectors (#N by 2) turned to the left by a right angle."""
     return np.stack([-vectors[:, 1], vectors[:, 0]], axis=1)

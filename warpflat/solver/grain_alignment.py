@@ -1,6 +1,7 @@
-"""Pieces that stay upright: the chord of the datum points up, since the datum is the grain.
+"""The rotation gauge of a piece: the chord of its datum, the grain, keeps pointing along +y.
 
-Nothing else says how a piece lies on the cloth, so that it would turn for ever to please a guard bound to the plane.
+Nothing else fixes the rotation of a piece on the cloth, and the guard, which is bound to the directions of the plane,
+would turn it for ever.
 """
 
 from __future__ import annotations
@@ -18,11 +19,11 @@ __all__ = ["GrainAlignment", "align_grain", "hold_grain", "remove_rotation"]
 
 @dataclass(frozen=True, kw_only=True)
 class GrainAlignment:
-    """A piece and the two of its vertices that lie one above the other.
+    """A piece and the two ends of its datum, which are kept one above the other.
 
     Attributes:
-        lower, upper: vertex indices.
-        vertices: those of the piece; all, if not given.
+        lower, upper: vertex indices of the ends.
+        vertices: the range of the piece's vertices; all, if not given.
     """
 
     lower: int
@@ -31,13 +32,13 @@ class GrainAlignment:
 
 
 def align_grain(pieces: Sequence[GrainAlignment], position: FloatArray) -> None:
-    """Turn each piece about its centre so that its chord points up; the positions (#V by 2 [m]) are changed in place."""
+    """Turn each piece about its centre so that its chord points up, in place; positions: #V by 2 [m]."""
     for piece in pieces:
         _turn(piece, position)
 
 
 def _turn(piece: GrainAlignment, position: FloatArray) -> tuple[ComplexArray, complex]:
-    """Turn a piece; where its vertices then are, and by what they were turned."""
+    """Turn a piece; return its vertices' places as complex numbers, and the factor by which they were turned."""
     place = _complex(position[piece.vertices])
     chord = complex(*(position[piece.upper] - position[piece.lower]))
     turn = 1j * abs(chord) / chord if chord else 1.0 + 0.0j
@@ -56,14 +57,16 @@ def hold_grain(
     force: FloatArray,
     weight: FloatArray,
 ) -> None:
-    """Turn each piece so, and balance what would turn it back; the first three arrays are changed in place.
+    """Turn each piece so that its chord points up, and balance the torque that would turn it back.
+
+    Position, velocity and load are changed in place.
 
     Args:
-        pieces: which.
-        position, velocity: #V by 2 [m], [m/s]; the latter is rid of what turning there is in it.
-        load: #V by 2 [N]; is made one that is spread over a piece and balances the torque with which its cloth would turn.
-        force: #V by 2, of the cloth, with the load as it was, in the layout as it was [N].
-        weight: #V, by which motion is averaged.
+        pieces: the pieces.
+        position, velocity: #V by 2 [m], [m/s]; the velocities lose their rotation.
+        load: #V by 2 [N]; becomes the load, spread over a piece, that balances the torque of its cloth.
+        force: #V by 2, forces of the cloth and of the load before, in the layout before [N].
+        weight: #V, weights of the mean motion.
     """
     for piece in pieces:
         here = piece.vertices
@@ -84,7 +87,10 @@ def hold_grain(
 def remove_rotation(
     pieces: Sequence[GrainAlignment], position: FloatArray, force: FloatArray, weight: FloatArray
 ) -> None:
-    """Rid forces (#V by 2 [N]) in place of those parts that only turn pieces as a whole. Arguments as of `hold_grain`."""
+    """Remove from the forces (#V by 2 [N]), in place, the parts that only turn pieces as a whole.
+
+    See `hold_grain` for the arguments.
+    """
     for piece in pieces:
         here = piece.vertices
         arm, inertia = _arm(_complex(position[here]), weight[here])
@@ -95,7 +101,7 @@ def remove_rotation(
 
 
 def _arm(place: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, float]:
-    """#V, velocities of a rigid turn by 1 rad/s about the weighted mean, and the moment of inertia."""
+    """Return the velocities of a rotation by 1 rad/s about the weighted mean, #V, and the moment of inertia."""
     centre = complex(*(dot(weight, part) for part in _vectors(place).T)) / weight.sum()
     arm = place - centre
     arm *= 1j
@@ -103,15 +109,15 @@ def _arm(place: ComplexArray, weight: FloatArray) -> tuple[ComplexArray, float]:
 
 
 def _moment(arm: ComplexArray, vectors: FloatArray, weight: FloatArray) -> float:
-    """The weighted sum of the scalar products of vectors."""
+    """Return the weighted sum of the scalar products of vectors."""
     return sum(float(np.einsum("i,i,i->", weight, _vectors(arm)[:, k], vectors[:, k])) for k in range(2))
 
 
 def _complex(vectors: FloatArray) -> ComplexArray:
-    """#V by 2 as #V, x + iy; the same memory."""
+    """View #V by 2 vectors as #V complex numbers x + iy, in the same memory."""
     return vectors.view(np.complex128)[:, 0]
 
 
 def _vectors(values: ComplexArray) -> FloatArray:
-    """#V as #V by 2; the same memory."""
+    """View #V complex numbers as #V by 2 vectors, in the same memory."""
     return values.view(np.float64).reshape(-1, 2)

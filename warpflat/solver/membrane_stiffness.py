@@ -1,4 +1,4 @@
-"""The matrix of a membrane's steps, kept to the stiffness that the membrane has in the present layout."""
+"""The step matrix of a membrane, updated to its tangent stiffness in the present layout."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ __all__ = ["TangentMatrix"]
 class TangentMatrix:
     """The k_ij of a network whose model is the membrane.
 
-    A network is built with the k_ij of a cloth at rest. A cell that lies in the plane very differently from how it lies on
-    the body, say a sliver that the development has opened, is much softer than that, and with the stiffness it would have
-    at rest its corners creep back for ten thousand steps.
+    A network is built with the k_ij of a cloth at rest. A cell whose shape in the plane differs much from that on the
+    body, such as a sliver that the development has opened, is much softer. With the stiffness at rest its corners would
+    creep back for ten thousand steps.
     """
 
     def __init__(self, network: SpringNetwork) -> None:
-        """Of this network; nothing is changed before `follow` is called."""
+        """Prepare updates of this network; nothing is changed before `update` is called."""
         self._network = network
         self._side = springs_of_sides(network.spring_arrays, network.cell_arrays)
         self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
 
-    def follow(self, position: wp.array) -> None:
-        """Let the k_ij bound the membrane's stiffness at these positions (#V vec2d [m]), none of its cells mirrored."""
+    def update(self, position: wp.array) -> None:
+        """Set the k_ij to a bound of the membrane's stiffness at positions (#V vec2d [m]) without mirrored cells."""
         network = self._network
         assert network.cloth is not None
         wp.launch(

@@ -1,4 +1,4 @@
-"""What the driver asks of the pieces of a state whose arrays are the host's own."""
+"""Sums over the pieces of a network, and the rotation of pieces, by NumPy on arrays of the host."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.sums import range_offsets
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Mark
+from warpflat.solver.convergence import Iterate
 from warpflat.solver.grain_alignment import GrainAlignment, hold_grain, remove_rotation
 from warpflat.solver.step_buffers import StepBuffers
 
@@ -18,25 +18,29 @@ __all__ = ["HostPieceSums"]
 
 
 class HostPieceSums:
-    """Sums over pieces, and pieces as wholes, by NumPy; `warpflat.solver.piece_sums_cuda` has the same for a CUDA device.
+    """Sums over the pieces of a state on the host; `warpflat.solver.piece_sums_cuda` has those on a CUDA device.
 
     Attributes:
-        vertices: of each piece, its vertices.
+        vertex_ranges: the slice of each piece's vertices.
     """
 
     def __init__(self, network: SpringNetwork, buffers: StepBuffers) -> None:
-        """Of a network and what its steps leave behind."""
+        """Prepare sums over the buffers of a network."""
         self._network, self._buffers = network, buffers
         self._vertex_begin = range_offsets([net.vertex_count for net in network.pieces])
         self._face_begin = range_offsets([net.face_count for net in network.pieces])
-        self.vertices = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
+        self.vertex_ranges = [slice(*ends) for ends in pairwise(self._vertex_begin.tolist())]
 
     def guard_acts(self) -> bool:
-        """Whether it does anywhere, at the last evaluated state."""
+        """Return whether the guard acts anywhere at the last evaluated state."""
         return bool(self._buffers.on_host(self._buffers.guarded).any())
 
+    def may_move(self) -> bool:
+        """Return whether any velocity may be other than zero."""
+        return bool(self._buffers.velocity.numpy().any())
+
     def damp(self) -> int:
-        """Velocities of pieces whose forces begin to brake the motion become zero; how many of them."""
+        """Set the velocities of pieces to zero whose forces brake their motion; return how many pieces that were."""
         buffers = self._buffers
         power = _sums(buffers.on_host(buffers.power), self._vertex_begin)
         braked = np.flatnonzero(power < 0.0) if power.min() < 0.0 else ()
@@ -44,72 +48,68 @@ class HostPieceSums:
             buffers.stop[piece].launch()
         return len(braked)
 
-    def stopped(self) -> int:
-        """How many of them there were besides."""
+    def take_stop_count(self) -> int:
+        """Return how many pieces were stopped that `damp` has not reported yet, and reset the count."""
         return 0
 
     def mirrored(self) -> BoolArray:
-        """#P, whether a piece has cells that are mirrored or without area, at the last evaluated state."""
+        """Return whether each piece has a mirrored or collapsed cell at the last evaluated state, #P."""
         clearance = self._buffers.on_host(self._buffers.face_clearance)
         return np.logical_or.reduceat(clearance <= 0.0, self._face_begin[:-1])
 
     def work_of_load(self) -> FloatArray:
-        """#P, sum of load times place [J]."""
+        """Return the sum of load times position of each piece, #P [J]."""
         load, position = (self._buffers.on_host(array) for array in (self._buffers.load, self._buffers.position))
-        return np.array([np.einsum("ij,ij->", load[here], position[here]) for here in self.vertices])
+        return np.array([np.einsum("ij,ij->", load[own], position[own]) for own in self.vertex_ranges])
 
-    def measured(self) -> tuple[FloatArray, FloatArray]:
-        """#P each, the energies of springs and cells that have been measured last [J]."""
+    def element_energies(self) -> tuple[FloatArray, FloatArray]:
+        """Return the energies of springs and of cells as last measured, #P each [J]."""
         buffers = self._buffers
         springs = _sums(buffers.on_host(buffers.vertex_energy), self._vertex_begin)
         return springs, _sums(buffers.on_host(buffers.face_energy), self._face_begin)
 
-    def of_vertices(self) -> FloatArray:
-        """#P, sums of what has been measured last at the vertices: energies of the motion [J], or pulls [N]."""
+    def vertex_sums(self) -> FloatArray:
+        """Return sums of the values last measured at the vertices, #P: kinetic energies [J], or spring tensions [N]."""
         return _sums(self._buffers.vertex_energy.numpy(), self._vertex_begin)
 
-    def moves(self) -> bool:
-        """Whether a velocity may be other than zero."""
-        return bool(self._buffers.velocity.numpy().any())
-
-    def force_sizes(self) -> FloatArray:
-        """#P, the norm of all forces on the vertices at the last evaluated state [N]."""
+    def force_norms(self) -> FloatArray:
+        """Return the norm of the forces on the vertices of each piece at the last evaluated state, #P [N]."""
         force = self._buffers.force.numpy()
-        return np.array([np.linalg.norm(force[here]) for here in self.vertices])
+        return np.array([np.linalg.norm(force[own]) for own in self.vertex_ranges])
 
-    def strongest(self, upright: Sequence[GrainAlignment]) -> FloatArray:
-        """#P, the largest force of the cloth on a vertex [N], but for what only turns a piece that is held upright."""
+    def largest_forces(self, alignments: Sequence[GrainAlignment]) -> FloatArray:
+        """Return the largest cloth force on a vertex of each piece, #P [N], without forces that turn aligned pieces."""
         force = self.cloth_force()
         weight = self._network.spring_stiffness.numpy()
-        remove_rotation(upright, self._buffers.position.numpy(), force, weight)
+        remove_rotation(alignments, self._buffers.position.numpy(), force, weight)
         return np.sqrt(np.maximum.reduceat(np.einsum("ij,ij->i", force, force), self._vertex_begin[:-1]))
 
-    def hold_grain(self, upright: Sequence[GrainAlignment]) -> None:
-        """See `warpflat.solver.grain_alignment`."""
+    def hold_grain(self, alignments: Sequence[GrainAlignment]) -> None:
+        """Turn aligned pieces and balance their torque (see `warpflat.solver.grain_alignment`)."""
         buffers = self._buffers
         position, velocity, load, force = (
             array.numpy() for array in (buffers.position, buffers.velocity, buffers.load, buffers.force)
         )
-        hold_grain(upright, position, velocity, load, force, self._network.spring_stiffness.numpy())
+        hold_grain(alignments, position, velocity, load, force, self._network.spring_stiffness.numpy())
 
     def cloth_force(self) -> FloatArray:
-        """#V by 2, forces of the cloth and the seams alone, at the last evaluated state [N]."""
+        """Return the forces of the cloth and its seams, without the load, at the last evaluated state, #V by 2 [N]."""
         return np.asarray(self._buffers.force.numpy() - self._buffers.load.numpy())
 
-    def mark(self) -> Mark:
-        """Where it is, and the forces of the cloth there, as they have just been evaluated; perhaps of the buffers themselves."""
+    def iterate(self) -> Iterate:
+        """Return the layout and the forces of the cloth there, as just evaluated; may share memory with the buffers."""
         return self._buffers.position.numpy(), self.cloth_force()
 
-    def mark_with_load(self) -> Mark:
-        """The same with all forces."""
+    def loaded_iterate(self) -> Iterate:
+        """Return the layout and all forces there, the load included; may share memory with the buffers."""
         return self._buffers.position.numpy(), self._buffers.force.numpy()
 
-    def room(self) -> FloatArray:
-        """#V by 2, what is spare until forces are evaluated."""
+    def scratch(self) -> FloatArray:
+        """Return a buffer that is free for any use until the forces are evaluated, #V by 2."""
         return np.asarray(self._buffers.first_guess.numpy())
 
 
 def _sums(values: FloatArray, begin: IntArray) -> FloatArray:
-    """The sum of each range of the values; `begin` has its begins and the last end."""
-    # Of a whole array NumPy adds in pairs, which loses less.
+    """Return the sum of each range of the values; `begin` holds where the ranges begin and where the last one ends."""
+    # NumPy sums a whole array pairwise, which loses less.
     return values.sum(keepdims=True) if len(begin) == 2 else np.add.reduceat(values, begin[:-1])

@@ -1,6 +1,7 @@
-"""What the driver asks of the pieces of a state whose arrays lie on a CUDA device: worked out there, but for a few numbers a piece.
+"""Sums over the pieces of a network, and the rotation of pieces, by kernels on a CUDA device.
 
-`warpflat.solver.piece_sums_cpu` has the same for arrays that are the host's own, and says what each of these is.
+Only a few numbers a piece are copied to the host. `warpflat.solver.piece_sums_cpu` has the same methods for arrays of
+the host, and describes each of them.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from warpflat.kernels.prolongation import inject
 from warpflat.kernels.reduce import subtract
 from warpflat.kernels.rigid_motion import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Mark
+from warpflat.solver.convergence import Iterate
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.step_buffers import StepBuffers
 
@@ -30,30 +31,30 @@ __all__ = ["DevicePieceSums"]
 
 
 class DevicePieceSums:
-    """As `HostPieceSums`."""
+    """Sums over the pieces of a state on a CUDA device, with the methods of `HostPieceSums`."""
 
     def __init__(self, network: SpringNetwork, buffers: StepBuffers) -> None:
-        """Of a network and what its steps leave behind."""
+        """Prepare sums over the buffers of a network."""
         self._network, self._buffers, self._device = network, buffers, network.device
         counts = [net.vertex_count for net in network.pieces]
         begin = range_offsets(counts)
-        self.vertices = [slice(*ends) for ends in pairwise(begin.tolist())]
-        self._of_vertices = DeviceSums(counts, self._device)
-        self._of_faces = DeviceSums([net.face_count for net in network.pieces], self._device)
+        self.vertex_ranges = [slice(*ends) for ends in pairwise(begin.tolist())]
+        self._over_vertices = DeviceSums(counts, self._device)
+        self._over_faces = DeviceSums([net.face_count for net in network.pieces], self._device)
         self._stopped = wp.zeros(len(counts), dtype=wp.int32, device=self._device)
         piece = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
         self._piece_of = wp.array(piece, dtype=wp.int32, device=self._device)
-        self._held: _Held | None = None
+        self._rotation: _PieceRotation | None = None
         self._damping: LaunchSequence | None = None
 
     def guard_acts(self) -> bool:
-        # To look costs more than to go through cells that do not act.
+        # A check costs more than a pass over cells in which the guard does not act.
         return True
 
     @property
     def damping(self) -> list[Launch]:
-        """What lets pieces whose forces begin to brake the motion rest, and counts them."""
-        net, buffers, power = self._network, self._buffers, self._of_vertices.result
+        """The launches that stop pieces whose forces brake their motion, and count them."""
+        net, buffers, power = self._network, self._buffers, self._over_vertices.result
         stop = record(
             stop_braked,
             dim=net.vertex_count,
@@ -62,7 +63,7 @@ class DevicePieceSums:
             device=self._device,
         )
         count = record(count_braked, dim=len(power), inputs=[power], outputs=[self._stopped], device=self._device)
-        return [*self._of_vertices.summing(buffers.power), stop, count]
+        return [*self._over_vertices.summing(buffers.power), stop, count]
 
     def damp(self) -> int:
         if self._damping is None:
@@ -70,91 +71,93 @@ class DevicePieceSums:
         self._damping.launch()
         return 0
 
-    def stopped(self) -> int:
-        """How many pieces have been stopped, one as often as it was, since this was asked last."""
+    def take_stop_count(self) -> int:
         count = int(self._stopped.numpy().sum())
         self._stopped.zero_()
         return count
 
     def mirrored(self) -> BoolArray:
-        return np.asarray(self._of_faces.least(self._buffers.face_clearance) <= 0.0)
+        return np.asarray(self._over_faces.least(self._buffers.face_clearance) <= 0.0)
 
     def work_of_load(self) -> FloatArray:
-        return self._of_vertices.dots(self._buffers.load, self._buffers.position)
+        return self._over_vertices.dots(self._buffers.load, self._buffers.position)
 
-    def measured(self) -> tuple[FloatArray, FloatArray]:
-        return self.of_vertices(), self._of_faces.sums(self._buffers.face_energy)
+    def element_energies(self) -> tuple[FloatArray, FloatArray]:
+        return self.vertex_sums(), self._over_faces.sums(self._buffers.face_energy)
 
-    def moves(self) -> bool:
-        """Whether a velocity may be other than zero: to look would take as long as to measure the motion."""
+    def may_move(self) -> bool:
+        # A check would take as long as measuring the kinetic energy.
         return True
 
-    def of_vertices(self) -> FloatArray:
-        return self._of_vertices.sums(self._buffers.vertex_energy)
+    def vertex_sums(self) -> FloatArray:
+        return self._over_vertices.sums(self._buffers.vertex_energy)
 
-    def force_sizes(self) -> FloatArray:
-        return np.sqrt(self._of_vertices.dots(self._buffers.force, self._buffers.force))
+    def force_norms(self) -> FloatArray:
+        return np.sqrt(self._over_vertices.dots(self._buffers.force, self._buffers.force))
 
-    def strongest(self, upright: Sequence[GrainAlignment]) -> FloatArray:
-        held = self._hold(upright)
-        held.measure()
-        if held.strongest is None:
-            held.strongest = self._of_vertices.least_after(partial(self._record_strongest, held))
-        return np.sqrt(-self._of_vertices.of(held.strongest))
+    def largest_forces(self, alignments: Sequence[GrainAlignment]) -> FloatArray:
+        rotation = self._rotation_of(alignments)
+        rotation.measure()
+        if rotation.largest_force is None:
+            rotation.largest_force = self._over_vertices.least_after(partial(self._record_largest_force, rotation))
+        return np.sqrt(-self._over_vertices.of(rotation.largest_force))
 
-    def _record_strongest(self, held: _Held, least: wp.array) -> Launch:
-        buffers, weight = self._buffers, self._network.spring_stiffness
-        given = [buffers.position, buffers.force, buffers.load, weight, held.piece, held.turn, self._of_vertices.blocks]
+    def _record_largest_force(self, rotation: _PieceRotation, least: wp.array) -> Launch:
+        buffers, weight, blocks = self._buffers, self._network.spring_stiffness, self._over_vertices.blocks
+        given = [buffers.position, buffers.force, buffers.load, weight, rotation.piece, rotation.turn, blocks]
         return record(strongest_of_blocks, dim=len(least), inputs=given, outputs=[least], device=self._device)
 
-    def hold_grain(self, upright: Sequence[GrainAlignment]) -> None:
-        held = self._hold(upright)
-        held.measure(ends=True)
-        held.go.launch()
+    def hold_grain(self, alignments: Sequence[GrainAlignment]) -> None:
+        rotation = self._rotation_of(alignments)
+        rotation.measure(chords=True)
+        rotation.turn_pieces.launch()
 
     def cloth_force(self) -> FloatArray:
         return np.asarray(self._cloth_force().numpy())
 
     def _cloth_force(self) -> wp.array:
         force, load = self._buffers.force, self._buffers.load
-        alone = wp.empty_like(force)
-        launch_each(subtract, len(force), [force, load], [alone], device=self._device)
-        return alone
+        cloth = wp.empty_like(force)
+        launch_each(subtract, len(force), [force, load], [cloth], device=self._device)
+        return cloth
 
-    def mark(self) -> Mark:
+    def iterate(self) -> Iterate:
         return self._buffers.position, self._cloth_force()
 
-    def mark_with_load(self) -> Mark:
+    def loaded_iterate(self) -> Iterate:
         return self._buffers.position, self._buffers.force
 
-    def room(self) -> wp.array:
+    def scratch(self) -> wp.array:
         return self._buffers.first_guess
 
-    def _hold(self, upright: Sequence[GrainAlignment]) -> _Held:
-        if self._held is None or self._held.upright is not upright:
-            self._held = _Held(self._network, self._buffers, upright)
-        return self._held
+    def _rotation_of(self, alignments: Sequence[GrainAlignment]) -> _PieceRotation:
+        if self._rotation is None or self._rotation.alignments is not alignments:
+            self._rotation = _PieceRotation(self._network, self._buffers, alignments)
+        return self._rotation
 
 
-class _Held:
-    """Pieces that are held upright: those that are sewn together, say, are one network, and each is held.
+class _PieceRotation:
+    """The rotation of the pieces whose grain is held, each on its own even where several are sewn to one network.
 
     Attributes:
-        upright: which. piece: #V, which of them a vertex is of, -1 where of none. turn: how each of them turns.
-        go: turns them so. strongest: looks for the largest force.
+        alignments: the pieces.
+        piece: #V, the aligned piece of each vertex, -1 for none.
+        turn: centre, angle, angular velocity and torque of each piece, as last measured.
+        turn_pieces: turns the pieces by these.
+        largest_force: finds the largest force of each piece of the network.
     """
 
-    strongest: LaunchSequence | None = None
+    largest_force: LaunchSequence | None = None
 
-    def __init__(self, network: SpringNetwork, buffers: StepBuffers, upright: Sequence[GrainAlignment]) -> None:
+    def __init__(self, network: SpringNetwork, buffers: StepBuffers, alignments: Sequence[GrainAlignment]) -> None:
         device, every = network.device, np.arange(network.vertex_count, dtype=np.int32)
-        self.upright, self._network, self._buffers = upright, network, buffers
-        own = [every[each.vertices] for each in upright]
+        self.alignments, self._network, self._buffers = alignments, network, buffers
+        own = [every[each.vertices] for each in alignments]
         self._sizes = np.array([len(vertices) for vertices in own])[:, None]
         piece = np.full(len(every), -1, dtype=np.int32)
         for number, vertices in enumerate(own):
             piece[vertices] = number
-        # Blocks of each, and of what lies between.
+        # Ranges of vertices: those of each aligned piece, and those in between.
         first = np.flatnonzero(np.diff(piece, prepend=-2))
         self._part = np.searchsorted(first, [vertices[0] for vertices in own])
         self._sums = DeviceSums(np.diff(first, append=len(every)).tolist(), device)
@@ -164,11 +167,11 @@ class _Held:
             setattr(self.turn, name, wp.zeros(len(own), dtype=wp.vec2d, device=device))
         for name in ("spin", "torque"):
             setattr(self.turn, name, wp.zeros(len(own), dtype=wp.float64, device=device))
-        chords = np.array([[each.lower, each.upper] for each in upright], dtype=np.int32).ravel()
+        chords = np.array([[each.lower, each.upper] for each in alignments], dtype=np.int32).ravel()
         self._chord = wp.array(chords, dtype=wp.int32, device=device)
-        self._ends = wp.empty(len(chords), dtype=wp.vec2d, device=device)
+        self._chord_ends = wp.empty(len(chords), dtype=wp.vec2d, device=device)
         self._moments = wp.empty(MOMENTS * (len(self._sums.blocks) - 1), dtype=wp.float64, device=device)
-        self.go = record(
+        self.turn_pieces = record(
             turn_pieces,
             dim=network.vertex_count,
             inputs=[network.spring_stiffness, self.piece, self.turn],
@@ -176,17 +179,17 @@ class _Held:
             device=device,
         )
 
-    def measure(self, *, ends: bool = False) -> None:
-        """Find out how the pieces turn; with their ends, how they are to be turned."""
-        if not self.upright:
+    def measure(self, *, chords: bool = False) -> None:
+        """Measure torque and angular velocity of each piece; with `chords`, also the angle by which to turn it."""
+        if not self.alignments:
             return
         net, buffers, device = self._network, self._buffers, self._network.device
         blocks = self._sums.blocks
         given = [buffers.position, buffers.velocity, buffers.force, buffers.load, net.spring_stiffness, blocks]
         launch_each(sum_moments, len(blocks) - 1, given, [self._moments], device=device)
-        of_parts = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), self._sums.first_block[:-1])
+        part_sums = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), self._sums.first_block[:-1])
         weight, moment, second, place, force, torque, motion, swing = np.split(
-            of_parts[self._part], np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
+            part_sums[self._part], np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
         )
         middle = moment / weight
         inertia = np.maximum(second - weight * (middle**2).sum(axis=1, keepdims=True), 1e-300)
@@ -195,10 +198,10 @@ class _Held:
             "torque": (torque - _cross(middle, force)) / inertia,
             "spin": (swing - _cross(middle, motion)) / inertia,
         }
-        if ends:
-            launch_each(inject, len(self._chord), [self._chord, buffers.position], [self._ends], device=device)
-            at = self._ends.numpy().reshape(-1, 2, 2)
-            chord = at[:, 1] - at[:, 0]
+        if chords:
+            launch_each(inject, len(self._chord), [self._chord, buffers.position], [self._chord_ends], device=device)
+            ends = self._chord_ends.numpy().reshape(-1, 2, 2)
+            chord = ends[:, 1] - ends[:, 0]
             length = np.linalg.norm(chord, axis=1, keepdims=True)
             with np.errstate(invalid="ignore", divide="ignore"):
                 # i |c| / c: from the chord to straight up.
@@ -209,5 +212,5 @@ class _Held:
 
 
 def _cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """#P by 1, of vectors (#P by 2)."""
+    """Return the cross products of vectors (#P by 2), #P by 1."""
     return (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])[:, None]

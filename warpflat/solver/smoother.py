@@ -1,26 +1,35 @@
-"""Steps that smooth: what is rough in a layout goes in few of them, what is not is left to coarser levels.
+"""Coefficients of the approximate implicit step, as the paper's and as a smoother for multigrid cycles.
 
-The approximate implicit step, eq. (10), without viscosity, is a push P F of the forces F on the vertices, P = (I + N) D^-1. Of P A, with A
-the stiffness of the springs, all eigenvalues e lie between 0 and 1. With viscosity velocities swing: times sqrt(e), .21 of some
-way is left after four steps from rest, and after eight. Velocities that are carried on and pushed by the shares of a Chebyshev polynomial
-of the fourth kind leave 1 / (2 k + 1) of any way after k steps, weighed so: as little as k pushes can, and what a cycle is bound by
-(Lottes, Optimal polynomial smoothers for multigrid V-cycles, Numerical Linear Algebra with Applications 30, 2023).
+Without viscosity the step of eq. (10) is a preconditioned push P F by the forces F on the vertices, P = (I + N) D^-1.
+All eigenvalues e of P A, with A the stiffness of the springs, lie between 0 and 1. With viscosity the velocities
+oscillate, and sqrt(e) times the error falls to 0.21 after four steps from rest, and no further after eight. When the
+momentum and the push follow a Chebyshev polynomial of the fourth kind instead, sqrt(e) times the error falls to 1 / (2
+k + 1) after k steps, the least that k pushes can reach. This bounds the convergence rate of a cycle (Lottes, Optimal
+polynomial smoothers for multigrid V-cycles, Numerical Linear Algebra with Applications 30, 2023).
 """
 
 from __future__ import annotations
 
-__all__ = ["STEADY", "STILL", "smoother_coefficients"]
+__all__ = ["IMPLICIT_STEP", "IMPLICIT_STEP_AT_REST", "SmootherCoefficients", "chebyshev_coefficients"]
 
 SmootherCoefficients = tuple[float, float, float]
+"""Factors of the viscosity (0 or 1), of the velocity (momentum) and of its change (step); see `kernels.implicit`."""
 
-STEADY: SmootherCoefficients = (1.0, 1.0, 1.0)
-"""The paper's: with viscosity, and with all of the velocity and of the push (`kernels.implicit`)."""
+IMPLICIT_STEP: SmootherCoefficients = (1.0, 1.0, 1.0)
+"""The paper's step."""
 
-STILL: SmootherCoefficients = (0.0, 1.0, 1.0)
-"""The same at rest, where there is no viscosity to be had."""
+IMPLICIT_STEP_AT_REST: SmootherCoefficients = (0.0, 1.0, 1.0)
+"""The paper's step from zero velocities, where the viscosity is zero."""
 
 
-def smoother_coefficients(number: int) -> SmootherCoefficients:
-    """Of the smoothing step after so many from rest: without viscosity, the share of the velocity that is carried on, that of the push."""
-    carried = max(2 * number - 1, 0) / (2 * number + 3)
-    return 0.0, carried, (8 * number + 4) / (2 * number + 3)
+def chebyshev_coefficients(step: int) -> SmootherCoefficients:
+    """Return the coefficients of the fourth-kind Chebyshev smoother (Lottes 2023).
+
+    Args:
+        step: index of the smoothing step, 0 for the first one from rest.
+
+    Returns:
+        viscosity factor 0, momentum (2k - 1) / (2k + 3), step factor (8k + 4) / (2k + 3) with k = `step`.
+    """
+    momentum = max(2 * step - 1, 0) / (2 * step + 3)
+    return 0.0, momentum, (8 * step + 4) / (2 * step + 3)

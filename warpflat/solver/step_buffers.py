@@ -1,7 +1,7 @@
 """The buffers of a step and the launches over them.
 
-Buffers are allocated once. A launch is recorded when it is first asked for, over ranges for all cores: a recorded one costs a fifth of
-a fresh one.
+Buffers are allocated once. A launch is recorded at its first use, over ranges for all cores: a recorded launch costs a
+fifth of a fresh one.
 """
 
 from __future__ import annotations
@@ -23,37 +23,41 @@ from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_fo
 from warpflat.kernels.line_solve import go_along_lines, solve_lines
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.smoother import STEADY
+from warpflat.solver.smoother import IMPLICIT_STEP, SmootherCoefficients
 
 __all__ = ["StepBuffers"]
 
 
-# So many lines of a lattice are worth a thread of their own: they have about as many vertices each.
+# Lines of a lattice that are worth a thread of their own; each has about as many vertices.
 _LEAST_LINES = 64
-# The guard takes several times as long as a look at a cell, and acts in some places of a piece only: each thread takes so many ranges,
-# spread over all.
+# The guard takes several times as long as the check of a cell, and acts in some places of a piece only. So each thread
+# takes this many ranges, spread over the piece.
 _TURNS = 4
 
 
 class StepBuffers:
-    """State of a network and what the kernels of a step leave behind; on the network's device.
+    """The state of a network and the results of a step's kernels, on the network's device.
 
     Attributes:
-        position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V vec2d, constant
-            forces [N].
+        position: #V vec2d [m]. velocity: #V vec2d [m/s]. force: #V vec2d, of the last evaluated state [N]. load: #V
+            vec2d, constant forces [N].
         guarded, power, driving_force, first_guess, stiffness, anchor, reach: #V, as `kernels.implicit` has them.
-        pace: 1 vec3d, how steps go on from one another, as `kernels.implicit` has it.
-        face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has them.
-        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_pull: #V, what each spring to a later one pulls with [N].
-            Those of vertices are where `power` is, those of faces where `face_stiffness` is: each is read as soon as it is written.
-        evaluate: the forces; all faces are looked at. evaluate_on, evaluate_unguarded: the same with those faces only that act, and with
-            none. advance: the places after them. along_lines: the places after a step along the lines of a lattice, once forces have been
-            evaluated; its ways take the place of `first_guess` and `driving_force`. stop: of each piece, the velocities. measure,
-            measure_motion: energies. measure_pull: what springs pull with.
+        coefficients: 1 vec3d, factors of viscosity, velocity and velocity change, as `kernels.implicit` has them.
+        face_acting, face_clearance, face_force, face_viscosity, face_stiffness: #F and 4 #F, as `kernels.cells` has
+            them.
+        vertex_energy, face_energy: #V and #F, as last measured [J]. vertex_tension: #V, |tension| of the springs to
+            later vertices [N]. Values of vertices share the memory of `power`, those of faces that of `face_stiffness`:
+            each is read as soon as it is written.
     """
 
     def __init__(self, network: SpringNetwork, time_step: float, start: FloatArray) -> None:
-        """Of a network at rest at a layout (#V by 2 [m]), stepped by so much [s]."""
+        """Allocate the buffers of a network at rest in a layout.
+
+        Args:
+            network: the model.
+            time_step: h [s].
+            start: #V by 2, the layout [m].
+        """
         self.network, self.time_step = network, time_step
         n, f, device = network.vertex_count, network.face_count, network.device
         net_seams = network.seam_count
@@ -68,7 +72,8 @@ class StepBuffers:
         self.reach = wp.zeros(n, dtype=wp.float64, device=device)
         self.guarded = wp.zeros(n, dtype=wp.int8, device=device)
         self.face_acting = wp.zeros(f, dtype=wp.int8, device=device)
-        # Written and read only with viscosity, and of faces only where cells act: elsewhere no memory stands behind them.
+        # Written and read only with viscosity, and for faces only where cells act: pages that are never touched take no
+        # memory.
         self.driving_force = wp.empty(n, dtype=wp.vec2d, device=device)
         self.face_force = wp.empty(4 * f, dtype=wp.vec2d, device=device)
         self.face_viscosity = wp.empty(4 * f, dtype=wp.vec2d, device=device)
@@ -77,13 +82,13 @@ class StepBuffers:
         self.seam_force = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_viscosity = wp.zeros(4 * net_seams, dtype=wp.vec2d, device=device)
         self.seam_stiffness = wp.zeros(4 * net_seams, dtype=wp.float64, device=device)
-        self.pace = wp.array(np.array([STEADY]), dtype=wp.vec3d, device=device)
-        self.vertex_energy = self.vertex_pull = self.power
+        self.coefficients = wp.array(np.array([IMPLICIT_STEP]), dtype=wp.vec3d, device=device)
+        self.vertex_energy = self.vertex_tension = self.power
         self.face_energy = self.face_stiffness[:f]
         self._views: dict[int, NDArray[Any]] = {}
 
     def on_host(self, array: wp.array) -> NDArray[Any]:
-        """The values of one of the buffers that each step asks for; on the CPU the buffer itself, without the way through Warp."""
+        """Return the values of a buffer; on the CPU a view of the buffer itself, kept to save the call of Warp."""
         view = self._views.get(id(array))
         if view is None:
             view = array.numpy()
@@ -91,21 +96,21 @@ class StepBuffers:
                 self._views[id(array)] = view
         return view
 
-    def go_at(self, pace: tuple[float, float, float]) -> None:
-        """Let the next steps go at this pace."""
-        values = self.on_host(self.pace)
-        values[0] = pace
+    def set_coefficients(self, coefficients: SmootherCoefficients) -> None:
+        """Set the coefficients of the next steps."""
+        values = self.on_host(self.coefficients)
+        values[0] = coefficients
         if not self.network.device.is_cpu:
-            self.pace.assign(values)
+            self.coefficients.assign(values)
 
-    def _cells(self, watch: int) -> Launch:
-        """Forces on the cells, of all faces (1) or of those that act (0)."""
+    def _cells(self, check_all: int) -> Launch:
+        """Record the forces on the cells, of all faces (1) or of those in which the guard acts (0)."""
         net = self.network
         kernel, _, parameters = net.cell_model
         return record(
             kernel,
             dim=net.face_count,
-            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.pace, watch],
+            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.coefficients, check_all],
             outputs=[
                 self.face_acting,
                 self.face_clearance,
@@ -132,8 +137,8 @@ class StepBuffers:
             )
         ]
 
-    def _gather(self, watch: int) -> Launch:
-        """Forces on the vertices, once all faces have been evaluated (1) or those that act (0)."""
+    def _gather(self, check_all: int) -> Launch:
+        """Record the forces on the vertices, after all faces (1) or only those in which the guard acts (0)."""
         net = self.network
         return record(
             gather_forces,
@@ -156,8 +161,8 @@ class StepBuffers:
                 self.seam_stiffness,
                 self.load,
                 self.time_step,
-                self.pace,
-                watch,
+                self.coefficients,
+                check_all,
             ],
             outputs=[
                 self.force,
@@ -175,22 +180,26 @@ class StepBuffers:
 
     @cached_property
     def evaluate(self) -> LaunchSequence:
+        """The forces, after a check of all faces."""
         return LaunchSequence([self._cells(1), *self._seams, self._gather(1)])
 
     @cached_property
-    def _gather_on(self) -> Launch:
+    def _gather_guarded(self) -> Launch:
         return self._gather(0)
 
     @cached_property
-    def evaluate_on(self) -> LaunchSequence:
-        return LaunchSequence([self._cells(0), *self._seams, self._gather_on])
+    def evaluate_guarded(self) -> LaunchSequence:
+        """The forces, with the guard only where it acted at the last check."""
+        return LaunchSequence([self._cells(0), *self._seams, self._gather_guarded])
 
     @cached_property
     def evaluate_unguarded(self) -> LaunchSequence:
-        return LaunchSequence([*self._seams, self._gather_on])
+        """The forces where the guard acted nowhere at the last check."""
+        return LaunchSequence([*self._seams, self._gather_guarded])
 
     @cached_property
     def advance(self) -> Launch:
+        """Velocities and positions after the step, from the evaluated forces."""
         net = self.network
         return record(
             advance,
@@ -206,19 +215,19 @@ class StepBuffers:
                 self.anchor,
                 self.reach,
                 self.time_step,
-                self.pace,
+                self.coefficients,
             ],
             outputs=[self.position, self.velocity],
             device=net.device,
         )
 
     @cached_property
-    def along_lines(self) -> LaunchSequence | None:
-        """None of a network without lines."""
+    def line_step(self) -> LaunchSequence | None:
+        """A line relaxation step from the forces; overwrites `first_guess` and `driving_force`. None without lines."""
         net = self.network
         if net.lines is None:
             return None
-        ways = [self.first_guess, self.driving_force]
+        displacements = [self.first_guess, self.driving_force]
         solve = record(
             solve_lines,
             dim=len(net.lines.offset) - 1,
@@ -234,18 +243,18 @@ class StepBuffers:
                 net.lines,
                 self.time_step,
             ],
-            outputs=ways,
+            outputs=displacements,
             device=net.device,
             least=_LEAST_LINES,
         )
-        go = record(
+        move = record(
             go_along_lines,
             dim=net.vertex_count,
-            inputs=[*ways, self.reach, net.bonds.freedom],
+            inputs=[*displacements, self.reach, net.bonds.freedom],
             outputs=[self.position],
             device=net.device,
         )
-        return LaunchSequence([solve, go])
+        return LaunchSequence([solve, move])
 
     @cached_property
     def _pieces(self) -> list[slice]:
@@ -254,30 +263,32 @@ class StepBuffers:
 
     @cached_property
     def stop(self) -> list[Launch]:
-        """Of each piece."""
+        """For each piece, velocities set to zero."""
         return [
             record(
                 stop,
-                dim=here.stop - here.start,
-                inputs=[self.network.mass[here], self.force[here], self.stiffness[here], self.time_step],
-                outputs=[self.velocity[here], self.driving_force[here], self.first_guess[here]],
+                dim=own.stop - own.start,
+                inputs=[self.network.mass[own], self.force[own], self.stiffness[own], self.time_step],
+                outputs=[self.velocity[own], self.driving_force[own], self.first_guess[own]],
                 device=self.network.device,
             )
-            for here in self._pieces
+            for own in self._pieces
         ]
 
     @cached_property
-    def measure_pull(self) -> Launch:
+    def measure_tension(self) -> Launch:
+        """The tensions of the springs, into `vertex_tension`."""
         return record(
             compute_spring_pull,
             dim=self.network.vertex_count,
             inputs=[self.position, self.network.springs],
-            outputs=[self.vertex_pull],
+            outputs=[self.vertex_tension],
             device=self.network.device,
         )
 
     @cached_property
-    def measure(self) -> LaunchSequence:
+    def measure_potential(self) -> LaunchSequence:
+        """The energies of springs and cells, into `vertex_energy` and `face_energy`."""
         net = self.network
         springs = record(
             compute_spring_energy,
@@ -298,6 +309,7 @@ class StepBuffers:
 
     @cached_property
     def measure_motion(self) -> Launch:
+        """The kinetic energies, into `vertex_energy`."""
         return record(
             compute_kinetic_energy,
             dim=self.network.vertex_count,

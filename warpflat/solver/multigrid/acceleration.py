@@ -1,105 +1,112 @@
-"""What the last few cycles of a relaxation say of where its energy is least."""
+"""Acceleration of a cycle: minimisation of the energy over the subspace of the corrections of the last few cycles."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from warpflat.solver.convergence import Mark, Vectors
+from warpflat.solver.convergence import Iterate, Vectors
 from warpflat.solver.multigrid.direction_space import DirectionSpace, make_direction_space
 
 __all__ = ["SubspaceAcceleration"]
 
 
-# Of so many cycles it is remembered where they have led, leaps and all.
+# Past cycles whose corrections, accelerated steps included, are directions of the subspace.
 _DEPTH = 2
-# Least curvature, over what its parts would have apart, of a direction that cycles leave to be followed.
-_SOUND = 1e-3
-
-
-"""#V by 2, a layout [m], and the forces there [N], where they are."""
+# Least curvature of a direction of the subspace, over that of its parts on their own; others are left out.
+_LEAST_CURVATURE = 1e-3
 
 
 class SubspaceAcceleration:
-    """The last few cycles: where they led, and how much the forces fell along each way on each other. In the plane of these ways the energy
-    is known, to second order, and least somewhere (locally optimal conjugate gradients; Knyazev 2001).
+    """Minimisation over the corrections of the present cycle and of those before.
 
-    Of a layout that is crushed to a point the forces are beyond all numbers, and so is what is worked out of them; `lowest` sees it.
+    The forces at the iterates tell the curvature of the energy in the space of the corrections between them. There the
+    energy is known to second order, and so is its minimum (locally optimal conjugate gradients; Knyazev 2001). This
+    accelerates what converges by the same factor in each cycle, such as a strip beside a crack whose stiffness against
+    bending the coarse level gets wrong.
 
-    A strip beside a crack, say, bent by a coarse level as if it were stiffer or softer than it is, nears its place by the same
-    share with each cycle.
+    A layout that is crushed to a point may have forces that overflow; `minimise_in_subspace` then reports no minimum.
 
     Attributes:
-        past: how many cycles before the present one are remembered.
+        past: number of past cycles in the subspace.
     """
 
     def __init__(self, depth: int = _DEPTH) -> None:
-        """Of so many cycles, besides the present one."""
+        """Keep the corrections of `depth` cycles besides the present one."""
         self._depth = depth
-        self._last: Mark | None = None
+        self._last: Iterate | None = None
         self._algebra: DirectionSpace
-        # Ways of cycles before, each as one, and then those of the present cycle's parts; of all of them the curvature, the fall of the
-        # forces on one of them along another [N m].
-        self._ways: list[Vectors] = []
-        self.past = 0
+        # The correction of each past cycle, then those of the present cycle's parts; and the curvature of the energy
+        # along each pair: minus the change of the forces along one, times the other [N m].
+        self._directions: list[Vectors] = []
         self._curvature = np.zeros((0, 0))
+        self.past = 0
 
     @np.errstate(over="ignore", invalid="ignore")
-    def begin(self, mark: Mark) -> None:
-        """A cycle begins here; the one before counts to here: its leap is part of it, and holds what cycles before it have told. The mark
-        is copied."""
-        if len(self._ways) > self.past:
-            self.come_to(mark)
-            self._join()
-            del self._ways[: -self._depth]
-            self.past = len(self._ways)
+    def begin_cycle(self, iterate: Iterate) -> None:
+        """Begin a cycle at an iterate, which is copied.
+
+        All corrections since the last beginning, accelerated step included, become one direction.
+        """
+        if len(self._directions) > self.past:
+            self.add_iterate(iterate)
+            self._merge_present_cycle()
+            del self._directions[: -self._depth]
+            self.past = len(self._directions)
             self._curvature = self._curvature[-self.past :, -self.past :]
-        self._keep(mark)
+        self._set_last(iterate)
 
     @np.errstate(over="ignore", invalid="ignore")
-    def come_to(self, mark: Mark) -> None:
-        """A part of the cycle has led here: each is a way of its own. The mark is copied."""
+    def add_iterate(self, iterate: Iterate) -> None:
+        """Add the correction from the last iterate to this one as a direction; the iterate is copied."""
         assert self._last is not None
-        fall = self._algebra.difference(self._last[1], mark[1])
-        self._ways.append(self._algebra.difference(mark[0], self._last[0]))
-        # How the forces fell on earlier ways along this one is the same as long as they fall in proportion.
-        along, count = self._algebra.products(self._ways, fall), len(self._ways)
+        force_drop = self._algebra.difference(self._last[1], iterate[1])
+        self._directions.append(self._algebra.difference(iterate[0], self._last[0]))
+        # The curvature is symmetric as far as the forces are linear.
+        row, count = self._algebra.products(self._directions, force_drop), len(self._directions)
         curvature = np.empty((count, count))
         curvature[:-1, :-1] = self._curvature
-        curvature[-1], curvature[:, -1] = along, along
+        curvature[-1], curvature[:, -1] = row, row
         self._curvature = curvature
-        self._keep(mark)
-
-    def _join(self) -> None:
-        """Make the parts of the present cycle one."""
-        parts = len(self._ways) - self.past
-        for way in self._ways[self.past + 1 :]:
-            self._algebra.join(self._ways[self.past], way)
-        del self._ways[self.past + 1 :]
-        joined = np.zeros((self.past + 1, self.past + parts))
-        joined[:-1, : self.past] = np.eye(self.past)
-        joined[-1, self.past :] = 1.0
-        self._curvature = joined @ self._curvature @ joined.T
-
-    def _keep(self, mark: Mark) -> None:
-        """In the room of the last one."""
-        if self._last is None:
-            self._algebra = make_direction_space(mark[0])
-        layout, forces = self._last or (None, None)
-        self._last = self._algebra.keep(mark[0], layout), self._algebra.keep(mark[1], forces)
+        self._set_last(iterate)
 
     @np.errstate(over="ignore", invalid="ignore")
-    def lowest(self, room: Vectors) -> bool:
-        """Put the way from where the cycle has come to where the energy is least there, #V by 2 [m]; whether that can be told."""
+    def minimise_in_subspace(self, out: Vectors) -> bool:
+        """Compute the step from the last iterate to the minimum in the subspace.
+
+        Args:
+            out: #V by 2, gets the step [m].
+
+        Returns:
+            Whether there is a minimum.
+        """
         assert self._last is not None
-        moved = [number for number, way in enumerate(self._ways) if self._algebra.moves(way)]
-        ways, curvature = [self._ways[number] for number in moved], self._curvature[np.ix_(moved, moved)]
-        size = np.sqrt(np.abs(np.diag(curvature)))
-        if not len(size) or not (size > 0.0).all() or not np.isfinite(curvature).all():
+        moving = [k for k, direction in enumerate(self._directions) if self._algebra.is_nonzero(direction)]
+        directions, curvature = [self._directions[k] for k in moving], self._curvature[np.ix_(moving, moving)]
+        scale = np.sqrt(np.abs(np.diag(curvature)))
+        if not len(scale) or not (scale > 0.0).all() or not np.isfinite(curvature).all():
             return False
-        gain = self._algebra.products(ways, self._last[1])
-        values, axes = np.linalg.eigh(curvature / np.outer(size, size))
-        sound = values > _SOUND
-        share = axes[:, sound] @ ((axes[:, sound].T @ (gain / size)) / values[sound]) / size
-        self._algebra.put(share, ways, room)
-        self._join()
+        slope = self._algebra.products(directions, self._last[1])
+        values, axes = np.linalg.eigh(curvature / np.outer(scale, scale))
+        curved = values > _LEAST_CURVATURE
+        weights = axes[:, curved] @ ((axes[:, curved].T @ (slope / scale)) / values[curved]) / scale
+        self._algebra.combine(weights, directions, out)
+        self._merge_present_cycle()
         return True
+
+    def _merge_present_cycle(self) -> None:
+        """Merge the directions of the present cycle's parts into one."""
+        parts = len(self._directions) - self.past
+        for direction in self._directions[self.past + 1 :]:
+            self._algebra.add_to(self._directions[self.past], direction)
+        del self._directions[self.past + 1 :]
+        merge = np.zeros((self.past + 1, self.past + parts))
+        merge[:-1, : self.past] = np.eye(self.past)
+        merge[-1, self.past :] = 1.0
+        self._curvature = merge @ self._curvature @ merge.T
+
+    def _set_last(self, iterate: Iterate) -> None:
+        """Copy an iterate into the memory of the last one."""
+        if self._last is None:
+            self._algebra = make_direction_space(iterate[0])
+        layout, forces = self._last or (None, None)
+        self._last = self._algebra.copy(iterate[0], layout), self._algebra.copy(iterate[1], forces)

@@ -1,62 +1,72 @@
-"""Large lattices start where a small one of theirs has come to rest: it is carried up to them at once, by cubics."""
+"""The cascadic start of large lattices: a small lattice is relaxed, and its layout interpolated by cubics at once."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.model.join import join_networks
 from warpflat.solver.grain_alignment import align_grain
-from warpflat.solver.multigrid.cycle import ENERGY_WORK, Levels
-from warpflat.solver.multigrid.hierarchy import device_levels
-from warpflat.solver.relax import Relaxation
+from warpflat.solver.multigrid.hierarchy import CascadeStart, make_cascade_start
+from warpflat.solver.multigrid.levels import ENERGY_WORK, Levels
+from warpflat.solver.multigrid.nested_iteration import relax_cascade_start
+from warpflat.solver.relaxation import Relaxation
 
-__all__ = ["cascade_up"]
-
-
-# Lattices of more vertices start where a small one has come to rest, of at most so many: cubics from this size on leave a few hundredths
-# of a per cent.
-_CYCLED = 5_000
+__all__ = ["start_from_cascade"]
 
 
-def cascade_up(state: Relaxation) -> Levels | None:
-    """Start pieces that are large lattices where a small one of theirs has come to rest; the others where their own levels lead.
+# Lattices of more vertices start from a relaxed small one of at most that many: from this size on cubic interpolation
+# leaves a few hundredths of a per cent of the energy.
+_LARGE = 5_000
 
-    Nothing is made or evaluated of the levels in between. The state is looked at in the end.
+
+def start_from_cascade(state: Relaxation) -> Levels | None:
+    """Start pieces that are large lattices from a relaxed small one, and the others where their own levels lead.
+
+    No level in between is made or evaluated. Convergence is checked at the end.
 
     Returns:
-        The levels of what was relaxed; None where no piece is such a lattice, or one would not be lower than it lies: then
-        all are where they were.
+        The levels of what was relaxed. None if no piece is such a lattice, or if any piece's energy would not be lower;
+        then all stay where they were.
     """
     pieces, layout = state.network.pieces, state.positions()
-    below = [
-        device_levels(net, layout[own], _CYCLED) if net.vertex_count > _CYCLED else None
-        for net, own in zip(pieces, state.vertices, strict=True)
+    starts = [
+        make_cascade_start(net, layout[own], _LARGE) if net.vertex_count > _LARGE else None
+        for net, own in zip(pieces, state.vertex_ranges, strict=True)
     ]
-    if not any(below):
+    if not any(starts):
         return None
-    before = state.last
-    networks = [net if way is None else way.network for net, way in zip(pieces, below, strict=True)]
-    start = [layout[own] if way is None else way.layout for own, way in zip(state.vertices, below, strict=True)]
-    coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(start))
-    levels = Levels(coarse, mend=True)
-    levels.start()
+    status_before = state.status
+    networks = [net if start is None else start.network for net, start in zip(pieces, starts, strict=True)]
+    layouts = [
+        layout[own] if start is None else start.layout for own, start in zip(state.vertex_ranges, starts, strict=True)
+    ]
+    coarse = Relaxation(join_networks(networks), state.options, start=np.concatenate(layouts))
+    levels = Levels(coarse, repair=True)
+    relax_cascade_start(levels)
     state.work_units += coarse.work_units * coarse.network.vertex_count / state.network.vertex_count
-    carried, relaxed = list[FloatArray](), coarse.positions()
-    for of, way in zip(coarse.vertices, below, strict=True):
-        up = relaxed[of]
-        if way is not None:
-            if way.rung is not None:
-                levels.leading[way.rung.step.surface] = way.rung
-            for carry in way.carries:
-                up = carry(up)
-        carried.append(up)
-    there = carried[0] if len(carried) == 1 else np.concatenate(carried)
-    align_grain(state.upright, there)
-    state.position.assign(there)
+    for start in starts:
+        if start is not None and start.coarse_level is not None:
+            levels.cascade_levels[start.coarse_level.coarsening.surface] = start.coarse_level
+    interpolated = _interpolate(coarse, starts)
+    align_grain(state.alignments, interpolated)
+    state.position.assign(interpolated)
     state.work_units += ENERGY_WORK
-    if (state.begin().potential < before.potential).all():
+    if (state.check_start().potential < status_before.potential).all():
         return levels
     state.position.assign(layout)
-    state.last = before
+    state.status = status_before
     return None
+
+
+def _interpolate(coarse: Relaxation, starts: Sequence[CascadeStart | None]) -> FloatArray:
+    """Return the layout of all pieces, #V by 2 [m], from the relaxed small lattices."""
+    layouts, relaxed = list[FloatArray](), coarse.positions()
+    for own, start in zip(coarse.vertex_ranges, starts, strict=True):
+        fine = relaxed[own]
+        for interpolate in () if start is None else start.interpolations:
+            fine = interpolate(fine)
+        layouts.append(fine)
+    return layouts[0] if len(layouts) == 1 else np.concatenate(layouts)

@@ -1,13 +1,15 @@
-"""One coarser level of a piece: a quarter of its vertices, faces between them, and how layouts go between the two.
+"""Coarsening of a mesh: a quarter of its vertices, faces between them, and the transfer between the two meshes.
 
-The vertices of the coarser level are vertices of the finer one. A rectangular grid of quads keeps every second row and column, quads on
-any other lattice, with concave corners, holes or cracks, all those too in which the border turns. Any other mesh loses vertices by edges
-that collapse, an independent set of them at a time, until about a quarter is left: a vertex vanishes into the neighbour that leaves
-the best triangles, on the border only along the border. So corners, holes and cracks stay what they are: two sides of a crack have
-different vertices, and nothing joins them.
+The vertices of the coarser mesh are vertices of the finer one. A rectangular grid of quads keeps every second row and
+column; quads on any other lattice, with concave corners, holes or cracks, also keep all rows and columns in which the
+border turns. Any other mesh loses
+vertices by edge collapses, an independent set of them in each pass, until about a quarter is left: a vertex collapses
+    into the neighbour that leaves the best triangles, and a border vertex only along the border. So corners, holes and
+    cracks remain: the two sides of a crack have different vertices, and nothing joins them.
 
-In a pass one vertex goes after the other, while the rings of neighbours that stay are kept up to date; only those beside which none has
-gone yet look for the neighbour that is best. The triangles are made at the end, of those that have three different corners left.
+In a pass vertices collapse one after the other, and the rings of the neighbours that stay are kept up to date. A vertex
+looks for its best neighbour only if no neighbour of it has collapsed in the pass. At the end the triangles with three
+different corners left are the faces.
 """
 
 from __future__ import annotations
@@ -36,9 +38,9 @@ from warpflat.solver.multigrid.grid_coarsening import (
     ResamplingKind,
     Transfer,
     can_be_coarsened,
+    coarsen_by_three,
     coarsened_grid,
     resampled_grid,
-    thirds_of,
 )
 from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.grid import rows_and_columns
@@ -47,117 +49,120 @@ from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.triangles import triangulate
 
 __all__ = [
-    "Coarser",
-    "coarser",
-    "coarser_surfaces",
-    "has_coarser",
+    "Coarsening",
+    "can_coarsen",
+    "coarsen",
+    "coarsenings_of",
     "hierarchy_in_background",
     "inherit_levels",
     "is_coarsest",
+    "iterate_coarsenings",
     "resampled_surface",
-    "steps_down",
 ]
 
 
-# A level of at most so many vertices is the coarsest; grids go further down than other meshes, of which too few faces make a poor
-# piece.
+# A mesh of at most this many vertices is the coarsest. Grids go further down than other meshes, whose few faces would
+# make a poor piece.
 _COARSEST = 250
 _COARSEST_GRID = 100
-# Passes of collapses to one level, the share of vertices from which on there are no more, and the least share that a level must lose to be
-# worth having.
+# Passes of collapses to one level; the share of vertices left at which they end; the least share that a level must lose
+# to be worth having.
 _PASSES = 10
-_ENOUGH = 0.27
-_LEAST_GAIN = 0.3
-# A pass takes first the vertices that leave triangles of this quality (1: equilateral), then the others down to the least; where
-# that does not make them fewer, worse ones.
+_SHARE_LEFT = 0.27
+_LEAST_LOSS = 0.3
+# A pass first collapses the vertices that leave triangles of this quality (1: equilateral), then others down to the
+# least quality; if too few collapse, the lower least quality applies.
 _GOOD = 0.6
 _LEAST_QUALITIES = (0.3, 0.15)
-# Levels of a surface of more vertices are worth a thread of their own.
+# Surfaces of more vertices are worth a thread of their own for their levels.
 _WORTH_A_THREAD = 5_000
-# Entries that a ring may have, unless it has more from the start; that of a vertex inside has six or so.
-_ROOM = 16
-# Entries for which a row of the prolongation has room at first; it has four or so.
+# Capacity of a ring, unless it has more entries from the start; the ring of an inner vertex has about six.
+_RING_CAPACITY = 16
+# Initial capacity of a row of the prolongation; it has about four entries.
 _ENTRIES = 8
 
 
 @dataclass(frozen=True, kw_only=True)
-class Coarser:
-    """A coarser level.
+class Coarsening:
+    """The step from a mesh to the next coarser one.
 
     Attributes:
-        surface: of the level; its vertices are the finer level's, without lines.
-        kept: #C, the finer level's vertices that it has.
-        transfer: weights by which layouts go up, and forces down.
-        face_of: #G, for each of its faces one of the finer level's that lies in or beside it.
-        smooth_carry: of quads on a lattice, what carries layouts up by cubics.
-        is_lowest: whether it is relaxed without a coarser one.
+        surface: the coarser mesh; its vertices are the finer one's, and it has no lines.
+        kept: #C, the finer mesh's vertices that it keeps.
+        transfer: weights that interpolate layouts on the finer mesh, and whose transpose restricts forces.
+        face_of: #G, for each of its faces one of the finer ones in or beside it.
+        smooth_interpolation: cubic interpolation of layouts on the finer mesh, for quads on a lattice.
+        is_coarsest: whether it is relaxed without a coarser one.
     """
 
     surface: Surface
     kept: IntArray
     transfer: Transfer
     face_of: IntArray
-    smooth_carry: GridProlongation | LatticeProlongation | None = None
-    is_lowest: bool = False
+    smooth_interpolation: GridProlongation | LatticeProlongation | None = None
+    is_coarsest: bool = False
 
     @property
     def prolongation(self) -> csr_array:
-        """#V by #C, rows add up to 1."""
+        """The weights of linear interpolation, #V by #C; rows add up to 1."""
         return self.transfer.prolongation
 
 
 def is_coarsest(surface: Surface) -> bool:
-    """Whether a level is small enough to have no coarser one."""
+    """Return whether a mesh is small enough to have no coarser one."""
     return len(surface.vertices) <= (_COARSEST_GRID if surface.is_quad.all() else _COARSEST)
 
 
-def coarser(surface: Surface, layout: FloatArray | None = None) -> Coarser | None:
-    """The next coarser level, or None where none is to be had.
+def coarsen(surface: Surface, layout: FloatArray | None = None) -> Coarsening | None:
+    """Make the next coarser mesh.
 
     Args:
-        surface: the finer one, of any size.
-        layout: #V by 2, of it, without mirrored faces [m]; triangles that collapses leave are not mirrored in it either. Without,
-            they are good on the body only.
+        surface: the finer mesh, of any size.
+        layout: #V by 2, a layout of it without mirrored faces [m]. Given, edge collapses mirror no triangle in it;
+            otherwise triangles are checked on the body only.
+
+    Returns:
+        None where no coarser mesh is worth having.
     """
-    thinned = coarsened_grid(surface)
-    if thinned is not None:
-        return _step_to(surface, thinned)
-    return None if rows_and_columns(surface) is not None else _collapsed(surface, layout)
+    grid = coarsened_grid(surface)
+    if grid is not None:
+        return _coarsen_quads(surface, grid)
+    return None if rows_and_columns(surface) is not None else _collapse_edges(surface, layout)
 
 
-def _step_to(surface: Surface, thinned: CoarsenedGrid) -> Coarser:
-    return Coarser(
-        surface=_part_of_quads(surface, surface.vertices[thinned.kept], thinned.faces, thinned.of_faces),
-        kept=thinned.kept,
-        transfer=thinned.transfer,
-        face_of=thinned.face_of,
-        smooth_carry=thinned.carry(surface),
+def _coarsen_quads(surface: Surface, grid: CoarsenedGrid) -> Coarsening:
+    return Coarsening(
+        surface=_coarse_quads(surface, surface.vertices[grid.kept], grid.faces, grid.of_faces),
+        kept=grid.kept,
+        transfer=grid.transfer,
+        face_of=grid.face_of,
+        smooth_interpolation=grid.make_interpolation(surface),
     )
 
 
-_inherited: WeakKeyDictionary[Surface, Coarser] = WeakKeyDictionary()
+_inherited: WeakKeyDictionary[Surface, Coarsening] = WeakKeyDictionary()
 
 
 @once_per_surface
-def _next(surface: Surface) -> Coarser | None:
-    return _inherited.pop(surface, None) or coarser(surface)
+def _next(surface: Surface) -> Coarsening | None:
+    return _inherited.pop(surface, None) or coarsen(surface)
 
 
 def inherit_levels(surface: Surface, other: Surface) -> None:
-    """Let a surface have the coarser levels of another one of the same faces, whose vertices do not lie far from its own."""
-    for step in coarser_surfaces(other):
-        if step.smooth_carry is None:
-            part = _part(surface, surface.vertices[step.kept], step.surface.faces, step.surface.of_faces)
+    """Give a surface the coarser levels of another one with the same faces, and with vertices not far from its own."""
+    for step in coarsenings_of(other):
+        if step.smooth_interpolation is None:
+            part = _coarse_surface(surface, surface.vertices[step.kept], step.surface.faces, step.surface.of_faces)
             _inherited[surface] = replace(step, surface=part)
-        # Lattices share what their faces tell anyway.
+        # Lattices share what follows from their faces anyway.
         following = _next(surface)
         if following is None:
             return
         surface = following.surface
 
 
-def has_coarser(surface: Surface) -> bool:
-    """Whether a surface has a coarser level; of a grid none is made to tell, since one that is large starts without them."""
+def can_coarsen(surface: Surface) -> bool:
+    """Return whether a surface has a coarser level. For a grid none is made, since a large grid starts without them."""
     if is_coarsest(surface):
         return False
     grid = rows_and_columns(surface)
@@ -165,13 +170,13 @@ def has_coarser(surface: Surface) -> bool:
 
 
 @once_per_surface
-def coarser_surfaces(surface: Surface) -> tuple[Coarser, ...]:
-    """All coarser levels of a surface, good on the body, the finest first, down to the coarsest; made once for each surface."""
-    return tuple(steps_down(surface))
+def coarsenings_of(surface: Surface) -> tuple[Coarsening, ...]:
+    """Return all coarser meshes of a surface, the finest first, checked on the body; made once for each surface."""
+    return tuple(iterate_coarsenings(surface))
 
 
-def steps_down(surface: Surface) -> Iterator[Coarser]:
-    """The same, each made when it is asked for."""
+def iterate_coarsenings(surface: Surface) -> Iterator[Coarsening]:
+    """Iterate over the coarser meshes of a surface, the finest first; each is made when it is reached."""
     while not is_coarsest(surface):
         step = _next(surface)
         if step is None:
@@ -181,68 +186,70 @@ def steps_down(surface: Surface) -> Iterator[Coarser]:
 
 
 def resampled_surface(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
-    """Return a small grid that is spread over a large one, made once for each surface; None of a surface that is no grid.
+    """Return a small grid that samples a large one, made once for each surface; None for a surface that is no grid.
 
     Returns:
-        the grid (see `warpflat.solver.multigrid.grid_coarsening.resampled_grid`), the interpolation of its layouts on the large one,
-        and #G, for each of its faces one of the large grid's that lies in it.
+        The small grid (see `warpflat.solver.multigrid.grid_coarsening.resampled_grid`), the interpolation of its
+        layouts on the large one, and #G, for each of its faces one of the large grid's in it.
     """
-    known = _spreads(surface)
+    known = _resampled_surfaces(surface)
     if kind not in known:
-        known[kind] = _spread(surface, kind)
+        known[kind] = _resample(surface, kind)
     return known[kind]
 
 
 @once_per_surface
-def _spreads(surface: Surface) -> dict[ResamplingKind, tuple[Surface, GridProlongation, IntArray] | None]:
+def _resampled_surfaces(surface: Surface) -> dict[ResamplingKind, tuple[Surface, GridProlongation, IntArray] | None]:
     return {}
 
 
-def _spread(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
-    spread = resampled_grid(surface, kind)
-    if spread is None:
+def _resample(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlongation, IntArray] | None:
+    grid = resampled_grid(surface, kind)
+    if grid is None:
         return None
-    carry = spread.carry(surface)
-    part = _part_of_quads(surface, carry.sample(surface.vertices), spread.faces, spread.of_faces)
-    thirds = thirds_of(part) if kind == "thirds" else None
-    if thirds is not None:
-        _inherited[part] = replace(_step_to(part, thirds), is_lowest=True)
-    return part, carry, spread.face_of
+    interpolation = grid.make_interpolation(surface)
+    small = _coarse_quads(surface, interpolation.sample(surface.vertices), grid.faces, grid.of_faces)
+    every_third = coarsen_by_three(small) if kind == "thirds" else None
+    if every_third is not None:
+        _inherited[small] = replace(_coarsen_quads(small, every_third), is_coarsest=True)
+    return small, interpolation, grid.face_of
 
 
 @contextmanager
 def hierarchy_in_background(surface: Surface) -> Iterator[None]:
-    """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
-    be done with all at its end. Those of a grid, which starts from one spread over it, are not needed so soon, nor take long."""
+    """Make the coarser meshes of a large surface in another thread; they are ready at the end of the `with` block.
+
+    For triangle meshes this includes all that depends on no layout. Those of a grid, which starts from a resampled
+    grid, are not needed so soon, and do not take long.
+    """
     if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_by_row(surface) is not None:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
-        made = other.submit(_prepare_levels, surface)
+        prepared = other.submit(_prepare_levels, surface)
         yield
-        made.result()
+        prepared.result()
 
 
 def _prepare_levels(surface: Surface) -> None:
-    for step in coarser_surfaces(surface):
-        if step.smooth_carry is None:
+    for step in coarsenings_of(surface):
+        if step.smooth_interpolation is None:
             cells_of(step.surface)
             unweighed_springs(step.surface)
             _ = step.transfer.transpose
 
 
-def _part_of_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
-    """A coarser level of quads. Creases are not looked for there: a level is only to lead to where the finer one is at rest, and as to that
-    there is no difference."""
-    part = _part(surface, vertices, faces, of_faces)
+def _coarse_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
+    """Return a coarser mesh of quads, without creases: these make no difference to a correction of the finer level."""
+    part = _coarse_surface(surface, vertices, faces, of_faces)
     tell(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
     return part
 
 
-def _part(
+def _coarse_surface(
     surface: Surface, vertices: FloatArray, faces: NDArray[np.integer], of_faces: dict[str, Any] | None = None
 ) -> Surface:
-    """The surface with these vertices (#C by 3 [m]) and faces, and what is known of the faces."""
+    """Return a surface of these vertices (#C by 3 [m]) and faces, with what is known of the faces."""
     return Surface(
         vertices=vertices,
         faces=faces.astype(np.int32, copy=False),
@@ -256,12 +263,12 @@ def _part(
 # --- any other mesh
 
 
-def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
+def _collapse_edges(surface: Surface, layout: FloatArray | None) -> Coarsening | None:
     count = len(surface.vertices)
     triangles, face = surface.faces[:, :3], np.arange(len(surface.faces), dtype=np.int32)
     if surface.is_quad.any():
         triangles, face = triangulate(surface.faces)
-    ring = _ring_of(surface.vertices, layout, triangles)
+    ring = _make_ring(surface.vertices, layout, triangles)
     if ring.degree.numpy().min() < 0:
         return None
     target, beside, gone = (wp.zeros(count, dtype=wp.int32, device="cpu") for _ in range(3))
@@ -270,30 +277,35 @@ def _collapsed(surface: Surface, layout: FloatArray | None) -> Coarser | None:
         wp.launch(
             collapse,
             dim=1,
-            inputs=[ring, least, _GOOD, int(_ENOUGH * count), _PASSES],
+            inputs=[ring, least, _GOOD, int(_SHARE_LEFT * count), _PASSES],
             outputs=[passes, remain, target, beside, gone],
             device="cpu",
         )
-    if remain[0] > (1.0 - _LEAST_GAIN) * count:
+    if remain[0] > (1.0 - _LEAST_LOSS) * count:
         return None
     parent = wp.empty(count, dtype=wp.vec3i, device="cpu")
     weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
     record(place, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
     kept = np.flatnonzero(gone.numpy() == 0).astype(np.int32)
-    corners = _ends(gone.numpy(), parent.numpy()[:, 0])[triangles]
+    corners = _final_vertices(gone.numpy(), parent.numpy()[:, 0])[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])
     corners = corners[whole]
     prolongation = _prolongation(gone, parent, weight, int(passes[0]))
-    return Coarser(
-        surface=_part(surface, surface.vertices[kept], np.column_stack([corners, np.full(len(corners), -1)])),
+    return Coarsening(
+        surface=_coarse_surface(surface, surface.vertices[kept], np.column_stack([corners, np.full(len(corners), -1)])),
         kept=kept,
         transfer=Transfer(lambda: prolongation),
         face_of=face[whole],
     )
 
 
-def _ends(gone: IntArray, into: IntArray) -> IntArray:
-    """#V, the number among those kept of where each has vanished in the end. into: #V, where at first, in pass `gone`."""
+def _final_vertices(gone: IntArray, into: IntArray) -> IntArray:
+    """Return the kept vertex into which each vertex has finally collapsed, #V, by its number among those kept.
+
+    Args:
+        gone: #V, the pass in which a vertex collapsed; 0 if it is kept.
+        into: #V, the vertex into which it collapsed then.
+    """
     end = np.where(gone == 0, np.arange(len(gone), dtype=np.int32), into)
     for _ in range(int(gone.max()).bit_length()):
         end = end[end]
@@ -301,30 +313,30 @@ def _ends(gone: IntArray, into: IntArray) -> IntArray:
 
 
 def _prolongation(gone: wp.array, parent: wp.array, weight: wp.array, passes: int) -> csr_array:
-    """#V by #C: the row of a vertex that is gone is the sum of its parents' rows by its weights."""
-    count, room = len(gone), _ENTRIES * len(gone)
+    """Return the weights of interpolation, #V by #C: a collapsed vertex has the weighted sum of its parents' rows."""
+    count, capacity = len(gone), _ENTRIES * len(gone)
     row, offset = np.empty(count, dtype=np.int32), np.zeros(count + 1, dtype=np.int32)
     while offset[-1] == 0:
-        column, value = np.empty(room, dtype=np.int32), np.empty(room)
+        column, value = np.empty(capacity, dtype=np.int32), np.empty(capacity)
         given, made = [gone, parent, weight, passes], [row, offset, column, value]
         wp.launch(compose_rows, dim=1, inputs=given, outputs=made, device="cpu")
-        room *= 2
+        capacity *= 2
     kept, end = count - np.count_nonzero(gone.numpy()), offset[-1]
     return csr_array(csr_array((value[:end], column[:end], offset), shape=(count, kept))[row])
 
 
-def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArray) -> Ring:
+def _make_ring(vertices: FloatArray, layout: FloatArray | None, triangles: IntArray) -> Ring:
     count = len(vertices)
     ring = Ring()
-    ring.vertices = _given(vertices, wp.vec3d)
-    ring.layout = _given(np.zeros((0, 2)) if layout is None else layout, wp.vec2d)
+    ring.vertices = _as_input(vertices, wp.vec3d)
+    ring.layout = _as_input(np.zeros((0, 2)) if layout is None else layout, wp.vec2d)
     around = np.bincount(triangles.ravel(), minlength=count)
-    room, sides = (range_offsets(places) for places in (np.maximum(around + 2, _ROOM), around))
-    ring.offset = _given(room, wp.int32)
+    slots, sides = (range_offsets(places) for places in (np.maximum(around + 2, _RING_CAPACITY), around))
+    ring.offset = _as_input(slots, wp.int32)
     ring.degree = wp.zeros(count, dtype=wp.int32, device="cpu")
-    ring.neighbor = wp.empty(int(room[-1]), dtype=wp.int32, device="cpu")
+    ring.neighbor = wp.empty(int(slots[-1]), dtype=wp.int32, device="cpu")
     side = wp.empty(int(sides[-1]), dtype=wp.vec2i, device="cpu")
-    begin, corners = _given(sides, wp.int32), _given(triangles, wp.vec3i)
+    begin, corners = _as_input(sides, wp.int32), _as_input(triangles, wp.vec3i)
     wp.launch(sort_corners, dim=1, inputs=[corners, begin], outputs=[ring.degree, side], device="cpu")
     order = record(
         order_rings, dim=count, inputs=[ring.offset, begin, side], outputs=[ring.degree, ring.neighbor], device="cpu"
@@ -333,6 +345,6 @@ def _ring_of(vertices: FloatArray, layout: FloatArray | None, triangles: IntArra
     return ring
 
 
-def _given(values: NDArray[np.generic], dtype: type) -> wp.array:
-    """The values for a kernel that does not write to them."""
+def _as_input(values: NDArray[np.generic], dtype: type) -> wp.array:
+    """Return the values as an array for a kernel that only reads them."""
     return wp.array(np.ascontiguousarray(values), dtype=dtype, device="cpu", copy=False)

@@ -1,4 +1,4 @@
-"""Search directions and their forces, kept for `warpflat.solver.multigrid.acceleration`: on the host, or on a CUDA device."""
+"""Linear algebra of search directions for `warpflat.solver.multigrid.acceleration`, on the host or on a CUDA device."""
 
 from __future__ import annotations
 
@@ -16,89 +16,87 @@ from warpflat.solver.convergence import Vectors
 
 __all__ = ["DeviceDirectionSpace", "DirectionSpace", "HostDirectionSpace", "make_direction_space"]
 
-"""#V by 2, of NumPy or on a device."""
-
 
 class DirectionSpace(Protocol):
-    """What is done with vectors that are all of one kind."""
+    """Operations on vectors (#V by 2) that all lie on the host, or all on one device."""
 
-    def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
-        """A copy, in this room if there is any."""
+    def copy(self, values: Vectors, out: Vectors | None) -> Vectors:
+        """Return a copy, written to `out` if given."""
 
     def difference(self, a: Vectors, b: Vectors) -> Vectors:
-        """a - b, to be used as a way or as what is measured along one."""
+        """Return a - b as a new vector."""
 
-    def join(self, way: Vectors, other: Vectors) -> None:
-        """Let a way go on by another."""
+    def add_to(self, direction: Vectors, other: Vectors) -> None:
+        """Add another direction to a direction in place."""
 
-    def moves(self, way: Vectors) -> bool:
-        """Whether it leads anywhere."""
+    def is_nonzero(self, direction: Vectors) -> bool:
+        """Return whether a direction has an entry other than zero."""
 
-    def products(self, ways: Sequence[Vectors], by: Vectors) -> FloatArray:
-        """#W, scalar products of each of them with one."""
+    def products(self, directions: Sequence[Vectors], vector: Vectors) -> FloatArray:
+        """Return the scalar product of each direction with a vector, #D."""
 
-    def put(self, share: FloatArray, ways: Sequence[Vectors], room: Vectors) -> None:
-        """Make the room their sum, each times its share (#W)."""
+    def combine(self, weights: FloatArray, directions: Sequence[Vectors], out: Vectors) -> None:
+        """Write the sum of the directions, each times its weight (#D), to `out`."""
 
 
 class HostDirectionSpace:
-    """On the host: ways in single precision, since only their direction counts."""
+    """Operations on NumPy arrays; differences are in single precision, since only their direction counts."""
 
-    def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
-        if room is None:
+    def copy(self, values: Vectors, out: Vectors | None) -> Vectors:
+        if out is None:
             return np.array(values)
-        np.copyto(room, values)
-        return room
+        np.copyto(out, values)
+        return out
 
     def difference(self, a: Vectors, b: Vectors) -> Vectors:
-        # Rounded in the end only.
+        # Subtracted in double precision, and rounded then.
         return np.subtract(a, b, out=np.empty(a.shape, dtype=np.float32))
 
-    def join(self, way: Vectors, other: Vectors) -> None:
-        way += other
+    def add_to(self, direction: Vectors, other: Vectors) -> None:
+        direction += other
 
-    def moves(self, way: Vectors) -> bool:
-        return bool(way.any())
+    def is_nonzero(self, direction: Vectors) -> bool:
+        return bool(direction.any())
 
-    def products(self, ways: Sequence[Vectors], by: Vectors) -> FloatArray:
-        return products([way.ravel() for way in ways], [by.ravel()])[:, 0]
+    def products(self, directions: Sequence[Vectors], vector: Vectors) -> FloatArray:
+        return products([direction.ravel() for direction in directions], [vector.ravel()])[:, 0]
 
-    def put(self, share: FloatArray, ways: Sequence[Vectors], room: Vectors) -> None:
-        weighted_rows(share, [way.ravel() for way in ways], room.reshape(-1))
+    def combine(self, weights: FloatArray, directions: Sequence[Vectors], out: Vectors) -> None:
+        weighted_rows(weights, [direction.ravel() for direction in directions], out.reshape(-1))
 
 
 class DeviceDirectionSpace:
-    """On a device."""
+    """Operations on Warp arrays of vec2d."""
 
     def __init__(self, count: int, device: wp.Device) -> None:
-        """Of so many vertices."""
+        """Prepare operations on vectors of `count` entries."""
         self._device, self._count = device, count
 
-    def keep(self, values: Vectors, room: Vectors | None) -> Vectors:
-        room = wp.empty(self._count, dtype=wp.vec2d, device=self._device) if room is None else room
-        wp.copy(room, values)
-        return room
+    def copy(self, values: Vectors, out: Vectors | None) -> Vectors:
+        out = wp.empty(self._count, dtype=wp.vec2d, device=self._device) if out is None else out
+        wp.copy(out, values)
+        return out
 
     def difference(self, a: Vectors, b: Vectors) -> Vectors:
-        found = wp.empty(self._count, dtype=wp.vec2d, device=self._device)
-        launch_each(subtract, self._count, [a, b], [found], device=self._device)
-        return found
+        result = wp.empty(self._count, dtype=wp.vec2d, device=self._device)
+        launch_each(subtract, self._count, [a, b], [result], device=self._device)
+        return result
 
-    def join(self, way: Vectors, other: Vectors) -> None:
-        launch_each(add_share, self._count, [1.0, other], [way], device=self._device)
+    def add_to(self, direction: Vectors, other: Vectors) -> None:
+        launch_each(add_share, self._count, [1.0, other], [direction], device=self._device)
 
-    def moves(self, way: Vectors) -> bool:
-        return bool(wp.utils.array_inner(way, way) > 0.0)
+    def is_nonzero(self, direction: Vectors) -> bool:
+        return bool(wp.utils.array_inner(direction, direction) > 0.0)
 
-    def products(self, ways: Sequence[Vectors], by: Vectors) -> FloatArray:
-        return np.array([wp.utils.array_inner(way, by) for way in ways])
+    def products(self, directions: Sequence[Vectors], vector: Vectors) -> FloatArray:
+        return np.array([wp.utils.array_inner(direction, vector) for direction in directions])
 
-    def put(self, share: FloatArray, ways: Sequence[Vectors], room: Vectors) -> None:
-        room.zero_()
-        for part, way in zip(share.tolist(), ways, strict=True):
-            launch_each(add_share, self._count, [part, way], [room], device=self._device)
+    def combine(self, weights: FloatArray, directions: Sequence[Vectors], out: Vectors) -> None:
+        out.zero_()
+        for weight, direction in zip(weights.tolist(), directions, strict=True):
+            launch_each(add_share, self._count, [weight, direction], [out], device=self._device)
 
 
 def make_direction_space(values: Vectors) -> DirectionSpace:
-    """For vectors of this kind, and as many."""
+    """Return the operations on vectors of the kind and length of `values`."""
     return DeviceDirectionSpace(len(values), values.device) if isinstance(values, wp.array) else HostDirectionSpace()

@@ -1,12 +1,12 @@
-"""Quads on a lattice with fewer rows and columns: all that their faces tell of a coarser level.
+"""Coarsening of quads on a lattice to fewer rows and columns, as far as it follows from their faces alone.
 
-A rectangular grid keeps every second row and column (all rows where these lie much farther apart than its columns), any other lattice
-those too in which its border turns, at corners and at the tips of cracks: then between two kept rows and two kept columns there is cloth
-everywhere or nowhere. Surfaces that differ only in where their vertices lie, such as the sizes of a pattern, share what is worked out
-here.
+A rectangular grid keeps every second row and column (all rows where these lie much farther apart than its columns). Any
+other lattice also keeps those in which its border turns, at corners and at the tips of cracks; then between two kept
+rows and two kept columns there is cloth everywhere or nowhere. Surfaces that differ only in the places of their
+vertices, such as the sizes of a pattern, share these results.
 
-A large rectangular grid starts where a small one has come to rest that is spread evenly over it, its rows and columns between those of
-the large one: of any number of them, it is as fine, and nowhere uneven.
+A large rectangular grid starts from a relaxed small one that samples it evenly, with rows and columns between its own.
+The size of the small grid does not depend on the number of the large one's rows and columns, and its spacing is even.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
-from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, places_of_rows
+from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, row_places
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
 from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
@@ -33,56 +33,61 @@ __all__ = [
     "ResamplingKind",
     "Transfer",
     "can_be_coarsened",
+    "coarsen_by_three",
     "coarsened_grid",
     "resampled_grid",
-    "thirds_of",
 ]
 
 
-# Which small grid is spread over a large one: for stiff cloth, whose next level has every third row and column; for others, whose levels
-# have every second one; and for cloth so soft that steps go along lines.
 ResamplingKind = Literal["thirds", "halves", "fine"]
+"""The kind of a small grid that samples a large one.
 
-# A grid of fewer rows or columns has no coarser one, or none of every third of them.
+"thirds" is for stiff cloth, whose next level has every third row and column; "halves" for other cloth, whose next
+level has every second one; "fine" for cloth so soft that it is relaxed along lines.
+"""
+
+# A grid of fewer rows or columns has no coarser one, or none with every third of them.
 _LEAST_LINES = 5
 _LEAST_THIRDS = 13
-# Quads that are left across a strip between two lines in which the border turns: a single one bends several times as stiffly as its cloth.
+# Quads left across a strip between two lines in which the border turns: a single one bends several times as stiffly as
+# its cloth.
 _LEAST_QUADS = 2
-# Rows this many times as far apart as columns all stay, and columns as rows.
-_MUCH = 2.5
+# Rows this many times as far apart as columns all stay, and likewise columns.
+_MOST_ASPECT = 2.5
 # A level of a lattice with more than this share of the finer one's vertices is not worth having.
 _MOST_LEFT = 0.7
-# A small grid spread over a large one has so many quads along its sides, more along the longer one. What cubics leave of a layout is then
-# .002 % of the energy on the dome, .03 % on the bodice, from grids of any size; of soft cloth, .09 % with the finer one. Multiples of eight
-# can be halved thrice, of six have a third that can be halved.
+# Quads along a side of a resampled square grid, and the number of which they are a multiple. With these sizes cubic
+# interpolation leaves less than .1 % of the energy. Multiples of eight can be halved three times; a third of a multiple
+# of six can be halved.
 _SIDES: dict[ResamplingKind, int] = {"thirds": 48, "halves": 48, "fine": 56}
 _MULTIPLES: dict[ResamplingKind, int] = {"thirds": 6, "halves": 8, "fine": 8}
 
 
 class Transfer:
-    """Weights between a level and a coarser one, made when they are first asked for."""
+    """The linear transfer between a level and a coarser one, made at its first use."""
 
-    def __init__(self, weigh: Callable[[], csr_array]) -> None:
-        """Of a function that makes the prolongation."""
-        self._weigh = weigh
+    def __init__(self, make_prolongation: Callable[[], csr_array]) -> None:
+        """Keep the function that makes the prolongation."""
+        self._make_prolongation = make_prolongation
 
     def make(self) -> None:
-        """Make them now."""
+        """Make prolongation and transpose now."""
         _ = self.transpose
 
     @cached_property
     def prolongation(self) -> csr_array:
-        """#V by #C, rows add up to 1."""
-        prolongation = self._weigh()
-        # With what it was made of.
-        del self._weigh
+        """The weights of interpolation, #V by #C; rows add up to 1."""
+        prolongation = self._make_prolongation()
+        # The function holds what it makes the weights from.
+        del self._make_prolongation
         return prolongation
 
     @cached_property
     def transpose(self) -> csr_array:
-        """#C by #V, the prolongation's transpose: its entries' numbers in that."""
-        of = self.prolongation
-        numbered = csr_array((np.arange(of.nnz, dtype=np.int32), of.indices, of.indptr), shape=of.shape)
+        """The transpose of the prolongation, #C by #V; its values are the numbers of the prolongation's entries."""
+        weights = self.prolongation
+        entry = np.arange(weights.nnz, dtype=np.int32)
+        numbered = csr_array((entry, weights.indices, weights.indptr), shape=weights.shape)
         return csr_array(numbered.T.tocsr())
 
 
@@ -91,73 +96,80 @@ class CoarsenedGrid:
     """The next coarser level of a lattice.
 
     Attributes:
-        kept: #C, the finer level's vertices that it has.
-        faces: #G by 4, among these.
-        face_of: #G, for each of them one of the finer level's that lies in it.
+        kept: #C, the finer level's vertices that it keeps.
+        faces: #G by 4, between these.
+        face_of: #G, for each of them one of the finer level's faces in it.
         transfer: linear by index.
-        carry: of a surface with the finer level's faces, what carries layouts up to it by cubics.
-        of_faces: what is worked out of the faces (`warpflat.surface.mesh.once_per_faces`), for all surfaces that have them.
+        make_interpolation: returns the cubic interpolation of layouts on a surface with the finer level's faces.
+        of_faces: results that depend on the faces alone (`warpflat.surface.mesh.once_per_faces`), shared by all
+            surfaces that have them.
     """
 
     kept: IntArray
     faces: IntArray
     face_of: IntArray
     transfer: Transfer
-    carry: Callable[[Surface], GridProlongation | LatticeProlongation]
+    make_interpolation: Callable[[Surface], GridProlongation | LatticeProlongation]
     of_faces: dict[str, Any]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ResampledGrid:
-    """A small grid spread over a large one.
+    """A small grid that samples a large one evenly.
 
     Attributes:
-        of_faces: what is known of its faces (`warpflat.surface.mesh.once_per_faces`).
-        face_of: #G, for each of them one of the large grid's that lies in it.
-        carry: of a surface with the large grid's faces, what carries layouts up to it by cubics, and samples what is there.
+        of_faces: results that depend on its faces alone (`warpflat.surface.mesh.once_per_faces`).
+        face_of: #G, for each of its faces one of the large grid's in it.
+        make_interpolation: returns the cubic interpolation of layouts on a surface with the large grid's faces, which
+            also samples such layouts.
     """
 
     of_faces: dict[str, Any]
     face_of: IntArray
-    carry: Callable[[Surface], GridProlongation]
+    make_interpolation: Callable[[Surface], GridProlongation]
 
     @property
     def faces(self) -> IntArray:
-        """#G by 4, of its vertices, which are numbered row by row."""
+        """Its faces, #G by 4; vertices are numbered row by row."""
         faces: IntArray = self.of_faces["faces"]
         return faces
 
 
 def resampled_grid(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
-    """The small grid that is spread over a large one; None of any other surface, and where there are too few rows or columns."""
-    known = _spreads(surface)
+    """Return the small grid for a large one; None for any other surface, and with too few rows or columns."""
+    known = _resampled_grids(surface)
     if kind not in known:
-        known[kind] = _spread(surface, kind)
+        known[kind] = _resample(surface, kind)
     return known[kind]
 
 
 @once_per_faces
-def _spreads(surface: Surface) -> dict[ResamplingKind, ResampledGrid | None]:
+def _resampled_grids(surface: Surface) -> dict[ResamplingKind, ResampledGrid | None]:
     return {}
 
 
-def _spread(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
+def _resample(surface: Surface, kind: ResamplingKind) -> ResampledGrid | None:
     grid = rows_and_columns(surface)
     if grid is None or not can_be_coarsened(grid):
         return None
-    quads = _quads(grid.shape, _SIDES[kind], _MULTIPLES[kind])
-    lines = tuple(np.linspace(0.0, count - 1.0, of + 1) for count, of in zip(grid.shape, quads, strict=True))
+    quads = _quad_counts(grid.shape, _SIDES[kind], _MULTIPLES[kind])
+    lines = tuple(np.linspace(0.0, count - 1.0, n + 1) for count, n in zip(grid.shape, quads, strict=True))
     middle = [(0.5 * (at[:-1] + at[1:])).astype(np.int32) for at in lines]
     return ResampledGrid(
-        of_faces=_known_of_grid(*map(len, lines)),
-        face_of=_some_face(surface, grid[np.ix_(*middle)].ravel()),
-        carry=lambda surface: GridProlongation(grid, _places_of_lines(surface), lines),
+        of_faces=_grid_faces_known(*map(len, lines)),
+        face_of=_any_face(surface, grid[np.ix_(*middle)].ravel()),
+        make_interpolation=lambda surface: GridProlongation(grid, _line_places(surface), lines),
     )
 
 
-def _quads(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
-    """Of a small grid's columns and rows, about as long for their width as those of a grid of this shape; `side` of a square one. Multiples
-    of this number, but where the large grid has fewer."""
+def _quad_counts(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
+    """Return how many quads a resampled grid has along each direction, with about the proportions of the large grid.
+
+    Args:
+        shape: rows and columns of the large grid.
+        side: quads along a square grid.
+        multiple: the counts are multiples of this number, unless the large grid has fewer quads.
+    """
     quads = [count - 1 for count in shape]
     short, long = np.argsort(quads).tolist()
     share = side / float(np.sqrt(np.prod(quads, dtype=float)))
@@ -168,91 +180,93 @@ def _quads(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
 
 
 @lru_cache(maxsize=16)
-def _known_of_grid(rows: int, columns: int) -> dict[str, Any]:
-    """What has been worked out of the faces of a small grid: pieces that are about as long for their width have the same."""
+def _grid_faces_known(rows: int, columns: int) -> dict[str, Any]:
+    """Return what is known of the faces of a resampled grid; pieces of about the same proportions share it."""
     return known_of_faces(_faces_of(rows, columns))
 
 
 def _faces_of(rows: int, columns: int) -> IntArray:
-    """#F by 4, of a grid whose vertices are numbered row by row."""
+    """Return the faces of a grid whose vertices are numbered row by row, #F by 4."""
     number = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
     return np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
 
 
 def can_be_coarsened(grid: IntArray) -> bool:
-    """Whether a grid (#rows by #columns vertices) has a coarser one."""
+    """Return whether a grid (#rows by #columns vertices) has a coarser one."""
     return min(grid.shape) >= _LEAST_LINES
 
 
 def coarsened_grid(surface: Surface) -> CoarsenedGrid | None:
-    """The next coarser level of quads on a lattice; None if they lie on none, or where it would not be worth having.
+    """Return the next coarser level of quads on a lattice; None without a lattice, or if too few vertices would go.
 
-    Of a grid whose rows lie much farther apart than its columns all rows stay, or the other way round: quads are to become squarer, since
-    steps smooth along their short sides only.
+    A grid whose rows lie much farther apart than its columns keeps all rows, and likewise for columns: quads should
+    become squarer, since steps smooth along their short sides only.
     """
     grid = rows_and_columns(surface)
     if grid is None:
-        return _of_lattice(surface)
+        return _coarsened_lattice(surface)
     if not can_be_coarsened(grid):
         return None
-    wide = _how_wide(surface)
+    wide = _wider_lines(surface)
     if wide == "rows":
-        return _across_rows(surface)
-    return _across_columns(surface) if wide == "columns" else _both_ways(surface)
+        return _coarsened_columns(surface)
+    return _coarsened_rows(surface) if wide == "columns" else _coarsened_rows_and_columns(surface)
 
 
-def thirds_of(surface: Surface) -> CoarsenedGrid | None:
-    """Every third row and column of a grid; None where they do not come out even, or where its quads are long."""
+def coarsen_by_three(surface: Surface) -> CoarsenedGrid | None:
+    """Return a grid with every third row and column; None if the last ones would be missing, or if quads are long."""
     grid = rows_and_columns(surface)
-    if grid is None or any(count < _LEAST_THIRDS or count % 3 != 1 for count in grid.shape) or _how_wide(surface):
+    if grid is None or any(count < _LEAST_THIRDS or count % 3 != 1 for count in grid.shape) or _wider_lines(surface):
         return None
-    return _thirds(surface)
+    return _coarsened_by_three(surface)
 
 
-def _how_wide(surface: Surface) -> Literal["rows", "columns", ""]:
-    """Which of a grid's lines lie much farther apart than the others, if any do."""
-    rows, columns = (place[-1] / (len(place) - 1) for place in _places_of_lines(surface))
-    if rows > _MUCH * columns:
+def _wider_lines(surface: Surface) -> Literal["rows", "columns", ""]:
+    """Return which of a grid's lines lie much farther apart than the others, if any do."""
+    rows, columns = (place[-1] / (len(place) - 1) for place in _line_places(surface))
+    if rows > _MOST_ASPECT * columns:
         return "rows"
-    return "columns" if columns > _MUCH * rows else ""
+    return "columns" if columns > _MOST_ASPECT * rows else ""
 
 
 @once_per_surface
-def _places_of_lines(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """How far a grid's rows lie from the first one, and its columns [m]."""
+def _line_places(surface: Surface) -> tuple[FloatArray, FloatArray]:
+    """Return the distances of a grid's rows from the first one, and those of its columns [m]."""
     grid = rows_and_columns(surface)
     assert grid is not None
-    return places_of_rows(surface.vertices, grid), places_of_rows(surface.vertices, grid.T)
+    return row_places(surface.vertices, grid), row_places(surface.vertices, grid.T)
 
 
 @once_per_faces
-def _of_lattice(surface: Surface) -> CoarsenedGrid | None:
+def _coarsened_lattice(surface: Surface) -> CoarsenedGrid | None:
     lattice = lattice_of(surface)
-    return None if lattice is None else _every_other(lattice)
+    return None if lattice is None else _coarsen_lattice(lattice)
 
 
 @once_per_faces
-def _both_ways(surface: Surface) -> CoarsenedGrid:
-    return _thinner(surface, rows=_second, columns=_second)
+def _coarsened_rows_and_columns(surface: Surface) -> CoarsenedGrid:
+    return _keep_lines(surface, rows=_second, columns=_second)
 
 
 @once_per_faces
-def _across_rows(surface: Surface) -> CoarsenedGrid:
-    return _thinner(surface, rows=_every, columns=_second)
+def _coarsened_columns(surface: Surface) -> CoarsenedGrid:
+    return _keep_lines(surface, rows=_every, columns=_second)
 
 
 @once_per_faces
-def _across_columns(surface: Surface) -> CoarsenedGrid:
-    return _thinner(surface, rows=_second, columns=_every)
+def _coarsened_rows(surface: Surface) -> CoarsenedGrid:
+    return _keep_lines(surface, rows=_second, columns=_every)
 
 
 @once_per_faces
-def _thirds(surface: Surface) -> CoarsenedGrid:
-    return _thinner(surface, rows=_third, columns=_third)
+def _coarsened_by_three(surface: Surface) -> CoarsenedGrid:
+    return _keep_lines(surface, rows=_third, columns=_third)
 
 
-def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]) -> CoarsenedGrid:
-    """Some rows and columns of a grid, which of so many these tell, and the last ones; between them linear by index."""
+def _keep_lines(
+    surface: Surface, *, rows: Callable[[int], IntArray], columns: Callable[[int], IntArray]
+) -> CoarsenedGrid:
+    """Return the coarser grid of the rows and columns that the functions keep of a given number of them."""
     grid = rows_and_columns(surface)
     assert grid is not None
     keep = rows(grid.shape[0]), columns(grid.shape[1])
@@ -261,16 +275,16 @@ def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Call
     return CoarsenedGrid(
         kept=kept.ravel(),
         faces=faces,
-        face_of=_some_face(surface, kept[:-1, :-1].ravel()),
+        face_of=_any_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
-        carry=lambda surface: GridProlongation(grid, _places_of_lines(surface), keep),
+        make_interpolation=lambda surface: GridProlongation(grid, _line_places(surface), keep),
         of_faces=known_of_faces(faces),
     )
 
 
 def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
-    """#V by #kept, a grid's values from those at the rows and columns kept, by the four around each vertex."""
-    (row, row_share), (column, column_share) = (_between(*of) for of in zip(grid.shape, keep, strict=True))
+    """Return the weights of bilinear interpolation by index, #V by #C, between the rows and columns kept."""
+    (row, row_share), (column, column_share) = (_linear_weights(*each) for each in zip(grid.shape, keep, strict=True))
     height, width = map(len, keep)
     parents, weights = np.empty((grid.size, 4), dtype=np.int32), np.empty((grid.size, 4))
     for k, (i, j) in enumerate(np.ndindex(2, 2)):
@@ -279,7 +293,7 @@ def _bilinear(grid: IntArray, keep: tuple[IntArray, ...]) -> csr_array:
     offset = np.arange(0, 4 * grid.size + 1, 4, dtype=np.int32)
     prolongation = csr_array((weights.ravel(), parents.ravel(), offset), shape=(grid.size, height * width))
     prolongation.eliminate_zeros()
-    # Without the room for what was zero.
+    # A copy has no memory for the zeros.
     return prolongation.copy()
 
 
@@ -292,27 +306,33 @@ def _third(count: int) -> IntArray:
 
 
 def _second(count: int) -> IntArray:
-    """Every second of so many, and the last; of an even number the last step goes over three, since a thin row of quads would be
-    stiffer than its cloth along it."""
+    """Return every second of `count` lines, and the last.
+
+    For an even number the last step is over three: a narrower row of quads would be stiffer along it than its cloth.
+    """
     return np.append(np.arange(0, count - 3 + count % 2, 2), count - 1).astype(np.int32)
 
 
-def _between(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
-    """#count by 2, of each index the places in `keep` before and after, and their shares, linear by index."""
+def _linear_weights(count: int, keep: IntArray) -> tuple[IntArray, FloatArray]:
+    """Return each index's two neighbours in `keep` and their weights, linear by index; #count by 2 each."""
     index = np.arange(count, dtype=np.int32)
     place = np.minimum(np.searchsorted(keep, index, side="right") - 1, len(keep) - 2)
     share = (index - keep[place]) / (keep[place + 1] - keep[place])
     return np.column_stack([place, place + 1]), np.column_stack([1.0 - share, share])
 
 
-def _some_face(surface: Surface, vertices: IntArray) -> IntArray:
-    """For each of a grid's vertices a face that has it, the last one."""
+def _any_face(surface: Surface, vertices: IntArray) -> IntArray:
+    """Return a face of each of these vertices of a grid, the last one around it."""
     around = corners_of(surface)
     return around.entry[around.offset[vertices + 1] - 1] // 4
 
 
-def _every_other(lattice: Lattice) -> CoarsenedGrid | None:
-    """Every second row and column between those in which the border turns, which all stay; None where too little would go."""
+def _coarsen_lattice(lattice: Lattice) -> CoarsenedGrid | None:
+    """Return the lattice with every second row and column between those in which the border turns, which all stay.
+
+    Returns:
+        None where too few vertices would go.
+    """
     keep = _kept_lines(lattice.row, lattice.bends), _kept_lines(lattice.column, lattice.bends)
     places = lattice.face_row, lattice.face_column
     block_row, block_column = (
@@ -348,15 +368,19 @@ def _every_other(lattice: Lattice) -> CoarsenedGrid | None:
         kept=kept,
         faces=faces,
         face_of=at_corner[0].copy(),
-        transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
-        carry=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
+        transfer=Transfer(lambda: _bilinear_in_blocks(lattice, keep, block, blocks, faces)),
+        make_interpolation=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
         of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
     )
 
 
 def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
-    """Of rows or columns (#V, of each vertex) those that stay: all in which the border turns, and between them every second, but for
-    strips that are as narrow as may be."""
+    """Return the lines that stay: all in which the border turns, and every second one between them if not too few.
+
+    Args:
+        line: #V, the row or the column of each vertex.
+        bends: #V, whether the border turns there.
+    """
     strips = []
     for begin, end in pairwise(np.unique(line[bends]).tolist()):
         lines = _second(end - begin + 1)
@@ -364,10 +388,10 @@ def _kept_lines(line: IntArray, bends: BoolArray) -> IntArray:
     return np.unique(np.concatenate(strips)).astype(np.int32)
 
 
-def _between_corners(
+def _bilinear_in_blocks(
     lattice: Lattice, keep: tuple[IntArray, IntArray], block: IntArray, blocks: NDArray[np.integer], corners: IntArray
 ) -> csr_array:
-    """#V by #C, linear by index along rows and columns between the corners of the block that a vertex lies in."""
+    """Return the weights of bilinear interpolation by index, #V by #C, between the corners of each vertex's block."""
     count = len(lattice.row)
     face = np.empty(count, dtype=np.int32)
     face[lattice.corner] = np.arange(len(block), dtype=np.int32)[:, None]
@@ -382,5 +406,5 @@ def _between_corners(
     size = int(corners.max()) + 1
     prolongation = csr_array((weights.ravel(), corners[number[block[face]]].ravel(), offset), shape=(count, size))
     prolongation.eliminate_zeros()
-    # Without the room for what was zero.
+    # A copy has no memory for the zeros.
     return prolongation.copy()

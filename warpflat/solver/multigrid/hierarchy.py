@@ -1,4 +1,4 @@
-"""The coarser levels of a piece: of each the step to it, its network and where it lies."""
+"""The hierarchy of a piece: its coarser levels, each with its mesh, its network and its layout."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from warpflat.core.free_memory import return_freed_memory
 from warpflat.core.launch import launch_each
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.multigrid.coarsen import Coarser, coarser, is_coarsest, resampled_surface, steps_down
+from warpflat.solver.multigrid.coarsen import Coarsening, coarsen, is_coarsest, iterate_coarsenings, resampled_surface
 from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
 from warpflat.surface.cells import cells_of
 from warpflat.surface.grid import rows_and_columns
@@ -23,29 +23,40 @@ from warpflat.surface.mesh import Surface, forget, is_large
 from warpflat.surface.row_by_row import row_by_row
 from warpflat.surface.untangle import untangle
 
-__all__ = ["CoarseLevel", "device_levels", "let_go", "make_coarse_levels", "stay"]
+__all__ = [
+    "CascadeStart",
+    "CoarseLevel",
+    "drop_caches",
+    "identity_coarsening",
+    "make_cascade_start",
+    "make_coarse_levels",
+]
 
 
-# A cell pressed to less than this share of its area is mended as if it were mirrored.
+# A cell compressed to less than this share of its area is repaired as if it were mirrored.
 _LEAST_AREA = 1e-6
-# Vertices of such a grid.
+# The most vertices of a grid that is relaxed by steps (see `_is_lowest`).
 _LOWEST_GRID = 240
-# By so much springs of coarser levels may be made weaker or stronger, to store what the finer ones do.
-_WEIGHTS = (0.1, 10.0)
+# Bounds on the factors that calibrate the springs of coarser levels.
+_FACTOR_BOUNDS = (0.1, 10.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class CoarseLevel:
-    """A coarser level of one piece: the step to it, its network, and its layout [m]."""
+    """A coarser level of one piece: the step from the finer mesh, its network, and its layout [m]."""
 
-    step: Coarser
+    coarsening: Coarsening
     network: SpringNetwork
     layout: FloatArray
 
 
 def _strain_fields(network: SpringNetwork, layout: FloatArray, *, products: bool = False) -> tuple[FloatArray, ...]:
-    """3, the sums over the springs of what they store of uniform strains, by their directions; if asked for, 3 by 3, what each of three
-    weights of directions adds to that."""
+    """Return the energies that the springs store under uniform strains.
+
+    Returns:
+        3, the sums over the springs by the `strain_field` of their directions [J]; if `products`, 3 by 3, the
+        derivatives of these sums by the three factors of `weigh_by_direction`, otherwise zeros.
+    """
     s, count = network.spring_arrays, network.vertex_count
     stored, added = np.empty((count, 3)), np.empty((count if products else 0, 3, 3))
     given = [layout, s.around.offset, s.around.neighbor, s.listed_length, s.listed_stiffness]
@@ -54,135 +65,165 @@ def _strain_fields(network: SpringNetwork, layout: FloatArray, *, products: bool
 
 
 def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, fine_layout: FloatArray) -> None:
-    """Weigh the springs of a coarse network by their directions, so that under uniform strains it stores what the fine one does: edge
-    springs on triangles store that only roughly, each mesh in its own way."""
+    """Weigh the springs of a coarse network by direction, so that it stores the fine one's energy under uniform strain.
+
+    Edge springs on triangles store that energy only roughly, each mesh with an error of its own.
+    """
     if network.model != "springs" or network.surface.is_quad.all():
         return
-    wished, _ = _strain_fields(fine, fine_layout)
+    target, _ = _strain_fields(fine, fine_layout)
     _, products = _strain_fields(network, layout, products=True)
-    factor = np.linalg.lstsq(products, wished, rcond=1e-6)[0]
+    factor = np.linalg.lstsq(products, target, rcond=1e-6)[0]
     s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
-    given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_WEIGHTS]
+    given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
     launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
     network.make_springs(stiffness)
 
 
 def make_coarse_levels(
-    network: SpringNetwork, layout: FloatArray, *, mend: bool, known: Mapping[Surface, CoarseLevel] | None = None
+    network: SpringNetwork, layout: FloatArray, *, repair: bool, known: Mapping[Surface, CoarseLevel] | None = None
 ) -> list[CoarseLevel]:
-    """All coarser levels of a piece, the finest first.
+    """Make all coarser levels of a piece, the finest first.
 
     Args:
         network: of the piece.
-        layout: #V by 2, where it lies [m].
-        mend: turn back what cells of coarser levels are mirrored there.
-        known: levels that are there already, by their surfaces.
+        layout: #V by 2, its layout [m].
+        repair: turn back cells of coarser levels that are mirrored there.
+        known: levels that exist already, by their surfaces.
     """
     coarse_levels: list[CoarseLevel] = []
-    # Those that the surface has anyway, as far as they are not mirrored where it lies; and beyond, some that are not.
-    ready: Iterator[Coarser] = steps_down(network.surface)
-    while not (_is_lowest(network) or (coarse_levels and coarse_levels[-1].step.is_lowest)):
-        step = next(ready, None)
-        rung = known.get(step.surface) if known and step is not None else None
-        rung = rung or _rung(network, layout, step, mend=mend)
-        if rung is None:
+    # First the surface's own coarsenings, down to one that is mirrored in this layout; from there on some that are not.
+    ready: Iterator[Coarsening] = iterate_coarsenings(network.surface)
+    while not (_is_lowest(network) or (coarse_levels and coarse_levels[-1].coarsening.is_coarsest)):
+        coarsening = next(ready, None)
+        level = known.get(coarsening.surface) if known and coarsening is not None else None
+        level = level or _make_level(network, layout, coarsening, repair=repair)
+        if level is None:
             ready = iter(())
-            rung = _rung(network, layout, coarser(network.surface, layout))
-        if rung is None:
+            level = _make_level(network, layout, coarsen(network.surface, layout))
+        if level is None:
             break
-        coarse_levels.append(rung)
-        network, layout = rung.network, rung.layout
+        coarse_levels.append(level)
+        network, layout = level.network, level.layout
     return coarse_levels
 
 
-def let_go(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) -> None:
-    """Forget what the making of a large piece's networks asks for and a relaxation does not, up to a tenth of what that takes: sides of
-    faces, and numbers of springs between quads. Triangles may be measured again, and keep these."""
+def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) -> None:
+    """Drop what making the networks of a large piece needs and a relaxation does not, up to a tenth of the memory.
+
+    These are half-edges, and the numbers of springs on quads. Triangle meshes keep the latter, since they may be
+    measured again.
+    """
     if is_large(network.surface):
-        for made in (network, *(rung.network for rung in coarse_levels)):
+        for made in (network, *(level.network for level in coarse_levels)):
             forget(made.surface, half_edges_of)
             if made.surface.is_quad.all():
                 made.spring_arrays.around.forget_numbers()
         if row_by_row(network.surface) is None:
-            # What else is made on the way, so that what that frees goes back, too.
-            for rung in coarse_levels:
-                rung.step.transfer.make()
+            # Make the transfers now, so that the memory they need on the way is returned, too.
+            for level in coarse_levels:
+                level.coarsening.transfer.make()
             return_freed_memory()
 
 
 def _is_lowest(network: SpringNetwork) -> bool:
-    """Whether a level is relaxed by steps. On a grid of a stiff cloth these take less time than another level below it would; in a soft
-    one, or beside a crack that opens, they would be too many."""
+    """Return whether a level is the coarsest, to be relaxed by steps.
+
+    On a small grid of a stiff cloth steps take less time than another level below it would. In a soft cloth, or beside
+    a crack that opens, they would be too many.
+    """
     few = network.vertex_count <= _LOWEST_GRID and network.model == "springs" and not network.goes_along_lines
     return (few and rows_and_columns(network.surface) is not None) or is_coarsest(network.surface)
 
 
 @dataclass(frozen=True, kw_only=True)
-class DeviceLevels:
-    """Where a large lattice starts: a small one's network and layout [m], what carries layouts up from it, in order, and the small one
-    as one of the large one's levels, if it is."""
+class CascadeStart:
+    """The small lattice from which a large one starts.
+
+    Attributes:
+        network: of the small lattice.
+        layout: its layout [m].
+        interpolations: from its layout to that of the large lattice, in order.
+        coarse_level: the small lattice as a level of the large one, if it is one.
+    """
 
     network: SpringNetwork
     layout: FloatArray
-    carries: Sequence[Callable[[FloatArray], FloatArray]]
-    rung: CoarseLevel | None = None
+    interpolations: Sequence[Callable[[FloatArray], FloatArray]]
+    coarse_level: CoarseLevel | None = None
 
 
-def device_levels(network: SpringNetwork, layout: FloatArray, most: int) -> DeviceLevels | None:
-    """The small grid that is spread over a grid, or the largest coarser one of any other lattice that has at most so many vertices; None
-    if there is none, or where it would be mirrored."""
-    spread = resampled_surface(network.surface, _spread_for(network))
-    if spread is not None:
-        surface, carry, face_of = spread
-        found = _network_below(network, surface, carry.sample(layout), face_of, mend=True)
-        return None if found is None else DeviceLevels(network=found[0], layout=found[1], carries=[carry])
-    steps: list[Coarser] = []
-    kept, face_of = (
-        np.arange(network.vertex_count, dtype=np.int32),
-        np.arange(len(network.surface.faces), dtype=np.int32),
-    )
-    for step in steps_down(network.surface):
-        if step.smooth_carry is None or len(kept) <= most:
+def make_cascade_start(network: SpringNetwork, layout: FloatArray, max_vertices: int) -> CascadeStart | None:
+    """Make the small lattice from which a large one starts.
+
+    For a rectangular grid it is a resampled grid, for any other lattice the largest coarser level of at most
+    `max_vertices` vertices.
+
+    Returns:
+        None if there is no such lattice, or if its layout would be mirrored.
+    """
+    resampled = resampled_surface(network.surface, _resampling_kind(network))
+    if resampled is not None:
+        surface, interpolate, face_of = resampled
+        found = _make_network(network, surface, interpolate.sample(layout), face_of, repair=True)
+        return None if found is None else CascadeStart(network=found[0], layout=found[1], interpolations=[interpolate])
+    steps: list[Coarsening] = []
+    kept = np.arange(network.vertex_count, dtype=np.int32)
+    face_of = np.arange(len(network.surface.faces), dtype=np.int32)
+    for step in iterate_coarsenings(network.surface):
+        if step.smooth_interpolation is None or len(kept) <= max_vertices:
             break
         kept, face_of = kept[step.kept], face_of[step.face_of]
         steps.append(step)
     if not steps:
         return None
-    found = _network_below(network, steps[-1].surface, layout[kept], face_of, mend=True)
+    found = _make_network(network, steps[-1].surface, layout[kept], face_of, repair=True)
     if found is None:
         return None
-    rung = CoarseLevel(step=steps[-1], network=found[0], layout=found[1])
-    carries = [step.smooth_carry for step in reversed(steps) if step.smooth_carry is not None]
-    return DeviceLevels(network=rung.network, layout=rung.layout, carries=carries, rung=rung)
+    level = CoarseLevel(coarsening=steps[-1], network=found[0], layout=found[1])
+    interpolations = [step.smooth_interpolation for step in reversed(steps) if step.smooth_interpolation is not None]
+    return CascadeStart(network=level.network, layout=level.layout, interpolations=interpolations, coarse_level=level)
 
 
-def _spread_for(network: SpringNetwork) -> ResamplingKind:
+def _resampling_kind(network: SpringNetwork) -> ResamplingKind:
     if network.goes_along_lines:
         return "fine"
     return "thirds" if network.is_stiff else "halves"
 
 
-def _rung(
-    fine: SpringNetwork, fine_layout: FloatArray, step: Coarser | None, *, mend: bool = False
+def _make_level(
+    fine: SpringNetwork, fine_layout: FloatArray, coarsening: Coarsening | None, *, repair: bool = False
 ) -> CoarseLevel | None:
-    """The level that a step leads to, unless there is none or some of its cells are mirrored where it lies."""
-    if step is None:
+    """Make the level of a coarsening; None if there is none, or if some of its cells are mirrored in the layout."""
+    if coarsening is None:
         return None
-    found = _network_below(fine, step.surface, fine_layout[step.kept], step.face_of, mend=mend)
+    start = fine_layout[coarsening.kept]
+    found = _make_network(fine, coarsening.surface, start, coarsening.face_of, repair=repair)
     if found is None:
         return None
     network, layout = found
     _calibrate(network, layout, fine, fine_layout)
-    return CoarseLevel(step=step, network=network, layout=layout)
+    return CoarseLevel(coarsening=coarsening, network=network, layout=layout)
 
 
-def _network_below(
-    fine: SpringNetwork, surface: Surface, layout: FloatArray, face_of: IntArray, *, mend: bool
+def _make_network(
+    fine: SpringNetwork, surface: Surface, layout: FloatArray, face_of: IntArray, *, repair: bool
 ) -> tuple[SpringNetwork, FloatArray] | None:
-    """The network of a coarser surface, and where it lies, mended if need be; None where cells are mirrored."""
+    """Make the network of a coarser surface.
+
+    Args:
+        fine: the finer network.
+        surface: the coarser one.
+        layout: #C by 2, its layout [m].
+        face_of: #G, for each of its faces one of the finer ones in or beside it.
+        repair: turn back mirrored cells.
+
+    Returns:
+        The network and its layout, repaired if need be; None where cells are mirrored.
+    """
     layout = np.ascontiguousarray(layout)
     if (cells_of(surface).least_shares(layout) <= 0.0).any():
-        layout, left = untangle(surface, layout, least_area=_LEAST_AREA) if mend else (layout, 1)
+        layout, left = untangle(surface, layout, least_area=_LEAST_AREA) if repair else (layout, 1)
         if left:
             return None
     network = SpringNetwork.build(
@@ -193,16 +234,16 @@ def _network_below(
         device=fine.device,
         model=fine.model,
         stretch=None if fine.stretch is None else fine.stretch[face_of],
-        # What threads are held by is a matter of the finest mesh.
+        # Only the finest mesh tells how its springs hold the threads.
         hold=float(fine.shear_hold),
     )
     return network, layout
 
 
-def stay(surface: Surface) -> Coarser:
-    """The step of a piece that has no coarser level, where others have."""
+def identity_coarsening(surface: Surface) -> Coarsening:
+    """Return the coarsening of a piece that has no coarser level where others have: the same mesh."""
     every = np.arange(len(surface.vertices), dtype=np.int32)
-    return Coarser(
+    return Coarsening(
         surface=surface,
         kept=every,
         transfer=Transfer(lambda: csr_array(eye(len(every), format="csr"))),

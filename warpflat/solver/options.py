@@ -1,0 +1,75 @@
+"""The options of a relaxation."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Literal
+
+from warpflat.core.errors import InputError, expect, is_number, nearest
+
+__all__ = ["SOLVERS", "RelaxOptions", "Solver", "given_options"]
+
+Solver = Literal["multilevel", "plain"]
+SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
+
+
+@dataclass(frozen=True, kw_only=True)
+class RelaxOptions:
+    """Options of a relaxation: the time step, the tolerances, the solver.
+
+    Attributes:
+        time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
+        energy_tolerance: eq. (11): relative change of the energy per step.
+        residual_tolerance: largest force on a vertex over the mean force of the springs. After Gauss-Newton steps
+            (`warpflat.solver.gauss_newton`) a piece also counts as at rest when its forces could release next to no
+            energy.
+        max_steps: a state that has taken so many steps is not stepped further, and reports `converged = False`. With
+            coarser levels their work counts in steps of the piece's own mesh, and a cycle that has begun is completed.
+        check_every: steps between two convergence checks.
+        kinetic_damping: set velocities to zero when the forces begin to brake the motion.
+        solver: "multilevel" (see `warpflat.solver.multigrid.solve`; sewn garments take plain steps all the same), or
+            "plain", the paper's steps alone.
+    """
+
+    time_step: float = 0.01
+    energy_tolerance: float = 1e-6
+    residual_tolerance: float = 5e-3
+    max_steps: int = 20_000
+    check_every: int = 10
+    kinetic_damping: bool = True
+    solver: Solver = "multilevel"
+
+    def validate(self) -> None:
+        """Raise InputError, with its name, for a value out of its bounds."""
+        for key, low, high in (
+            ("time_step", 1e-9, 1e9),
+            ("energy_tolerance", 0.0, 1.0),
+            ("residual_tolerance", 1e-12, 1e3),
+            ("max_steps", 1, 10**9),
+            ("check_every", 1, 10**6),
+        ):
+            value = getattr(self, key)
+            if not (is_number(value) and math.isfinite(value)):
+                raise InputError(f"relax: {key} = {value!r} is not a number")
+            if not low <= value <= high:
+                raise InputError(f"relax: {key} = {value!r} is out of range; must be {low:g} to {high:g}")
+            if key in ("max_steps", "check_every") and not is_number(value, whole=True):
+                raise InputError(f"relax: {key} = {value!r} is not a whole number")
+        if not isinstance(self.kinetic_damping, bool):
+            raise InputError(f"relax: kinetic_damping = {self.kinetic_damping!r} is neither True nor False")
+        if self.solver not in SOLVERS:
+            raise InputError(f"relax: solver {self.solver!r} is unknown; {nearest(str(self.solver), SOLVERS)}")
+
+
+def given_options(options: RelaxOptions | None) -> RelaxOptions:
+    """Return valid options: those given, or the defaults.
+
+    Raises:
+        InputError: they are no RelaxOptions, or a value is out of its bounds.
+    """
+    if options is None:
+        return RelaxOptions()
+    expect(options, RelaxOptions, "relax", "a RelaxOptions, such as RelaxOptions(max_steps=5000)")
+    options.validate()
+    return options
