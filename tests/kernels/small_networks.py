@@ -15,7 +15,7 @@ from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
 
 from warpflat.fabric.fabric import Fabric
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.smoother import STEADY
+from warpflat.solver.smoother import IMPLICIT_STEP
 from warpflat.surface.repair.validate import make_surface
 
 CLOTH = Fabric(
@@ -71,7 +71,7 @@ class Launched:
     time_step: float = 0.01
     pieces: int = 1
     watch: int = 1
-    pace: tuple[float, float, float] = STEADY
+    pace: tuple[float, float, float] = IMPLICIT_STEP
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:

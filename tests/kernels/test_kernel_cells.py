@@ -11,7 +11,7 @@ from small_networks import CLOTH, DEVICE, Launched, corner_vertices, shaken, sma
 
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.smoother import STEADY, STILL
+from warpflat.solver.smoother import IMPLICIT_STEP, IMPLICIT_STEP_AT_REST
 from warpflat.surface.repair.validate import make_surface
 
 # How the patch, seen from the front, is made larger or smaller along weft and warp.
@@ -357,7 +357,7 @@ def test_without_viscosity_none_is_written_and_all_else_is_the_same():
     velocities = np.random.default_rng(3).normal(size=(network.vertex_count, 2))
     with_it, without = (
         Launched(network, shaken(network, scale=0.8), velocities, pace=pace).evaluate_guard()
-        for pace in (STEADY, STILL)
+        for pace in (IMPLICIT_STEP, IMPLICIT_STEP_AT_REST)
     )
     for name in ("face_acting", "face_clearance", "face_force", "face_stiffness"):
         np.testing.assert_array_equal(with_it[name], without[name])

@@ -17,7 +17,7 @@ from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.membrane import cloth_of
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.membrane_stiffness import TangentMatrix
-from warpflat.solver.smoother import STEADY
+from warpflat.solver.smoother import IMPLICIT_STEP
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -71,7 +71,7 @@ def evaluated(
             network.cells,
             network.cloth,
             0.01,
-            wp.array([STEADY], dtype=wp.vec3d, device=DEVICE),
+            wp.array([IMPLICIT_STEP], dtype=wp.vec3d, device=DEVICE),
             1,
             0,
         ],
