@@ -186,12 +186,12 @@ def test_the_skirt_block_measures_what_the_table_says(block: Garment):
 
 
 def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
-    piece, carrier = block.pieces["front_bodice"], block.carrier("front_bodice")
+    piece, to = block.pieces["front_bodice"], block.pattern_map("front_bodice")
     drawn = np.linspace(piece.positions[piece.datum[3]], piece.positions[piece.surface.lines["bust"][5]], 7)
-    on_body = carrier.to_body(drawn)
-    np.testing.assert_allclose(carrier.to_pattern(on_body), drawn, atol=1e-6)
-    np.testing.assert_allclose(carrier.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
-    line = carrier.polyline_to_body(drawn)
+    on_body = to.to_body(drawn)
+    np.testing.assert_allclose(to.to_pattern(on_body), drawn, atol=1e-6)
+    np.testing.assert_allclose(to.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
+    line = to.polyline_to_body(drawn)
     assert len(line) >= len(drawn)
     with pytest.raises(InputError, match=r"no piece 'front_bodise'; did you mean 'front_bodice'"):
         block.carrier("front_bodise")

@@ -22,9 +22,9 @@ from warpflat.garment.ease import SeamWish, wished_seams
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
-from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.pattern_map import PatternMap
 from warpflat.mannequin.pieces import FormPiece, FormSeam
 from warpflat.solver.relax import RelaxOptions
 from warpflat.surface.energy_map import energy_report
@@ -107,8 +107,8 @@ class Garment:
             price=price,
         )
 
-    def carrier(self, piece: str) -> Carrier:
-        """What carries points and drawn lines between a piece's pattern and the body, both ways.
+    def pattern_map(self, piece: str) -> PatternMap:
+        """Return the map of points and drawn lines between a piece's pattern and the body, in both directions.
 
         Raises:
             InputError: there is no such piece.
@@ -116,7 +116,7 @@ class Garment:
         if piece not in self.pieces:
             raise InputError(f"garment {self.name!r} has no piece {piece!r}; {nearest(piece, self.pieces)}")
         flat = self.pieces[piece]
-        return Carrier(flat.surface.vertices, flat.positions, flat.faces)
+        return PatternMap(flat.surface.vertices, flat.positions, flat.faces)
 
     def _measures(self, name: str) -> dict[str, Any]:
         """The piece's measures, its energy also brick by brick."""

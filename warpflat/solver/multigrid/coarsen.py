@@ -42,8 +42,8 @@ from warpflat.solver.multigrid.grid_coarsening import (
 )
 from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.mesh import Surface, once_per_surface, tell
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.mesh import Surface, once_per_surface, store_results
+from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.triangles import triangulate
 
 __all__ = [
@@ -214,7 +214,7 @@ def _spread(surface: Surface, kind: ResamplingKind) -> tuple[Surface, GridProlon
 def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     """Make `coarser_surfaces` of a large surface, and what no layout changes of those of triangles, on another core while the body runs;
     be done with all at its end. Those of a grid, which starts from one spread over it, are not needed so soon, nor take long."""
-    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_by_row(surface) is not None:
+    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_major_grid(surface) is not None:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
@@ -235,7 +235,7 @@ def _part_of_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_f
     """A coarser level of quads. Creases are not looked for there: a level is only to lead to where the finer one is at rest, and as to that
     there is no difference."""
     part = _part(surface, vertices, faces, of_faces)
-    tell(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
+    store_results(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
     return part
 
 

@@ -24,7 +24,7 @@ from scipy.sparse import csr_array
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, places_of_rows
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
-from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, face_results, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
 __all__ = [
@@ -170,7 +170,7 @@ def _quads(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
 @lru_cache(maxsize=16)
 def _known_of_grid(rows: int, columns: int) -> dict[str, Any]:
     """What has been worked out of the faces of a small grid: pieces that are about as long for their width have the same."""
-    return known_of_faces(_faces_of(rows, columns))
+    return face_results(_faces_of(rows, columns))
 
 
 def _faces_of(rows: int, columns: int) -> IntArray:
@@ -264,7 +264,7 @@ def _thinner(surface: Surface, *, rows: Callable[[int], IntArray], columns: Call
         face_of=_some_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
         carry=lambda surface: GridProlongation(grid, _places_of_lines(surface), keep),
-        of_faces=known_of_faces(faces),
+        of_faces=face_results(faces),
     )
 
 
@@ -350,7 +350,7 @@ def _every_other(lattice: Lattice) -> CoarsenedGrid | None:
         face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _between_corners(lattice, keep, block, blocks, faces)),
         carry=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
-        of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
+        of_faces=face_results(faces, {lattice_of: read_only(coarse)}),
     )
 
 

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.pattern_map import PatternMap
 
 
 @pytest.fixture(scope="module")
@@ -22,14 +22,14 @@ def piece() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_vertices_go_there_and_back(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
+    carrier = PatternMap(body, flat, faces)
     assert np.abs(carrier.to_body(flat) - body).max() < 1e-12
     assert np.abs(carrier.to_pattern(body) - flat).max() < 1e-12
 
 
 def test_any_point_goes_there_and_back(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
+    carrier = PatternMap(body, flat, faces)
     rng = np.random.default_rng(3)
     pick = rng.integers(len(faces), size=400)
     weights = rng.dirichlet(np.ones(3), 400)
@@ -41,7 +41,7 @@ def test_any_point_goes_there_and_back(piece: tuple[np.ndarray, np.ndarray, np.n
 
 def test_polyline_lies_on_the_surface(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
+    carrier = PatternMap(body, flat, faces)
     middle = flat.mean(axis=0)
     drawn = middle + np.array([[-0.12, 0.10], [0.02, -0.2], [0.10, 0.15]])
     on_body = carrier.polyline_to_body(drawn)
@@ -64,7 +64,7 @@ def _distance(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def test_points_off_the_piece_are_refused(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    carrier = Carrier(*piece)
+    carrier = PatternMap(*piece)
     with pytest.raises(InputError, match=r"point 1 .* off the pattern"):
         carrier.to_body(np.array([piece[1][0], [5.0, 5.0]]))
     with pytest.raises(InputError, match=r"point 0 .* off the body"):
@@ -72,7 +72,7 @@ def test_points_off_the_piece_are_refused(piece: tuple[np.ndarray, np.ndarray, n
     with pytest.raises(InputError, match="#P by 2"):
         carrier.to_body(np.zeros((2, 3)))
     with pytest.raises(InputError, match="do not fit"):
-        Carrier(piece[0], piece[1], np.array([[0, 1, 2, 99999]]))
+        PatternMap(piece[0], piece[1], np.array([[0, 1, 2, 99999]]))
 
 
 def test_closest_is_exact_against_brute_force() -> None:
