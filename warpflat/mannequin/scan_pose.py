@@ -39,7 +39,7 @@ _Part: TypeAlias = tuple[float, FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class ScanOptions:
-    """What the user knows about a scan; values left at None are found from the body's shape.
+    """Known properties of a scan; values left at None are found from the body's shape.
 
     Attributes:
         unit: ``m``, ``dm``, ``cm``, ``mm`` or ``in``.
@@ -146,7 +146,7 @@ def upright(
         Vertices (#W by 3 [m], welded), triangles (#T by 3), and notes of what was found, one sentence each.
 
     Raises:
-        InputError: if the mesh is no body that stands on two legs, or its facing cannot be told.
+        InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
     points, triangles = _welded(vertices, faces)
@@ -169,7 +169,7 @@ def upright(
             f"scan: {size:.3g} m tall if its unit is {unit}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
         )
     if options.unit is None and unit != "m":
-        notes.append(f"the scan's unit was told from its height of {height:.4g}: {unit}")
+        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
     left = sideways - up * (sideways @ up)

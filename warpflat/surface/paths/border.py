@@ -86,7 +86,7 @@ def line_on_border(
 
     Raises:
         InputError: for an unknown side or direction, a place that is not on the border, or a border whose four corners, or which
-            way up they lie, cannot be told.
+            way up they lie, cannot be decided.
     """
     loops = border_loops(surface.faces, surface.vertices)
     if side is not None:

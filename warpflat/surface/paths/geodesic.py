@@ -324,7 +324,7 @@ def _around(
 
 
 def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
-    """#V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
+    """Return #V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
     he = half_edges_of(surface)
     position = np.full(len(surface.vertices), -2, dtype=np.int64)
     position[path] = np.arange(len(path))

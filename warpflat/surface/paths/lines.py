@@ -214,7 +214,7 @@ def _path_around(
 
 
 def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> IntArray:
-    """The path along edges that follows a drawn curve most closely.
+    """Return the path along edges that follows a drawn curve most closely.
 
     Points that lie on vertices are kept; between them the path is drawn to the curve.
 

@@ -308,10 +308,10 @@ def _retrace(
     for target in drawn[1:-1]:
         place, distance, size = _nearest_on_edges(positions, star, walked[-1], target)
         if distance > 1e-6 * size:
-            raise InputError(f"no straight path found near {describe_place(walked[-1])}: mend the triangles there")
+            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
         walked.append(place)
     if not star.sharing([*walked[-1], stop]):
-        raise InputError(f"the path ends at {describe_place(walked[-1])}, short of its goal: mend the triangles there")
+        raise InputError(f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there")
     return [*walked, {stop: 1.0}]
 
 
