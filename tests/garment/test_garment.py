@@ -185,7 +185,7 @@ def test_the_skirt_block_measures_what_the_table_says(block: Garment):
     assert length == pytest.approx(0.96, abs=0.01)
 
 
-def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
+def test_points_and_lines_are_mapped_to_the_body_and_back(block: Garment):
     piece, to = block.pieces["front_bodice"], block.pattern_map("front_bodice")
     drawn = np.linspace(piece.positions[piece.datum[3]], piece.positions[piece.surface.lines["bust"][5]], 7)
     on_body = to.to_body(drawn)
@@ -194,7 +194,7 @@ def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
     line = to.polyline_to_body(drawn)
     assert len(line) >= len(drawn)
     with pytest.raises(InputError, match=r"no piece 'front_bodise'; did you mean 'front_bodice'"):
-        block.carrier("front_bodise")
+        block.pattern_map("front_bodise")
 
 
 def test_metrics_and_files_of_a_garment(block: Garment, tmp_path: Path):

@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.mannequin.layout import Layout
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 
 __all__ = ["FormPiece", "FormSeam", "cut_pieces"]
@@ -169,9 +170,6 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     count = len(faces) * 4
     owners: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for corner in range(count):
@@ -186,8 +184,7 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
         (a0, b0), (a1, b1) = sides
         joined += [(a0, b1), (b0, a1)] if flat[a0] == flat[b1] else [(a0, a1), (b0, b1)]
     links = np.array(joined, int).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count))
-    _, label = connected_components(graph, directed=False)
+    label = join_labels(count, links[:, 0], links[:, 1])
     # Numbered in the mannequin's order, so that a piece is the same in every size.
     order = np.lexsort((np.arange(count), flat))
     _, first = np.unique(label[order], return_index=True)

@@ -14,6 +14,7 @@ from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
 from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
+from warpflat.surface.connectivity import join_labels
 
 __all__ = ["neck_and_arms"]
 
@@ -244,14 +245,10 @@ def _beyond(
     points: FloatArray, triangles: NDArray[np.int64], normal: FloatArray, offset: float, near: FloatArray
 ) -> FloatArray:
     """Return the vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     outside = points @ normal > offset
     kept = triangles[outside[triangles].all(axis=1)]
     ends = np.concatenate([kept[:, :2], kept[:, 1:]])
-    n = len(points)
-    _, label = connected_components(coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (n, n)), directed=False)
+    label = join_labels(len(points), ends[:, 0], ends[:, 1])
     used = np.unique(kept)
     if not len(used):
         raise InputError("scan: nothing lies beyond the armhole; arms are missing")

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
@@ -103,9 +104,6 @@ class Slicer:
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
         """Return the connected parts of the section where normal . x = offset, longest first."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         d = self.vertices @ normal - offset
         d = np.where(d == 0.0, 1e-12, d)
         crossing = (d[self.edges[:, 0]] > 0) != (d[self.edges[:, 1]] > 0)
@@ -123,11 +121,8 @@ class Slicer:
         a, b = self.edges[used].T
         t = (d[a] / (d[a] - d[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
-        graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), (len(used), len(used)))
-        count, label = connected_components(graph, directed=False)
-        length = np.bincount(
-            label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1), minlength=count
-        )
+        label = join_labels(len(used), local[:, 0], local[:, 1])
+        length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
         parts = [Slice(points=points[label == i], length=float(length[i])) for i in np.argsort(-length)]
         return [p for p in parts if len(p.points) > 3]
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length, project_on_segments
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -160,8 +161,6 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         InputError: if both ends are one point, or lie on parts of the surface that are not connected.
     """
     import potpourri3d
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
 
     ends = [locate(surface, a), locate(surface, b)]
     if ends[0] == ends[1]:
@@ -171,8 +170,7 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         return make_path(surface, ends)
     size = len(surface.vertices)
     row, column = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    graph = coo_matrix((np.ones(len(row), dtype=np.int8), (row, column)), shape=(size, size))
-    part = connected_components(graph, directed=False)[1]
+    part = join_labels(size, row, column)
     if part[next(iter(ends[0]))] != part[next(iter(ends[1]))]:
         raise InputError(
             f"no path from {describe_place(ends[0])} to {describe_place(ends[1])}: they lie on separate parts of the "
@@ -311,7 +309,9 @@ def _retrace(
             raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
         walked.append(place)
     if not star.sharing([*walked[-1], stop]):
-        raise InputError(f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there")
+        raise InputError(
+            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
+        )
     return [*walked, {stop: 1.0}]
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.connectivity import components, euler_characteristic
+from warpflat.surface.connectivity import components, euler_characteristic, join_labels
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.repair.polygons import distinct_corners
 
@@ -20,8 +20,6 @@ _ON_EDGE, _OFF_ENDS = 1e-3, 1e-2
 
 def weld_map(vertices: FloatArray) -> IntArray:
     """Return #V, for each vertex the first vertex at the same place (to 1e-7 of the bounding box's diagonal)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
     size = len(vertices)
@@ -33,8 +31,7 @@ def weld_map(vertices: FloatArray) -> IntArray:
     close = _SAME_PLACE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     pairs = cKDTree(vertices[first]).query_pairs(close, output_type="ndarray")
     if len(pairs):
-        graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(first), len(first)))
-        group = connected_components(graph, directed=False)[1][group]
+        group = join_labels(len(first), *pairs.T).astype(np.int64)[group]
         _, first = np.unique(group, return_index=True)
     return first[group].astype(np.int32)
 
