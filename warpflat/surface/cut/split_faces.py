@@ -81,7 +81,7 @@ def _snap_places(surface: Surface, path: SurfacePath, snap: float) -> list[Place
         if places and free == places[-1]:
             # Beside a border vertex that the path has reached already, moving onto it parts nothing.
             continue
-        while is_end and index and len(places) > 1 and _without_small(places[-1], snap, set()) == place:
+        while is_end and len(places) > 1 and _without_small(places[-1], snap, set()) == place:
             del places[-1], points[-1]
         if place not in places:
             places.append(place)
