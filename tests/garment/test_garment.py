@@ -22,9 +22,9 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import FixedLength
 from warpflat.garment.ease import SeamWish
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.pattern_map import PatternMap
 from warpflat.model.wear import Wear
 from warpflat.scene.load import load_scene
 from warpflat.scene.run import run_scene
@@ -185,14 +185,14 @@ def test_the_skirt_block_measures_what_the_table_says(block: Garment):
     assert length == pytest.approx(0.96, abs=0.01)
 
 
-def test_points_and_lines_are_carried_to_the_body_and_back(block: Garment):
+def test_points_and_lines_are_mapped_to_the_body_and_back(block: Garment):
     piece = block.pieces["front_bodice"]
-    carrier = Carrier(piece.surface.vertices, piece.positions, piece.faces)
+    to = PatternMap(piece.surface.vertices, piece.positions, piece.faces)
     drawn = np.linspace(piece.positions[piece.datum[3]], piece.positions[piece.surface.lines["bust"][5]], 7)
-    on_body = carrier.to_body(drawn)
-    np.testing.assert_allclose(carrier.to_pattern(on_body), drawn, atol=1e-6)
-    np.testing.assert_allclose(carrier.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
-    line = carrier.polyline_to_body(drawn)
+    on_body = to.to_body(drawn)
+    np.testing.assert_allclose(to.to_pattern(on_body), drawn, atol=1e-6)
+    np.testing.assert_allclose(to.to_body(piece.positions[:5]), piece.surface.vertices[:5], atol=1e-9)
+    line = to.polyline_to_body(drawn)
     assert len(line) >= len(drawn)
 
 

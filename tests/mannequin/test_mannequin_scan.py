@@ -160,7 +160,7 @@ def test_units_and_poses_are_recognised() -> None:
     plain = _plain("female")
     c, s = np.cos(0.6), np.sin(0.6)
     poses = {
-        "centimetres": (100.0 * points, "unit was told"),
+        "centimetres": (100.0 * points, "unit was found"),
         "lying on its back, in inches": (points[:, [0, 2, 1]] * [1.0, 1.0, -1.0] / 0.0254, "head was found towards -z"),
         "z up": (points[:, [0, 2, 1]] * [1.0, -1.0, 1.0], "head was found towards +z"),
         "facing -z": (points * [-1.0, 1.0, -1.0], "found to face"),

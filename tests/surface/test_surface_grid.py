@@ -17,7 +17,7 @@ from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_col
 from warpflat.surface.half_edges import non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.shapes import make_shape
 
 BoolArray = NDArray[np.bool_]
@@ -230,7 +230,7 @@ def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level()
 def walked(surface: Surface, monkeypatch: pytest.MonkeyPatch) -> Lattice | None:
     """The lattice found by a walk over the faces, whatever is known of them."""
     with monkeypatch.context() as blind:
-        blind.setattr("warpflat.surface.grid.row_by_row", lambda _: None)
+        blind.setattr("warpflat.surface.grid.row_major_grid", lambda _: None)
         return lattice_of(replace(surface, of_faces={}))
 
 
@@ -256,7 +256,7 @@ def test_the_lattice_of_a_grid_numbered_row_by_row_is_that_of_a_walk(
     turn: int, mirrored: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     surface = grid(6, 9, turn, mirrored=mirrored)
-    assert row_by_row(surface) is not None
+    assert row_major_grid(surface) is not None
     assert_same(lattice_of(surface), walked(surface, monkeypatch))
 
 

@@ -1,4 +1,4 @@
-"""Fabrics: in-plane stiffness, weight and limits of a cloth, each value with where it comes from."""
+"""Fabrics: in-plane stiffness, weight and limits of a cloth, each value with its origin."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ _RANGES: dict[str, tuple[float, float, str]] = {
 
 @dataclass(frozen=True, kw_only=True)
 class Provenance:
-    """Where one value of a fabric comes from.
+    """The origin of one value of a fabric.
 
     Attributes:
-        source: who measured or says so.
+        source: the measurement or publication.
         grade: a key of `GRADES`.
         unit: the unit the value was given in; the fabric itself holds SI.
         test_load: the load or strain at which it was measured; cloth stiffens 3 to 30 times between 5 and 500 gf/cm, so
@@ -73,9 +73,9 @@ class Fabric:
     A fabric is checked when it is made, so one that exists is one that can be computed with.
 
     Attributes:
-        name: what it is called in files and messages.
+        name: of the fabric in files and messages.
         stiffness_warp: secant tensile stiffness along the warp (load per width / strain) [N/m].
-        stiffness_weft: the same along the weft [N/m].
+        stiffness_weft: secant tensile stiffness along the weft [N/m].
         shear_stiffness: shear force per width per shear angle [N/m per rad].
         poisson_ratio: weft contraction per warp extension under tension along the warp. Measured values are rare for
             cloth, so 0 unless a source gives one; an isotropic sheet has G = K / (2 (1 + nu)).
@@ -85,7 +85,7 @@ class Fabric:
             being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
         curve_warp: (strain, tension [N/m]) points of a J-shaped curve along the warp, both rising from the origin,
             which is not listed; empty where the secant stiffness is all that is known.
-        curve_weft: the same along the weft.
+        curve_weft: such points along the weft.
         description: one line for people.
         aliases: other names it is found by.
         provenance: for each value (by attribute name) where it comes from.
@@ -109,7 +109,7 @@ class Fabric:
         self.validate()
 
     def validate(self) -> None:
-        """Refuse what no cloth can be.
+        """Check the values.
 
         Raises:
             InputError: a value is missing, no number, outside its range, or contradicts another one; names the value.
@@ -142,18 +142,18 @@ class Fabric:
 
     @property
     def softness(self) -> float:
-        """K/G: how much stiffer it is along its threads than in shear."""
+        """K/G, the tensile stiffness along the stiffer threads over the shear stiffness."""
         return max(self.stiffness_warp, self.stiffness_weft) / self.shear_stiffness
 
     @property
     def is_isotropic(self) -> bool:
-        """Whether it is the same in all directions, within .1 %: values are given with three or four digits."""
+        """True if stiffness is the same in all directions within 0.1 %, as values are given with three or four digits."""
         same = math.isclose(self.stiffness_warp, self.stiffness_weft, rel_tol=1e-3)
         sheared = self.stiffness_warp / (2.0 * (1.0 + self.poisson_ratio))
         return same and math.isclose(self.shear_stiffness, sheared, rel_tol=1e-3)
 
     def tension(self, strain: ArrayLike, direction: Literal["warp", "weft"] = "warp") -> FloatArray:
-        """Tension at given strains along one direction, by the curve where there is one.
+        """Return tension at given strains along one direction, by the curve where there is one.
 
         Args:
             strain: any shape, elongation over length; negative is compression.
@@ -192,13 +192,13 @@ def fabric_called(name: str, library: Mapping[str, Fabric]) -> Fabric:
 
 
 def grain_axes(grain_angle: float) -> tuple[FloatArray, FloatArray]:
-    """Unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
+    """Return unit vectors of warp and weft in the plane; at 0 degrees the warp is +y (up) and the weft +x."""
     angle = np.deg2rad(grain_angle)
     return np.array([-np.sin(angle), np.cos(angle)]), np.array([np.cos(angle), np.sin(angle)])
 
 
 def value_names() -> tuple[str, ...]:
-    """The attributes of a fabric that are measured numbers or curves."""
+    """Return the attributes of a fabric that are measured numbers or curves."""
     return tuple(f.name for f in fields(Fabric) if f.name in _RANGES or f.name.startswith("curve_"))
 
 

@@ -147,12 +147,12 @@ def _shipped() -> tuple[Fabric, ...]:
 
 
 def read_shipped_fabrics() -> dict[str, Fabric]:
-    """The package's own library, by name."""
+    """Return the package's own library, by name."""
     return {fabric.name: fabric for fabric in _shipped()}
 
 
 def read_fabrics(path: Path, library: Mapping[str, Fabric] | None = None) -> dict[str, Fabric]:
-    """The fabrics of a file, by name.
+    """Return the fabrics of a file, by name.
 
     Args:
         path: a TOML file with one table per fabric, and optionally ``[sources]``: short key = full text.
@@ -186,10 +186,10 @@ def fabric_from_table(
     library: Mapping[str, Fabric] | None = None,
     sources: Mapping[str, str] | None = None,
 ) -> Fabric:
-    """The fabric that a checked table describes.
+    """Return the fabric that a checked table describes.
 
     Args:
-        name: what it is called.
+        name: of the fabric.
         table: its table.
         where: the file, the beginning of messages.
         library: where its `base` is looked up (the shipped library without one).
@@ -205,8 +205,8 @@ def fabric_from_table(
             base = _base(name, table.base, read_shipped_fabrics() if library is None else library)
             values = {f.name: getattr(base, f.name) for f in fields(Fabric) if f.name not in ("name", "aliases")}
             origins = dict(values.pop("provenance"))
-        given, told = _readings(table)
-        own, own_told = _own_values(name, table, sources or {})
+        given, given_origins = _readings(table)
+        own, own_origins = _own_values(name, table, sources or {})
         if table.base is not None:
             # A curve of the base would contradict a stiffness that is given here.
             for direction in ("warp", "weft"):
@@ -214,7 +214,7 @@ def fabric_from_table(
                     values.pop(f"curve_{direction}", None)
                     origins.pop(f"curve_{direction}", None)
         values.update(given | own)
-        origins.update(told | own_told)
+        origins.update(given_origins | own_origins)
         for key in ("stiffness_warp", "stiffness_weft", "shear_stiffness", "areal_density"):
             if key not in values:
                 raise InputError(f"fabric {name!r}: {key} is missing; {_how_to_give(key)}")

@@ -1,4 +1,4 @@
-"""From the readings of the two usual instruments, KES-F and FAST, to a fabric's SI values."""
+"""Values of a fabric in SI units from the readings of the two usual instruments, KES-F and FAST."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ FAST_LOADS = {"e5": 5 * GF_PER_CM, "e20": 20 * GF_PER_CM, "e100": 100 * GF_PER_C
 
 
 def stiffness_from_extension(extension: float, load: float) -> float:
-    """Secant stiffness [N/m] from an extension [percent] under a load [N/m].
+    """Return secant stiffness [N/m] from an extension [percent] under a load [N/m].
 
     KES tensile's EMT is taken at 500 gf/cm (490 N/m), FAST's E100 at 98.1 N/m.
 
@@ -39,7 +39,7 @@ def stiffness_from_extension(extension: float, load: float) -> float:
 
 
 def shear_stiffness_from_kes(g: float) -> float:
-    """Shear stiffness [N/m per rad] from KES shear's G [gf/(cm degree)].
+    """Return shear stiffness [N/m per rad] from KES shear's G [gf/(cm degree)].
 
     Raises:
         InputError: a reading that is not above zero.
@@ -48,7 +48,7 @@ def shear_stiffness_from_kes(g: float) -> float:
 
 
 def shear_stiffness_from_fast(eb5: float) -> float:
-    """Shear stiffness [N/m per rad] from FAST-2's bias extension EB5 [percent]: G = 123 / EB5.
+    """Return shear stiffness [N/m per rad] from FAST-2's bias extension EB5 [percent]: G = 123 / EB5.
 
     Raises:
         InputError: a reading that is not above zero.
@@ -57,7 +57,7 @@ def shear_stiffness_from_fast(eb5: float) -> float:
 
 
 def curve_from_kes(emt: float, linearity: float, load: float) -> tuple[tuple[float, float], ...]:
-    """A J-shaped curve that meets a KES tensile test's extension and energy.
+    """Return a J-shaped curve that meets a KES tensile test's extension and energy.
 
     LT is the energy under the loading curve over that of a straight line, 1/2 load EMT. Of the curves through the
     origin and (EMT, load), the power law T = load (e / EMT)^p has LT = 2 / (p + 1).
@@ -81,7 +81,7 @@ def curve_from_kes(emt: float, linearity: float, load: float) -> tuple[tuple[flo
 
 
 def curve_from_fast(e5: float, e20: float, e100: float) -> tuple[tuple[float, float], ...]:
-    """The curve through FAST-2's three extensions [percent]: (strain, tension [N/m]) at 4.9, 19.6 and 98.1 N/m."""
+    """Return the curve through FAST-2's three extensions [percent]: (strain, tension [N/m]) at 4.9, 19.6 and 98.1 N/m."""
     readings = {"e5": e5, "e20": e20, "e100": e100}
     return tuple((_positive(key, value) / 100.0, FAST_LOADS[key]) for key, value in readings.items())
 

@@ -17,7 +17,7 @@ __all__ = ["as_fabric", "find_fabric", "load_library"]
 
 
 def load_library(extra_files: Iterable[str | Path] = ()) -> dict[str, Fabric]:
-    """The fabrics that ship with the package, and those of further files.
+    """Return the fabrics that ship with the package, and those of further files.
 
     Args:
         extra_files: TOML files in the format of ``data/fabrics.toml``; a later one replaces one of the same name.
@@ -42,7 +42,7 @@ def load_library(extra_files: Iterable[str | Path] = ()) -> dict[str, Fabric]:
 
 
 def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabric:
-    """The fabric of that name or alias; case, spaces and underscores do not matter.
+    """Return the fabric of that name or alias; case, spaces and underscores do not matter.
 
     Raises:
         InputError: there is none; names the nearest.
@@ -52,7 +52,7 @@ def find_fabric(name: str, library: Mapping[str, Fabric] | None = None) -> Fabri
 
 
 def as_fabric(fabric: Fabric | str) -> Fabric:
-    """A fabric, or the one of the library of that name.
+    """Return a fabric, or the one of the library of that name.
 
     Raises:
         InputError: there is none of that name, or it is neither.

@@ -1,4 +1,4 @@
-"""Blending: a form's surface from the body's, by ease, scale, offset of profiles, or by mixing profiles and forms."""
+"""Blending: the surface of a form from that of the body, by ease, scale and offset of profiles, or by mixing profiles or forms."""
 
 from __future__ import annotations
 
@@ -21,10 +21,10 @@ __all__ = ["Adjustment", "adjusted_vertices", "blended"]
 
 @dataclass(frozen=True, kw_only=True)
 class Adjustment:
-    """What is done to one profile, in this order.
+    """The adjustments of one profile, made in this order.
 
     Attributes:
-        like: another profile whose outline is taken, as far as `weight` says.
+        like: another profile whose outline is mixed in by `weight`.
         weight: 0 keeps the own outline, 1 takes all of the other's.
         bridge: hollows are bridged, as cloth hangs from bust point to bust point.
         scale: blow-up about the profile's middle.
@@ -43,7 +43,7 @@ class Adjustment:
 
     @staticmethod
     def ranges() -> dict[str, tuple[float, float]]:
-        """Least and greatest valid value of every number."""
+        """Return the least and the greatest valid value of every number."""
         return {
             "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "ease_cm": (-30.0, 400.0),
             "raise_cm": (-60.0, 60.0),
@@ -51,7 +51,7 @@ class Adjustment:
 
 
 def blended(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
-    """The surface between two forms of one layout; `weight` 0 is the first, 1 the second.
+    """Return the surface between two forms of one layout; `weight` 0 is the first, 1 the second.
 
     Raises:
         InputError: if the forms are of different layouts or the weight is not from 0 to 1.
@@ -66,7 +66,7 @@ def blended(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
 def adjusted_vertices(
     layout: Layout, vertices: FloatArray, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]] = ()
 ) -> FloatArray:
-    """The body's vertices with some profiles moved; what lies between follows smoothly.
+    """Return the body's vertices with some profiles moved; what lies between follows smoothly.
 
     Args:
         layout: the grid.
@@ -95,7 +95,7 @@ def adjusted_vertices(
 
 
 def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
-    """A closed level row, #P by 3, after one adjustment."""
+    """Return a closed level row, #P by 3, after one adjustment."""
     new = row.copy()
     if other is not None:
         new[:, [0, 2]] += change.weight * (other - row)[:, [0, 2]]
@@ -118,7 +118,7 @@ def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment) -> F
 
 
 def _bridged(row: FloatArray) -> FloatArray:
-    """A closed level row with every vertex that lies in a hollow moved to the straight line across it."""
+    """Return a closed level row with every vertex that lies in a hollow moved to the straight line across it."""
     from scipy.spatial import ConvexHull
 
     touch = np.sort(ConvexHull(row[:, [0, 2]]).vertices)
@@ -177,7 +177,7 @@ def _rule(
 
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjustment | None) -> None:
-    """Chest and shoulders follow the bust's rows; neckline and shoulder seams stay."""
+    """Move chest and shoulders with the bust's rows; neckline and shoulder seams stay."""
     from scipy import sparse
     from scipy.sparse.linalg import spsolve
 
@@ -241,7 +241,7 @@ def _rule_arm(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: 
 
 
 def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
-    """How an arm's closed row moves: in its own plane, about its middle."""
+    """Return the displacement of an arm's closed row, in its own plane and about its middle."""
     middle = row.mean(axis=0)
     length = polyline_length(row, closed=True)
     shape = row - middle

@@ -1,4 +1,4 @@
-"""What a body has to tell before the grid can be laid on it: profiles, the curves about neck and armhole, the arms.
+"""The blueprint of a body, on which the grid is laid: profiles, the curves about neck and armhole, the arms.
 
 Size tables and scans both answer with a :class:`Blueprint`; one builder lays the same grid on either.
 """
@@ -78,10 +78,10 @@ class Blueprint:
         heights: height [m] of every closed level.
         quarters: the curves of the four quarters by name.
         arms: the curves of the two arms, ``left`` and ``right``.
-        neck: what the neck base measures along its curve [m].
+        neck: length of the neck base along its curve [m].
         collar: #P by 3 [m], closed curve at the upper end of the neck, from centre front over the left.
-        attract: for #P by 3 points of chest and shoulder the places [m] on the body to draw them to, or None.
-        mirror: whether the left and the right side are to be averaged.
+        attract: maps #P by 3 points of chest and shoulder to the places [m] on the body to draw them to; None for none.
+        mirror: true to average the left and the right side.
     """
 
     profile: Callable[[float], Profile]

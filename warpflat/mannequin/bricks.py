@@ -41,7 +41,7 @@ class Brick:
 
 
 def brick(layout: Layout, name: str) -> Brick:
-    """A brick by its name.
+    """Return a brick by its name.
 
     Raises:
         InputError: if there is no such brick, or the name covers several.
@@ -75,7 +75,7 @@ def _border_owners(layout: Layout) -> dict[tuple[int, int], list[str]]:
 
 
 def select_bricks(layout: Layout, patterns: Iterable[str]) -> list[str]:
-    """Names of the bricks that patterns cover, in the mannequin's order.
+    """Return names of the bricks that patterns cover, in the mannequin's order.
 
     Args:
         layout: the grid.
@@ -108,7 +108,7 @@ def _expand(layout: Layout, pattern: str) -> set[str]:
 
 
 def _bands(upper: str, lower: str, pattern: str) -> set[str]:
-    """The bands of neighbouring levels between two levels."""
+    """Return the bands of neighbouring levels between two levels."""
     if (upper, lower) == ("collar", "neck"):
         return {"collar-neck"}
     for levels in (TRUNK_LEVELS, ARM_LEVELS):

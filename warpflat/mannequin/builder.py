@@ -24,7 +24,7 @@ _ATTRACT_ROUNDS = 4
 
 
 def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
-    """The grid's vertices on a body.
+    """Return the grid's vertices on a body.
 
     Returns:
         layout.vertex_count by 3, positions [m].
@@ -39,7 +39,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
 
 
 def _mirrored(vertices: FloatArray, layout: Layout) -> FloatArray:
-    """The average of the body and its mirror image, girths kept."""
+    """Return the average of the body and its mirror image, girths kept."""
     other = vertices[layout.mirror] * np.array([-1.0, 1.0, 1.0])
     out = 0.5 * (vertices + other)
     for ring in layout.rings[: layout.level_row["bust"] + 1]:
@@ -48,7 +48,7 @@ def _mirrored(vertices: FloatArray, layout: Layout) -> FloatArray:
 
 
 def quarter_fractions(layout: Layout, princess: float) -> FloatArray:
-    """Shares of a quarter's arc at which its columns stand, from the centre to the side, both included."""
+    """Return shares of a quarter's arc at which its columns stand, from the centre to the side, both included."""
     n0, n1, n2, n3 = layout.columns
     knots = [0.0, 0.5 * princess, princess, princess + 0.50 * (1.0 - princess), 1.0]
     parts = [
@@ -58,7 +58,7 @@ def quarter_fractions(layout: Layout, princess: float) -> FloatArray:
 
 
 def girth_ring(layout: Layout, profile: Profile, height: float) -> FloatArray:
-    """One closed row of the grid, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
+    """Return one closed row of the grid, #columns by 3 [m]; a tape around it reads exactly the profile's girth."""
     total = polyline_length(profile.curve, closed=True)
     ends = (
         profile.centre_front,
@@ -88,14 +88,14 @@ def _set_rings(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
 
 
 def _pieces(curve: FloatArray, knots: list[float], counts: list[int]) -> FloatArray:
-    """Points of a curve: `counts` cells between consecutive `knots` (shares of the length), ends included."""
+    """Return points of a curve: `counts` cells between consecutive `knots` (shares of the length), ends included."""
     spans = zip(knots[:-1], knots[1:], counts, strict=True)
     parts = [np.linspace(a, b, n, endpoint=False) for a, b, n in spans]
     return resample(curve, np.concatenate([*parts, knots[-1:]]))
 
 
 def _quarter_ids(layout: Layout, name: str) -> tuple[IntArray, IntArray, IntArray, IntArray, IntArray]:
-    """Vertex ids of one quarter: neckline from the centre, shoulder from the neck, armhole down, chest row, centre."""
+    """Return vertex ids of one quarter: neckline from the centre, shoulder from the neck, armhole down, chest row, centre."""
     n0 = layout.columns[0]
     k, q = layout.to_arm, layout.quarter
     face = name.partition("-")[0]
@@ -117,7 +117,7 @@ def _quarter_ids(layout: Layout, name: str) -> tuple[IntArray, IntArray, IntArra
 
 
 def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    """Neckline, shoulder seams and armholes."""
+    """Set the vertices of neckline, shoulder seams and armholes."""
     n0, n1, n2, n3 = layout.columns
     m2, m3 = len(layout.front) - 1, len(layout.yokes["front-left"]) - 1
     for name in QUARTERS:
@@ -137,13 +137,13 @@ def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> N
 
 
 def _to_length(loop: FloatArray, length: float) -> FloatArray:
-    """A closed polygon, #P by 3, blown up about its middle until it is `length` [m] long."""
+    """Return a closed polygon, #P by 3, blown up about its middle until it is `length` [m] long."""
     middle = loop.mean(axis=0)
     return middle + (loop - middle) * (length / polyline_length(loop, closed=True))
 
 
 def _yoke_share(c: QuarterCurves) -> float:
-    """Share of the upper armhole, from the shoulder point down to the notch, at which the yoke row ends.
+    """Return share of the upper armhole, from the shoulder point down to the notch, at which the yoke row ends.
 
     As far down as the neckline's bend lies below the shoulder seam, within what leaves both strips of rows room.
     """
@@ -202,7 +202,7 @@ def _set_neck(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
 
 
 def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
-    """Chest, blades and shoulders: the smoothest sheet through the bounds that continues the bust's rows."""
+    """Set the vertices of chest, blades and shoulders: the smoothest sheet through the bounds that continues the bust's rows."""
     from scipy import sparse
     from scipy.sparse.linalg import factorized
 
@@ -229,7 +229,7 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
     position = np.zeros((len(free), 3))
     for round_ in range(1 + (_ATTRACT_ROUNDS if blueprint.attract else 0)):
         if round_ == 0:
-            # Before there is a sheet nothing can be drawn to the body: the guides carry it alone.
+            # The first sheet follows the guides alone: there is none yet to draw to the body.
             first = sparse.vstack([operator, guide * 5.0]).tocsr()
             u, f = first[:, free], first[:, np.flatnonzero(known)]
             right = (
@@ -246,7 +246,7 @@ def _set_sheet(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
 
 
 def _guides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> tuple[IntArray, FloatArray]:
-    """Vertices of the across-chest rows and the centre lines above the bust, and where they should lie."""
+    """Return vertices of the across-chest rows and the centre lines above the bust, and where they should lie."""
     n0, n1, n2, _ = layout.columns
     ids: list[IntArray] = []
     places: list[FloatArray] = []

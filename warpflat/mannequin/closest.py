@@ -27,7 +27,7 @@ class Closest:
         self.tree = cKDTree(self.middles)
 
     def __call__(self, points: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """The nearest triangle of every point.
+        """Return the nearest triangle of every point.
 
         Args:
             points: #P by 2 or 3.
@@ -58,7 +58,7 @@ class Closest:
     def _best(
         self, points: FloatArray, owner: NDArray[np.int64], triangles: NDArray[np.int64]
     ) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-        """Among pairs of a point and a triangle (sorted by point) the nearest triangle of each point that occurs."""
+        """Return the nearest triangle of each point, among pairs of a point and a triangle that are sorted by point."""
         weights = _barycentric(self.corners[triangles], points[owner])
         place = np.einsum("nk,nkd->nd", weights, self.corners[triangles])
         distance = np.linalg.norm(place - points[owner], axis=1)
@@ -69,7 +69,7 @@ class Closest:
 
 
 def _barycentric(corners: FloatArray, points: FloatArray) -> FloatArray:
-    """Weights of the nearest point of each triangle, #N by 3.
+    """Return weights of the nearest point of each triangle, #N by 3.
 
     Source: Ericson, Real-Time Collision Detection, 5.1.5, by regions of the triangle's plane.
     """

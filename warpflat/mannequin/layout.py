@@ -184,7 +184,7 @@ def _strips(resolution: float) -> Strips:
 
 
 def _yokes(front_top: IntArray, back_top: IntArray, n0: int, k: int, rows: int, fresh: object) -> dict[str, IntArray]:
-    """The four patches under the shoulder seams; front and back share the seam's vertices."""
+    """Return the four patches under the shoulder seams; front and back share the seam's vertices."""
     assert callable(fresh)
     width = k - n0 + 1
     starts = {

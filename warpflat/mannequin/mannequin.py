@@ -55,7 +55,7 @@ class Mannequin:
         layout: the grid, the same for every body of one resolution.
         vertices: layout.vertex_count by 3, positions [m].
         source: where the body comes from: a size, measurements, or a scan.
-        notes: what was completed or mended, one sentence each.
+        notes: completions and repairs, one sentence each.
         sections: for a scan, the length [m] of the body's own section at each level.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
@@ -69,7 +69,7 @@ class Mannequin:
 
     @classmethod
     def from_size(cls, size: str, *, resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
-        """A mannequin of a size of the tables: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``, ``men 50/182``.
+        """Return a mannequin of a size of the tables: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``, ``men 50/182``.
 
         Args:
             size: its name.
@@ -84,7 +84,7 @@ class Mannequin:
 
     @classmethod
     def from_measurements(cls, *, table: str = "women", resolution_mm: float = 10.0, **lengths: float) -> Mannequin:
-        """A mannequin to given measurements [m]; the missing ones are completed by `table`'s proportions (see `notes`).
+        """Return a mannequin to given measurements [m]; the missing ones are completed by `table`'s proportions (see `notes`).
 
         Raises:
             InputError: for an unknown measurement, one outside its valid range, or two that no body has together.
@@ -95,10 +95,10 @@ class Mannequin:
     def from_scan(
         cls, vertices: FloatArray, faces: Any, *, options: ScanOptions | None = None, resolution_mm: float = 10.0
     ) -> Mannequin:
-        """A mannequin on a body scan: levels found from the body's shape, hollows bridged as a tape does.
+        """Return a mannequin on a body scan: levels found from the body's shape, hollows bridged as a tape does.
 
         Args:
-            vertices: #V by 3, in any unit and pose that can be told from the shape (see :class:`ScanOptions`).
+            vertices: #V by 3, in any unit and pose that can be found from the shape (see :class:`ScanOptions`).
             faces: #F by 3 or 4 (-1 in the last column for a triangle).
             options: unit, facing, landmarks, mirroring.
             resolution_mm: wished quad edge [mm].
@@ -140,7 +140,7 @@ class Mannequin:
         return cls(layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes)
 
     def brick(self, name: str) -> Brick:
-        """A brick with its vertices, faces and neighbours.
+        """Return a brick with its vertices, faces and neighbours.
 
         Raises:
             InputError: if there is no such brick.
@@ -148,11 +148,11 @@ class Mannequin:
         return brick(self.layout, name)
 
     def select(self, *patterns: str) -> list[str]:
-        """Names of the bricks that patterns such as ``waist-hip/front-*`` cover."""
+        """Return names of the bricks that patterns such as ``waist-hip/front-*`` cover."""
         return select_bricks(self.layout, patterns)
 
     def line(self, name: str) -> FloatArray:
-        """#P by 3, positions [m] along a feature profile or line; a closed one repeats its first point.
+        """Return #P by 3, positions [m] along a feature profile or line; a closed one repeats its first point.
 
         Raises:
             InputError: if there is no such line.
@@ -162,11 +162,11 @@ class Mannequin:
         return self.vertices[self.layout.lines[name]]
 
     def lines(self) -> dict[str, FloatArray]:
-        """Every feature profile and line by name, #P by 3 [m]."""
+        """Return every feature profile and line by name, #P by 3 [m]."""
         return {name: self.vertices[ids] for name, ids in self.layout.lines.items()}
 
     def levels(self) -> dict[str, Level]:
-        """Height and girth of every feature profile, from the neck down, then the arms."""
+        """Return height and girth of every feature profile, from the neck down, then the arms."""
         found: dict[str, Level] = {}
         for name in ("neck", "shoulder left", "shoulder right", "chest front", "chest back"):
             points = self.line(name)
@@ -186,14 +186,14 @@ class Mannequin:
         return found
 
     def surface(self) -> Surface:
-        """All bricks as one surface with every feature line."""
+        """Return all bricks as one surface with every feature line."""
         return Surface(
             vertices=self.vertices, faces=self.layout.faces, lines=dict(self.layout.lines), name="mannequin",
             input_vertices=self.vertices, input_index=np.arange(len(self.vertices), dtype=np.int32), notes=self.notes,
         )  # fmt: skip
 
     def form(self, form: str | Form, *, half: bool = False) -> FormResult:
-        """The pieces of a form on this body, and their seams.
+        """Return the pieces of a form on this body, and their seams.
 
         Args:
             form: a shipped form's name (see :func:`warpflat.mannequin.forms.form_names`) or one of your own.
@@ -207,7 +207,7 @@ class Mannequin:
         return realise(self.layout, self.vertices, shipped_form(form) if isinstance(form, str) else form, half=half)
 
     def metrics(self) -> dict[str, Any]:
-        """What ``metrics.json`` says about the mannequin: its source and each level's height and girths [m].
+        """Return the mannequin's entry of ``metrics.json``: its source, and each level's height and girths [m].
 
         ``girth_m`` is the body's: of a scan the length of its section there, hollows followed. ``tape_m`` is what a tape
         reads on the mannequin, which bridges hollows; without a scan the two are one.

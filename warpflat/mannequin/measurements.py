@@ -1,4 +1,4 @@
-"""Measurements of a body: size tables, completion by proportion, and what is refused."""
+"""Measurements of a body: size tables, completion by proportion, and checks."""
 
 from __future__ import annotations
 
@@ -51,13 +51,13 @@ class Measurements:
 
 @functools.cache
 def size_tables() -> dict[str, Any]:
-    """The contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
+    """Return the contents of ``data/sizes.toml``: size tables, completion rules, cross-sections, valid ranges."""
     text = importlib.resources.files("warpflat.mannequin").joinpath("data/sizes.toml").read_text(encoding="utf-8")
     return tomllib.loads(text)
 
 
 def size_names() -> list[str]:
-    """Every size that can be asked for, as it is typed: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``."""
+    """Return every size that can be asked for, as it is typed: ``EU 38``, ``UK 10``, ``US 8``, ``JIS 9AR``, ``men 50``."""
     names: list[str] = []
     for table in size_tables()["tables"].values():
         names += [f"{table['label']} {size}" for size in table["sizes"]]
@@ -66,7 +66,7 @@ def size_names() -> list[str]:
 
 
 def size_table(size: str) -> str:
-    """The table whose proportions complete a size: ``women`` or ``men``.
+    """Return the table whose proportions complete a size: ``women`` or ``men``.
 
     Raises:
         InputError: if no table has the size.
@@ -76,7 +76,7 @@ def size_table(size: str) -> str:
 
 
 def measurements_from_size(size: str, **given: float) -> Measurements:
-    """The measurements of a size of the tables, some of them replaced.
+    """Return the measurements of a size of the tables, some of them replaced.
 
     Args:
         size: a name of :func:`size_names`, optionally with a stature in centimetres: ``men 50/182``.
@@ -102,7 +102,7 @@ def measurements_from_size(size: str, **given: float) -> Measurements:
 
 
 def measurements_from_values(*, table: str = "women", **given: float) -> Measurements:
-    """Measurements that a user gives, the missing ones completed by a table's proportions.
+    """Return measurements that a user gives, the missing ones completed by a table's proportions.
 
     Args:
         table: ``women`` or ``men``: whose proportions and cross-sections complete the rest.
@@ -122,7 +122,7 @@ def measurements_from_values(*, table: str = "women", **given: float) -> Measure
 
 
 def _found(size: str) -> tuple[str, str, str]:
-    """A size's table, its name there, and the stature after its '/', if any."""
+    """Return a size's table, its name there, and the stature after its '/', if any."""
     expect(size, str, "size", 'text, such as "EU 38"')
     name, _, tall = size.partition("/")
     for key, table in size_tables()["tables"].items():
@@ -169,7 +169,7 @@ def _stature(text: str, size: str) -> float:
 
 
 class _Completion:
-    """What is given, of a size or by a user, and the rest by a table's proportions.
+    """Completion of measurements that a size or a user gives by a table's proportions.
 
     Args:
         table: of the size, or the one that completes.
@@ -209,7 +209,7 @@ class _Completion:
             self._known = set(self._lengths)
 
     def measurements(self, source: str) -> Measurements:
-        """All of them.
+        """Return all measurements.
 
         Raises:
             InputError: two that are given go together on no body.
@@ -239,7 +239,7 @@ class _Completion:
         )  # fmt: skip
 
     def _fill(self, name: str, value: float, how: str) -> None:
-        """Complete one, within the ratios in which bodies have it to what is known."""
+        """Complete one measurement, within the valid ratios to those that are known."""
         for top, bottom, low, high in size_tables()["valid"]["ratio"].values():
             other = bottom if name == top else top
             if name not in (top, bottom) or other not in self._known:
@@ -251,7 +251,7 @@ class _Completion:
         self._notes.append(f"{name} = {value * 100:.1f} cm {how}")
 
     def _at_stature(self, name: str, value: float) -> float:
-        """A length [m] at the stature of the own table, at that of the body."""
+        """Return a length [m] at the stature of the own table, at that of the body."""
         of_table = self._own["stature"] / 100.0
         step = self._rows.get("stature_step", {})
         if name in step:
@@ -274,12 +274,12 @@ class _Completion:
 
 
 def _ends(name: str, top: str, low: float, high: float, other: float) -> tuple[float, float]:
-    """Between which lengths [m] the first or the second of a ratio lies, given the other [m]."""
+    """Return the bounds [m] of the first or the second length of a ratio, given the other [m]."""
     return (low * other, high * other) if name == top else (other / high, other / low)
 
 
 def _along_table(table: Mapping[str, Any], key: str, value: float, name: str) -> float:
-    """`name` [m] where `key` = `value` [m], linear between the table's sizes and beyond its ends."""
+    """Return the measurement `name` [m] where `key` is `value` [m], linear between the table's sizes and beyond its ends."""
     x = np.array([s[key] for s in table["sizes"].values()], float)
     y = np.array([s[name] for s in table["sizes"].values()], float)
     at = value * 100.0
@@ -291,7 +291,7 @@ def _along_table(table: Mapping[str, Any], key: str, value: float, name: str) ->
 
 
 def _heights(lengths: Mapping[str, float], body: Mapping[str, Any]) -> dict[str, float]:
-    """Height of every level and landmark above the floor [m]."""
+    """Return height of every level and landmark above the floor [m]."""
     stature = lengths["stature"]
     if "heights_mm" in body:
         by = (stature * 100.0 - 176.0) / 6.0

@@ -1,4 +1,4 @@
-"""What a mannequin leaves behind: ``mannequin.usdc``, ``mannequin.obj``, ``metrics.json`` and ``picture.png``."""
+"""The files of a mannequin: ``mannequin.usdc``, ``mannequin.obj``, ``metrics.json`` and ``picture.png``."""
 
 from __future__ import annotations
 

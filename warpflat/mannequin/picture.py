@@ -65,7 +65,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
 
 
 def _turned(vertices: FloatArray, degrees: float) -> FloatArray:
-    """Vertices seen by somebody who walked `degrees` around the body to its left; x right, y up, z to the eye."""
+    """Return vertices seen by somebody who walked `degrees` around the body to its left; x right, y up, z to the eye."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     x, y, z = vertices.T
     turned = np.column_stack([c * x - s * z, y, s * x + c * z])
@@ -92,7 +92,7 @@ def _draw_body(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
 
 
 def _visible(turned: FloatArray, mannequin: Mannequin, ids: Any) -> Any:
-    """Which vertices of a line face the viewer and are not behind an arm."""
+    """Return which vertices of a line face the viewer and are not behind an arm."""
     from scipy.spatial import cKDTree
 
     normals = vertex_normals(turned, mannequin.layout.faces)
@@ -118,7 +118,7 @@ def _draw_lines(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
 
 
 def _label_levels(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
-    """Names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
+    """Return names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
     levels = mannequin.levels()
     names = ["neck", "chest back", *reversed(RING_LEVELS)]
     span = float(np.ptp(turned[:, 1]))
@@ -132,7 +132,7 @@ def _label_levels(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
 
 
 def _spread(wished: FloatArray, gap: float) -> FloatArray:
-    """Heights near the wished ones (high to low), at least `gap` apart."""
+    """Return heights near the wished ones (high to low), at least `gap` apart."""
     places = wished.copy()
     for i in range(1, len(places)):
         places[i] = min(places[i], places[i - 1] - gap)
@@ -140,7 +140,7 @@ def _spread(wished: FloatArray, gap: float) -> FloatArray:
 
 
 def _label_lines(axes: Any, turned: FloatArray, mannequin: Mannequin, view: str) -> None:
-    """Names of the vertical lines, written along them where they are seen best, and of shoulder and armhole."""
+    """Return names of the vertical lines, written along them where they are seen best, and of shoulder and armhole."""
     rows = mannequin.layout.level_row
     places = {
         "front": {"centre front": 0.15, "princess front right": 0.35, "princess front left": 0.35},

@@ -14,6 +14,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.mannequin.layout import Layout
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 
 __all__ = ["FormPiece", "FormSeam", "cut_pieces"]
@@ -165,13 +166,10 @@ def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:
 
 
 def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArray]:
-    """Faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
+    """Return faces renumbered to the piece's own vertices, which are doubled along the edges in `cut`.
 
     Two corners at one vertex are one vertex of the piece if a chain of faces joins them without crossing the cut.
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
     count = len(faces) * 4
     owners: dict[tuple[int, int], list[tuple[int, int]]] = {}
     for corner in range(count):
@@ -186,8 +184,7 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
         (a0, b0), (a1, b1) = sides
         joined += [(a0, b1), (b0, a1)] if flat[a0] == flat[b1] else [(a0, a1), (b0, b1)]
     links = np.array(joined, int).reshape(-1, 2)
-    graph = coo_matrix((np.ones(len(links)), (links[:, 0], links[:, 1])), (count, count))
-    _, label = connected_components(graph, directed=False)
+    label = join_labels(count, links[:, 0], links[:, 1])
     # Numbered in the mannequin's order, so that a piece is the same in every size.
     order = np.lexsort((np.arange(count), flat))
     _, first = np.unique(label[order], return_index=True)
@@ -200,7 +197,7 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
 
 
 def _border(corners: IntArray, name: str, *, opened: bool) -> NDArray[np.int64]:
-    """The one border loop of a disk, counter-clockwise from outside."""
+    """Return the one border loop of a disk, counter-clockwise from outside."""
     ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
     key = np.sort(ahead, axis=1)
     edges, inverse, counts = np.unique(key, axis=0, return_inverse=True, return_counts=True)
@@ -257,7 +254,7 @@ def _edges(
 def _lines(
     layout: Layout, corners: IntArray, grid_vertices: IntArray, edges: Mapping[str, IntArray]
 ) -> dict[str, IntArray]:
-    """Every edge and, as vertex indices of the piece, the runs of feature lines inside it, the longest of a line first.
+    """Return every edge and, as vertex indices of the piece, the runs of feature lines inside it, the longest of a line first.
 
     Where an edge goes on inside as the same line, its name means both.
     """
@@ -271,12 +268,12 @@ def _lines(
 
 
 def _is_of(name: str, line: str) -> bool:
-    """Whether a name is that of a feature line or of a further part of it."""
+    """Return whether a name is that of a feature line or of a further part of it."""
     return name == line or (name.startswith(f"{line} ") and name[len(line) + 1 :].isdigit())
 
 
 def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[int], str | None]:
-    """A run and what goes on at its ends, as one line; the first of the names that this has."""
+    """Return a run and what goes on at its ends, as one line; the first of the names that this has."""
     joined: set[str] = set()
     for name in list(edges) * len(edges):
         ids = edges[name]
@@ -293,7 +290,7 @@ def _with_edges(run: list[int], edges: Mapping[str, list[int]]) -> tuple[list[in
 
 
 def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> dict[str, list[list[int]]]:
-    """By feature line its runs inside the piece, off the border, as vertex indices of the piece."""
+    """Return the runs of each feature line inside the piece, off the border, as vertex indices of the piece."""
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     mesh_edges, faces = np.unique(ends, axis=0, return_counts=True)
     # Off the border, and so off all that is doubled, an edge of the mannequin is one of the piece.
@@ -320,7 +317,7 @@ def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> d
 
 
 def _seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
-    """Runs of border edges that two pieces (or two edges of one) share on the mannequin."""
+    """Return the seams: runs of border edges that two pieces (or two edges of one) share on the mannequin."""
     places: dict[tuple[int, int], list[tuple[str, str, int]]] = {}
     for name, piece in pieces.items():
         for edge, ids in piece.edges.items():

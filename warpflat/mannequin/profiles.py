@@ -42,7 +42,7 @@ class Section:
 
 
 def section_curve(section: Section, samples: int = 720) -> FloatArray:
-    """The closed curve of a section.
+    """Return the closed curve of a section.
 
     Returns:
         #samples by 2, (x, z) [m], from centre front over the body's left to the back, not repeated at the end; evenly
@@ -67,7 +67,7 @@ def section_curve(section: Section, samples: int = 720) -> FloatArray:
 
 @functools.lru_cache(maxsize=4096)
 def superellipse_exponent(area: float) -> float:
-    """The exponent whose superellipse fills the share `area` of its bounding box.
+    """Return the exponent whose superellipse fills the share `area` of its bounding box.
 
     Raises:
         InputError: if `area` is not between 0.6 and 0.97.
@@ -85,7 +85,7 @@ def superellipse_exponent(area: float) -> float:
 
 
 def convex_girth(points: FloatArray) -> float:
-    """Length [m] of a tape around points: the perimeter of their convex hull.
+    """Return length [m] of a tape around points: the perimeter of their convex hull.
 
     Args:
         points: #P by 2, or #P by 3 in a level plane, of which x and z count.
@@ -103,7 +103,7 @@ def convex_girth(points: FloatArray) -> float:
 
 
 def scale_to_girth(points: FloatArray, girth: float) -> FloatArray:
-    """Points of a level profile blown up or shrunk about their middle until a tape around them reads `girth` [m].
+    """Return points of a level profile blown up or shrunk about their middle until a tape around them reads `girth` [m].
 
     Args:
         points: #P by 3, one height.

@@ -27,12 +27,12 @@ _HARMONICS = 28
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class ScanFound:
-    """What was found in a scan.
+    """The result of slicing a scan.
 
     Attributes:
         blueprint: ready for the grid.
         source: one line for metrics.
-        notes: what was told from the shape, one sentence each.
+        notes: findings from the shape, one sentence each.
         sections: length [m] of the body's own section, hollows followed, at every closed level.
     """
 
@@ -48,7 +48,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Args:
         vertices: #V by 3, any unit.
         faces: #F by 3 or 4 (-1 in the last column for a triangle).
-        options: what is known about the scan.
+        options: what the user knows about the scan.
 
     Raises:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk.
@@ -73,7 +73,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
 
 
 def _ray_radii(hull: FloatArray, middle: FloatArray, count: int) -> FloatArray:
-    """Distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x."""
+    """Return distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x."""
     corners = hull - middle
     angle = np.arctan2(corners[:, 0], corners[:, 1]) % (2.0 * np.pi)
     order = np.argsort(angle)
@@ -145,7 +145,7 @@ def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float]
 
 
 def _where(values: FloatArray, s: FloatArray, i: int, wished: float) -> float:
-    """Arc length near sample `i` at which `values` pass `wished`."""
+    """Return arc length near sample `i` at which `values` pass `wished`."""
     a, b = values[i - 1], values[i + 1]
     if abs(b - a) < 1e-9:
         return float(s[i])
@@ -154,7 +154,7 @@ def _where(values: FloatArray, s: FloatArray, i: int, wished: float) -> float:
 
 
 def _share(quarter: FloatArray, wished: float) -> float:
-    """Share of a quarter's length, from its centre line to its side, at which it is `wished` [m] off the midplane."""
+    """Return share of a quarter's length, from its centre line to its side, at which it is `wished` [m] off the midplane."""
     s = arc_lengths(quarter)
     rising = np.maximum.accumulate(np.abs(quarter[:, 0]))
     return float(np.clip(np.interp(wished, rising, s) / s[-1], 0.2, 0.7))
@@ -163,7 +163,7 @@ def _share(quarter: FloatArray, wished: float) -> float:
 def _attractor(
     slicer: Slicer, levels: Mapping[str, float], armpits: Mapping[str, tuple[float, float, float]]
 ) -> Callable[[FloatArray], FloatArray]:
-    """The nearest place on the scan for every point, hollows between bust points and along the spine bridged.
+    """Return the nearest place on the scan for every point, hollows between bust points and along the spine bridged.
 
     As tape and cloth bridge them: all the way at the bust, less and less up to the pit of the neck.
     """
@@ -202,7 +202,7 @@ def _attractor(
 
 
 def _upper_hull(points: FloatArray, x: FloatArray) -> FloatArray:
-    """The upper side of the convex hull of points (x, z), at `x`."""
+    """Return the upper side of the convex hull of points (x, z), at `x`."""
     from scipy.spatial import ConvexHull, QhullError
 
     try:

@@ -104,7 +104,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
 def _armpit(
     slicer: Slicer, y: FloatArray, reach: FloatArray, side: float, stature: float
 ) -> tuple[float, float, float]:
-    """Where an arm joins the trunk: (height, x, z) just below the join."""
+    """Return the place where an arm joins the trunk, (height, x, z) [m] just below it."""
     window = np.flatnonzero((y > 0.66 * stature) & (y < 0.84 * stature))
     jump = next((i for i in window if reach[i + 1] > 1.22 * reach[i]), None)
     where = "left" if side > 0 else "right"
@@ -129,11 +129,11 @@ def _armpit(
 
 
 def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
-    """Heights [m] of the closed levels and of ``armpit``, ``front_neck``, ``side_neck``.
+    """Return heights [m] of the closed levels and of ``armpit``, ``front_neck``, ``side_neck``.
 
     Waist: the smallest section between rib and hip bone; where a belly leaves none, the deepest hollow of the back.
     Bust: the largest section between the waist and an inch below the armpits. Hip: where the seat, coming down from the
-    small of the back, first reaches seven eighths of its full prominence; further down a scan's girth only tells how
+    small of the back, first reaches seven eighths of its full prominence; further down a scan's girth only shows how
     far apart the feet stand.
 
     Args:
@@ -230,7 +230,7 @@ def _hip(t: TrunkSections, waist: float) -> float:
 
 
 def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:
-    """Heights of the front neck point (the pit over the breastbone) and the side neck point.
+    """Return heights of the front neck point (the pit over the breastbone) and the side neck point.
 
     Both are where an outline turns from the chest or the shoulder into the neck: the point furthest inside the chord.
     """

@@ -14,6 +14,7 @@ from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
 from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
+from warpflat.surface.connectivity import join_labels
 
 __all__ = ["neck_and_arms"]
 
@@ -26,7 +27,7 @@ _NOTCH = 0.22
 def neck_and_arms(
     slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], profile: Callable[[float], Profile]
 ) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray]:
-    """The curves above the bust.
+    """Return the curves above the bust.
 
     Args:
         slicer: the upright scan.
@@ -77,7 +78,7 @@ def neck_and_arms(
 def _loop(
     points: FloatArray, origin: FloatArray, first: FloatArray, second: FloatArray, harmonics: int, count: int = 360
 ) -> FloatArray:
-    """A smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3."""
+    """Return a smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3."""
     from scipy.spatial import ConvexHull
 
     flat = np.column_stack([(points - origin) @ first, (points - origin) @ second])
@@ -99,7 +100,7 @@ def _loop(
 
 
 def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tuple[FloatArray, FloatArray]:
-    """Neck base and collar, from the front over the left."""
+    """Return neck base and collar, from the front over the left."""
     front = np.array([0.0, levels["front_neck"], float(np.interp(levels["front_neck"], t.y, t.front_centre))])
     side_z = 0.5 * float(
         np.interp(levels["side_neck"], t.y, t.front_centre) + np.interp(levels["side_neck"], t.y, t.back_centre)
@@ -130,7 +131,7 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
 
 
 def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> FloatArray:
-    """The closed armhole in the leaning plane through the armpit, from the underarm forward."""
+    """Return the closed armhole in the leaning plane through the armpit, from the underarm forward."""
     y, x, z = t.armpits[side]
     normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
     up = np.array([sign * np.sin(_LEAN), np.cos(_LEAN), 0.0])
@@ -147,7 +148,7 @@ def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> FloatA
 
 
 def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
-    """The seam from the side neck point to the shoulder point, on the scan's upper side."""
+    """Return the seam from the side neck point to the shoulder point, on the scan's upper side."""
     flat = tip - neck
     normal = np.cross(flat, np.array([0.0, 1.0, 0.0]))
     normal /= np.linalg.norm(normal)
@@ -171,7 +172,7 @@ def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
 
 
 def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
-    """The across-chest row on the scan, from the midplane to the armhole's notch."""
+    """Return the across-chest row on the scan, from the midplane to the armhole's notch."""
     sign = 1.0 if face == "front" else -1.0
     points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), float(notch[1]))])
     side = np.sign(notch[0])
@@ -187,7 +188,7 @@ def _row(slicer: Slicer, notch: FloatArray, face: str) -> FloatArray:
 
 
 def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArray, face: str) -> FloatArray:
-    """The centre line from the bust to the neckline on the scan."""
+    """Return the centre line from the bust to the neckline on the scan."""
     sign = 1.0 if face == "front" else -1.0
     y = np.linspace(bottom[1], top[1], 24)
     points = np.concatenate([p.points for p in slicer.cut(np.array([1.0, 0.0, 0.0]), 1e-4)])
@@ -202,7 +203,7 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
 
 
 def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
-    """Biceps, elbow and wrist from planes across the arm."""
+    """Return biceps, elbow and wrist from planes across the arm."""
     points, triangles = slicer.vertices, slicer.triangles
     middle = hole.mean(axis=0)
     normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
@@ -243,15 +244,11 @@ def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
 def _beyond(
     points: FloatArray, triangles: NDArray[np.int64], normal: FloatArray, offset: float, near: FloatArray
 ) -> FloatArray:
-    """The vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
+    """Return the vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
     outside = points @ normal > offset
     kept = triangles[outside[triangles].all(axis=1)]
     ends = np.concatenate([kept[:, :2], kept[:, 1:]])
-    n = len(points)
-    _, label = connected_components(coo_matrix((np.ones(len(ends)), (ends[:, 0], ends[:, 1])), (n, n)), directed=False)
+    label = join_labels(len(points), ends[:, 0], ends[:, 1])
     used = np.unique(kept)
     if not len(used):
         raise InputError("scan: nothing lies beyond the armhole; arms are missing")

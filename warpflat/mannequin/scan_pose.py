@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
@@ -39,7 +40,7 @@ _Part: TypeAlias = tuple[float, FloatArray]
 
 @dataclass(frozen=True, kw_only=True)
 class ScanOptions:
-    """What the user knows about a scan; values left at None are found from the body's shape.
+    """Known properties of a scan; values left at None are found from the body's shape.
 
     Attributes:
         unit: ``m``, ``dm``, ``cm``, ``mm`` or ``in``.
@@ -103,9 +104,6 @@ class Slicer:
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
         """Return the connected parts of the section where normal . x = offset, longest first."""
-        from scipy.sparse import coo_matrix
-        from scipy.sparse.csgraph import connected_components
-
         d = self.vertices @ normal - offset
         d = np.where(d == 0.0, 1e-12, d)
         crossing = (d[self.edges[:, 0]] > 0) != (d[self.edges[:, 1]] > 0)
@@ -123,11 +121,8 @@ class Slicer:
         a, b = self.edges[used].T
         t = (d[a] / (d[a] - d[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
-        graph = coo_matrix((np.ones(len(local)), (local[:, 0], local[:, 1])), (len(used), len(used)))
-        count, label = connected_components(graph, directed=False)
-        length = np.bincount(
-            label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1), minlength=count
-        )
+        label = join_labels(len(used), local[:, 0], local[:, 1])
+        length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
         parts = [Slice(points=points[label == i], length=float(length[i])) for i in np.argsort(-length)]
         return [p for p in parts if len(p.points) > 3]
 
@@ -146,7 +141,7 @@ def upright(
         Vertices (#W by 3 [m], welded), triangles (#T by 3), and notes of what was found, one sentence each.
 
     Raises:
-        InputError: if the mesh is no body that stands on two legs, or its facing cannot be told.
+        InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
     points, triangles = _welded(vertices, faces)
@@ -169,7 +164,7 @@ def upright(
             f"scan: {size:.3g} m tall if its unit is {unit}: a body is {_STATURE[0]} to {_STATURE[1]} m tall"
         )
     if options.unit is None and unit != "m":
-        notes.append(f"the scan's unit was told from its height of {height:.4g}: {unit}")
+        notes.append(f"the scan's unit was found from its height of {height:.4g}: {unit}")
     if up_name != "+y":
         notes.append(f"the scan's head was found towards {up_name}")
     left = sideways - up * (sideways @ up)

@@ -14,7 +14,7 @@ __all__ = ["sheet_laplacian"]
 
 
 def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
-    """The umbrella operator of the sheet.
+    """Return the umbrella operator of the sheet.
 
     Args:
         layout: the grid.

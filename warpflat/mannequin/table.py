@@ -1,4 +1,4 @@
-"""The `[mannequin]` table of a scene file, and the mannequin it asks for."""
+"""The `[mannequin]` table of a scene file, and the mannequin that it describes."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ class MannequinTable(Table):
 
     @property
     def size_name(self) -> str:
-        """What patterns call the body's size."""
+        """The name of the body's size on patterns."""
         if self.measurements is None and self.size is not None:
             return self.size
         return f"{self.size or ''} {MADE_TO_MEASURE}".strip()
 
 
 def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path]) -> Mannequin:
-    """The mannequin of a scene's table.
+    """Return the mannequin of a scene's table.
 
     Args:
         table: checked.
@@ -89,7 +89,7 @@ def mannequin_from_table(table: MannequinTable, *, path_of: Callable[[str], Path
 
 
 def mannequin_from_scan_file(path: Path, *, options: ScanOptions, resolution_mm: float) -> Mannequin:
-    """The mannequin on a body scan in a mesh file.
+    """Return the mannequin on a body scan in a mesh file.
 
     Raises:
         InputError: the file cannot be read as a mesh, or the mesh is no standing body.

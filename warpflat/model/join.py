@@ -12,7 +12,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, SpringsAround
 from warpflat.surface.cells import CellArrays
 from warpflat.surface.mesh import Surface
-from warpflat.surface.unfold import ByVertex
+from warpflat.surface.unfold import VertexLists
 
 __all__ = ["join_networks", "join_surfaces"]
 
@@ -109,7 +109,7 @@ def _join_cells(networks: Sequence[SpringNetwork], vertex: IntArray) -> CellArra
         ),
         first=np.concatenate([c.first + at for c, at in zip(cells, cell, strict=False)]),
         laid=np.concatenate([c.laid for c in cells]),
-        around=ByVertex(
+        around=VertexLists(
             offset=_join_offsets([a.offset for a in around]),
             entry=np.concatenate([a.entry + 4 * at for a, at in zip(around, face, strict=False)]),
         ),

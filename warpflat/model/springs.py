@@ -31,7 +31,7 @@ from warpflat.kernels.stiffness import (
 from warpflat.surface.cells import CellArrays, cells_of, creases_of, first_of_faces
 from warpflat.surface.half_edges import half_edges, half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
-from warpflat.surface.row_by_row import RowByRow, row_by_row
+from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
 from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 
 __all__ = [
@@ -72,16 +72,16 @@ class SpringsAround:
 
     offset: IntArray
     neighbor: IntArray
-    numbering: Callable[[], IntArray] | RowByRow
+    numbering: Callable[[], IntArray] | RowMajorGrid
 
     @property
     def entry(self) -> IntArray:
         """2 #S, the springs' numbers, mesh edges first."""
-        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowByRow) else self._kept
+        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowMajorGrid) else self._kept
 
     @cached_property
     def _kept(self) -> IntArray:
-        assert not isinstance(self.numbering, RowByRow)
+        assert not isinstance(self.numbering, RowMajorGrid)
         return self.numbering()
 
     def forget_numbers(self) -> None:
@@ -90,7 +90,7 @@ class SpringsAround:
 
     def listed(self, values: FloatArray) -> FloatArray:
         """2 #S, the springs' values (#S) at both of their ends."""
-        if isinstance(self.numbering, RowByRow):
+        if isinstance(self.numbering, RowMajorGrid):
             return self.numbering.listed(self.offset, values)
         listed = np.empty(len(self.neighbor))
         given = [self._kept, np.ascontiguousarray(values, dtype=np.float64)]
@@ -253,7 +253,7 @@ def springs_of(
 
 def _listed_stiffness(surface: Surface, own: _Unweighed, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
     """2 #S [N/m], from what faces give to the springs along their sides (#H) and, quads, to both diagonals (#Q)."""
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     if numbered is not None:
         return numbered.listed_stiffness(own.around.offset, of_side, diagonal)
     at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
@@ -319,7 +319,7 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 @once_per_surface
 def unweighed_springs(surface: Surface) -> _Unweighed:
     """What no fabric changes of a surface's springs, worked out once."""
-    vertices, around, numbered = surface.vertices, _springs_around(surface), row_by_row(surface)
+    vertices, around, numbered = surface.vertices, _springs_around(surface), row_major_grid(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
     if numbered is not None:
         lengths = numbered.listed_lengths(around.offset, vertices, diagonal)
@@ -334,7 +334,7 @@ def unweighed_springs(surface: Surface) -> _Unweighed:
 @once_per_faces
 def _springs_around(surface: Surface) -> SpringsAround:
     """The springs around each vertex, edges first, then diagonals."""
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     if numbered is not None:
         offset, neighbor = numbered.neighbors_around()
         return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))

@@ -1,7 +1,7 @@
-"""Seams that a maker names on one surface: two stretches of its border, found, checked and brought into correspondence.
+"""Seams between two named lines on the border of one surface: found, checked and matched vertex by vertex.
 
-Their vertices need not agree. Where both sides share them, or have as many at the same shares of their length, they are sewn
-edge by edge; otherwise by arc length: each vertex of the side with fewer is matched to the nearest of the other, and between
+The vertices of the two sides need not agree. Sides with equal numbers of vertices at equal shares of their length are sewn edge
+by edge. Otherwise each vertex of the side with fewer is matched by arc length to the nearest of the other side, and between
 two such joints both sides stretch evenly.
 """
 
@@ -32,13 +32,13 @@ _SAME_SHARE = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class NamedSeam:
-    """That two lines along the border of a surface are sewn together.
+    """A wish that two lines along the border of a surface be sewn together.
 
     Attributes:
-        name: the seam's.
+        name: of the seam.
         sides: the two lines, by name.
         factor: length of the longer side over that of the other: 1.02 for an ease of 2 %.
-        gathered: the fullness falls on through the piece; otherwise it is eased in near the seam.
+        gathered: true if the fullness continues through the piece; false if it is eased in near the seam.
         longer: the side that is longer, 0 or 1.
     """
 
@@ -50,7 +50,7 @@ class NamedSeam:
 
     @property
     def ease(self) -> float:
-        """By how much the second side is longer, as a share of the first."""
+        """The surplus length of the second side, as a share of the first."""
         return self.factor - 1.0 if self.longer == 1 else 1.0 / self.factor - 1.0
 
 
@@ -59,9 +59,9 @@ class SurfaceSeam:
     """A named seam on a mesh.
 
     Attributes:
-        named: what was asked.
+        named: the wish.
         vertices: of both sides, in corresponding order.
-        joints: #J by 2, places in the two rows that are sewn to each other; None where all are, one to one.
+        joints: #J by 2, positions in the two rows that are sewn to each other; None if all are, one to one.
     """
 
     named: NamedSeam
@@ -70,11 +70,11 @@ class SurfaceSeam:
 
 
 def surface_seams(surface: Surface, named: Sequence[NamedSeam]) -> tuple[SurfaceSeam, ...]:
-    """Look named seams up on a surface.
+    """Find named seams on a surface.
 
     Args:
         surface: whole or cut, with the lines that the seams name.
-        named: what is sewn to what.
+        named: the seams.
 
     Raises:
         InputError: a line is unknown (names the nearest), closed, parted by a cut or not on the border, or the two do not
@@ -93,7 +93,7 @@ def surface_seams(surface: Surface, named: Sequence[NamedSeam]) -> tuple[Surface
 
 
 def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
-    """The line's vertices as the border runs, the surface to its left."""
+    """Return the line's vertices in the direction of the border, with the surface to its left."""
     if line not in surface.lines:
         raise InputError(f"unknown line {line!r}; {nearest(line, surface.lines)}")
     ids = np.asarray(surface.lines[line], dtype=np.int32)
@@ -109,6 +109,7 @@ def _side(surface: Surface, along: set[tuple[int, int]], line: str) -> IntArray:
 
 
 def _sewn(surface: Surface, seam: NamedSeam, first: IntArray, second: IntArray) -> SurfaceSeam:
+    """Check that two sides fit each other, and match their vertices."""
     if len(np.intersect1d(first, second)) > 1:
         raise InputError(f"lines {seam.sides[0]!r} and {seam.sides[1]!r} overlap; a side is sewn to another one")
     one, other = surface.vertices[first], surface.vertices[second]
@@ -131,7 +132,11 @@ def _sewn(surface: Surface, seam: NamedSeam, first: IntArray, second: IntArray) 
 
 
 def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
-    """Places in both rows that are sewn to each other, from their shares of the length; None if all are, one to one."""
+    """Match two rows of vertices by their shares of the length (#P each).
+
+    Returns:
+        #J by 2, positions in both rows that are sewn to each other; None if all are, one to one.
+    """
     if len(first) == len(second) and np.abs(first - second).max() <= _SAME_SHARE * np.diff(first).min():
         return None
     swapped = len(first) > len(second)
@@ -147,9 +152,10 @@ def _joints(first: FloatArray, second: FloatArray) -> IntArray | None:
 
 
 def _apart(one: FloatArray, other: FloatArray) -> float:
-    """Largest distance [m] of a vertex of either polyline from the other one."""
-    return max(_strays(one, other), _strays(other, one))
+    """Return the largest distance [m] of a vertex of either polyline from the other polyline."""
+    return max(_largest_distance(one, other), _largest_distance(other, one))
 
 
-def _strays(points: FloatArray, line: FloatArray) -> float:
+def _largest_distance(points: FloatArray, line: FloatArray) -> float:
+    """Return the largest distance [m] of some points from a polyline."""
     return float(project_on_segments(points[:, None], line[:-1], line[1:])[1].min(axis=1).max())

@@ -1,5 +1,4 @@
-"""The cells of a surface: triangles (a quad gives its four corner triangles) laid flat, on which the cloth is compared with the
-body."""
+"""The cells of a surface: its triangles and the four corner triangles of its quads, each laid flat."""
 
 from __future__ import annotations
 
@@ -13,16 +12,16 @@ from warpflat.core.launch import launch_each
 from warpflat.kernels.cells import find_least_shares
 from warpflat.kernels.unfold import add_areas
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.mesh import Surface, once_per_surface, read_only, tell
+from warpflat.surface.mesh import Surface, once_per_surface, read_only, store_results
 from warpflat.surface.triangles import corner_triangles
-from warpflat.surface.unfold import ByVertex, corners_of, lay_cells, quad_creases
+from warpflat.surface.unfold import VertexLists, corners_of, lay_cells, quad_creases
 
 __all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class CellArrays:
-    """The cells, face by face (see `kernels.cells`).
+    """The cells, face by face (see `kernels.cells`): the cloth in the plane is compared with them.
 
     Attributes:
         faces: #F by 4, -1 in the last column of a triangle.
@@ -34,9 +33,9 @@ class CellArrays:
     faces: IntArray
     first: IntArray
     laid: FloatArray
-    around: ByVertex
+    around: VertexLists
 
-    # Seldom asked for, and not kept: they take as much memory as what a relaxation needs of the cells.
+    # The arrays below are seldom used and not kept: they take as much memory as those a relaxation needs.
 
     @property
     def of_face(self) -> IntArray:
@@ -54,7 +53,7 @@ class CellArrays:
 
     @property
     def face(self) -> IntArray:
-        """#C, the face of each."""
+        """#C, the face of each cell."""
         return self._corners[1]
 
     @property
@@ -76,14 +75,14 @@ class CellArrays:
 
     @property
     def vertex_areas(self) -> FloatArray:
-        """#V [m2], a third of each cell's share of the cloth at each of its corners."""
+        """#V, the area of each vertex [m2]: a third of the weighted area of each cell at it."""
         around, total = self.around, np.empty(len(self.around.offset) - 1)
         given = [self.faces, self.first, self.laid, around.offset, around.entry]
         launch_each(add_areas, len(total), given, [total])
         return total
 
     def least_shares(self, positions: FloatArray) -> FloatArray:
-        """#F, signed area in a layout (#V by 2 [m]) over that on the body, the least of each face's cells."""
+        """Return #F, the signed area in a layout (#V by 2 [m]) over that on the body, the least of each face's cells."""
         share = np.empty(len(self.faces))
         given = [np.ascontiguousarray(positions, dtype=np.float64), self.faces, self.first, self.laid]
         launch_each(find_least_shares, len(share), given, [share])
@@ -92,7 +91,7 @@ class CellArrays:
 
 @once_per_surface
 def creases_of(surface: Surface) -> NDArray[np.int8]:
-    """#F, as `quad_creases` has it, worked out once."""
+    """Return #F, the diagonal along which each quad is creased (see `quad_creases`), computed once per surface."""
     if not surface.is_quad.any():
         return quad_creases(surface.vertices, surface.faces)
     around = corners_of(surface)
@@ -103,20 +102,20 @@ def creases_of(surface: Surface) -> NDArray[np.int8]:
 
 @once_per_surface
 def cells_of(surface: Surface) -> CellArrays:
-    """The surface's cells, each laid flat; the four of a creased quad come from the one quad that it unfolds into."""
+    """Return the cells of a surface, computed once. The four cells of a creased quad come from the quad that it unfolds into."""
     faces, first = surface.faces, first_of_faces(surface, 4, 1)
     laid = lay_cells(surface.vertices, faces, creases_of(surface), first)
     return read_only(CellArrays(faces=faces, first=first, laid=laid, around=corners_of(surface)))
 
 
 def inherit_cells(surface: Surface, whole: Surface) -> None:
-    """Let a surface that a cut has made of another have its creases and cells: no face has moved, or has another place in their order."""
+    """Store the creases and cells of a surface for the one that a cut has made of it: the cut moves no face and keeps their order."""
     cells = replace(cells_of(whole), faces=surface.faces, around=corners_of(surface))
-    tell(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
+    store_results(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
 
 
 def first_of_faces(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:
-    """#F, the first of each face's cells or sides, where a quad and a triangle have so many."""
+    """Return #F, the number of each face's first item, where a quad has `of_quad` items and a triangle `of_triangle`."""
     is_quad = surface.is_quad
     if is_quad.all():
         return np.arange(0, of_quad * len(is_quad), of_quad, dtype=np.int32)

@@ -22,7 +22,7 @@ from warpflat.surface.half_edges import (
     read_only_view,
 )
 from warpflat.surface.mesh import Surface, once_per_faces
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = [
     "border_loops",
@@ -156,7 +156,7 @@ def border_loops(faces: ArrayLike, vertices: FloatArray | None = None) -> list[I
 
 def border_of(surface: Surface) -> IntArray:
     """Return the vertices on a surface's border, sorted."""
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     return _on_border(half_edges_of(surface)) if numbered is None else numbered.border
 
 

@@ -23,11 +23,11 @@ _BLOCK = 32_768
 
 @once_per_surface
 def curvature_tensors(surface: Surface) -> FloatArray:
-    """Second fundamental form at each vertex, as a tensor in space: d . II . d is the curvature along a unit tangent d.
+    """Return the second fundamental form at each vertex, a tensor in space: d . II . d is the curvature along a unit tangent d.
 
     Positive where the surface bulges to the outside. Around each vertex, normal and curvature are fitted to two rings of
-    neighbours: a point at d from the vertex lies 1/2 |d|^2 k(direction) below the tangent plane. On a circle that is
-    exact for any chord, so spheres and cylinders come out exact, at the border too. A vertex with fewer than five
+    neighbours: a point at d from the vertex lies 1/2 |d|^2 k(direction) below the tangent plane. This is exact for any chord
+    of a circle, so spheres and cylinders come out exact, at the border too. A vertex with fewer than five
     neighbours within two rings counts as flat.
 
     Args:
@@ -48,7 +48,7 @@ def curvature_tensors(surface: Surface) -> FloatArray:
 
 
 def _ring(surface: Surface) -> csr_matrix:
-    """#V by #V, 1 where two vertices share a face."""
+    """Return #V by #V, 1 where two vertices share a face."""
     from scipy.sparse import coo_matrix
 
     faces, count = surface.faces, len(surface.vertices)

@@ -1,4 +1,4 @@
-"""Where the strain energy stays: from joules per face to a map, totals per region and line, and the peak in words."""
+"""Maps of the strain energy: its density at vertices, totals per region and line, and its peak, described in words."""
 
 from __future__ import annotations
 
@@ -30,9 +30,9 @@ __all__ = [
     "smooth_to_vertices",
 ]
 
-# How nearly heat is conserved, and after how many iterations it is solved for directly: slivers may take that.
-_EXACT = 1e-12
-_PATIENCE = 1000
+# Relative tolerance of the diffusion, and the number of iterations after which it is solved directly, as slivers may need.
+_TOLERANCE = 1e-12
+_MOST_ITERATIONS = 1000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -44,7 +44,7 @@ class LineEnergy:
         integral: of the density along the line [J/m]: what a strip around it holds per metre of its width.
         mean: integral / length [J/m2]; of a line without length, the mean of its vertices.
         peak: the highest density on the line [J/m2].
-        peak_vertex: where that is.
+        peak_vertex: the vertex with that density.
     """
 
     length: float
@@ -105,7 +105,7 @@ def energy_map(
     smoothing_length: float = 0.0,
     up: ArrayLike = (0.0, 1.0, 0.0),
 ) -> EnergyMap:
-    """Everything about where the energy of a piece lies.
+    """Map the energy of a piece: smoothed density, totals, and its peak.
 
     Args:
         surface: the surface the density belongs to.
@@ -133,7 +133,7 @@ def energy_map(
 def energy_report(
     surface: Surface, face_energy: ArrayLike, *, regions: Mapping[str, ArrayLike] | None = None
 ) -> dict[str, Any]:
-    """Where the energy of a piece lies, as in `metrics.json`.
+    """Describe the energy distribution of a piece, as in `metrics.json`.
 
     Args:
         surface: the surface the energies belong to.
@@ -160,12 +160,12 @@ def energy_report(
 
 
 def smooth_to_vertices(surface: Surface, face_density: ArrayLike, *, smoothing_length: float = 0.0) -> FloatArray:
-    """Energy density at the vertices, with the same total energy.
+    """Return the energy density at the vertices, with the same total energy.
 
-    Each face hands its energy to its corners in equal parts, each vertex has the same parts of its faces' areas.
-    A smoothing length then spreads the energy over the surface as heat would spread: (M + l^2/2 L) d' = M d, with M the
-    vertex areas and L the cotangent stiffness, one implicit step. That takes out what depends on the mesh, slivers
-    above all, and neither makes nor loses energy, since the columns of L sum to zero.
+    Each face gives its energy and its area to its corners in equal parts.
+    A smoothing length then spreads the energy over the surface as heat spreads: (M + l^2/2 L) d' = M d, with M the
+    vertex areas and L the cotangent stiffness, one implicit step. This removes differences that depend on the mesh, on slivers
+    above all, and conserves the energy, since the columns of L sum to zero.
 
     Args:
         surface: the surface.
@@ -197,10 +197,10 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
 
     triangles, _, weight = corner_triangles(surface.faces)
     triangle_area, product = _measured(surface, triangles)
-    # Negative cotangents of obtuse corners could make densities negative, those of slivers are rounding noise:
-    # without them spreading is a little slower there and still conserves energy.
+    # Negative cotangents of obtuse corners could make densities negative, and those of slivers are rounding noise.
+    # Without them the diffusion is a little slower there and still conserves energy.
     product = np.maximum(product, 0.0)
-    # A corner of less than 0.001 rad counts as one of that: it joins its neighbours as good as rigidly anyway.
+    # A corner below 0.001 rad counts as 0.001 rad: it couples its neighbours almost rigidly anyway.
     cotangent = product / np.maximum(2.0 * triangle_area[:, None], 1e-3 * product + np.finfo(float).tiny)
     half = 0.25 * length**2 * weight[:, None] * cotangent
     count = len(surface.vertices)
@@ -211,10 +211,15 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
     used = np.flatnonzero(area > 0)
     if len(used) < count:
         system = system[used][:, used]
-    # Heat does not come far in one step: a few dozen iterations, where a factor would grow faster than the mesh.
+    # Heat does not spread far in one step, so a few dozen iterations suffice, where a factorisation would grow faster than the mesh.
     first = energy[used] / area[used]
     solved, left = cg(
-        system, energy[used], x0=first, rtol=_EXACT, maxiter=_PATIENCE, M=diags_array(1.0 / system.diagonal())
+        system,
+        energy[used],
+        x0=first,
+        rtol=_TOLERANCE,
+        maxiter=_MOST_ITERATIONS,
+        M=diags_array(1.0 / system.diagonal()),
     )
     smooth = np.zeros(count)
     smooth[used] = solved if left == 0 else spsolve(system.tocsc(), energy[used])
@@ -222,7 +227,7 @@ def _diffused(surface: Surface, area: FloatArray, energy: FloatArray, length: fl
 
 
 def integrate_faces(surface: Surface, face_density: ArrayLike, regions: Mapping[str, ArrayLike]) -> dict[str, float]:
-    """The energy of named face sets [J].
+    """Return the energy of named face sets [J].
 
     Args:
         surface: the surface.
@@ -246,7 +251,7 @@ def integrate_faces(surface: Surface, face_density: ArrayLike, regions: Mapping[
 
 
 def integrate_along(surface: Surface, vertex_density: ArrayLike, line: ArrayLike) -> LineEnergy:
-    """The energy density along a line of vertices, taken as linear between them.
+    """Integrate the energy density along a line of vertices, linear between them.
 
     Args:
         surface: the surface.
@@ -281,7 +286,7 @@ def energy_peak(
     landmarks: Mapping[str, ArrayLike | int] | None = None,
     up: ArrayLike = (0.0, 1.0, 0.0),
 ) -> EnergyPeak:
-    """The vertex of highest density and where it lies to the nearest lines and the nearest landmark.
+    """Return the vertex of highest density, and its place relative to the nearest lines and the nearest landmark.
 
     Distances are straight in space: near a line that is what a tape measures to less than a millimetre.
 
@@ -299,14 +304,14 @@ def energy_peak(
 
 
 def place_in_words(surface: Surface, vertex: int) -> str:
-    """Where a vertex is, as a sentence for a pattern maker."""
+    """Describe the place of a vertex as a sentence for a pattern maker."""
     return _place(surface, vertex, 0.0, {}, (0.0, 1.0, 0.0)).words
 
 
 def _place(
     surface: Surface, vertex: int, density: float, landmarks: Mapping[str, ArrayLike | int], up: ArrayLike
 ) -> EnergyPeak:
-    """Where a vertex of this density lies."""
+    """Return the place of a vertex with its density."""
     here = surface.vertices[vertex]
     upwards = np.asarray(up, dtype=float)
     norm = np.linalg.norm(upwards)
@@ -334,7 +339,7 @@ def _in_words(
     landmarks: Mapping[str, float],
     up: FloatArray,
 ) -> str:
-    """Such as "4 mm above bust line, 12 mm from princess front; 13 mm from bust point"."""
+    """Return words such as "4 mm above bust line, 12 mm from princess front; 13 mm from bust point"."""
     phrases = []
     for name, distance in list(lines.items())[:2]:
         if distance < 1e-3:
@@ -372,7 +377,7 @@ def _landmark(surface: Surface, name: str, place: ArrayLike | int) -> FloatArray
 
 @once_per_surface
 def _face_areas(surface: Surface) -> FloatArray:
-    """#F [m2]; a quad's is the mean of both ways of splitting it."""
+    """Return #F, the areas of faces [m2]; that of a quad is the mean of both ways of splitting it."""
     triangles, face, weight = corner_triangles(surface.faces)
     area, _ = _measured(surface, triangles)
     total = np.bincount(face, weights=weight * area, minlength=len(surface.faces)).astype(np.float64)
@@ -381,7 +386,7 @@ def _face_areas(surface: Surface) -> FloatArray:
 
 
 def _measured(surface: Surface, triangles: IntArray) -> tuple[FloatArray, FloatArray]:
-    """Of triangles (#T by 3 vertices): areas, and at each corner the product of the edges that leave it [m2]."""
+    """Return the areas of triangles (#T by 3 vertices), and at each corner the scalar product of the edges that leave it [m2]."""
     area, product = np.empty(len(triangles)), np.empty((len(triangles), 3))
     launch_each(measure_triangles, len(triangles), [surface.vertices, triangles], [area, product])
     return area, product

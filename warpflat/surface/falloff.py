@@ -1,4 +1,4 @@
-"""Values that are given along a few lines of a mesh and fade out between them."""
+"""Values given along a few lines of a mesh, interpolated harmonically in between."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ __all__ = ["falloff_weights"]
 def falloff_weights(
     faces: IntArray, given: Sequence[tuple[IntArray, FloatArray]], stops: Sequence[IntArray], count: int
 ) -> FloatArray:
-    """Values given at some vertices, spread evenly over a mesh.
+    """Interpolate values given at some vertices over a mesh.
 
     Args:
         faces: #F by 4, -1 last in a triangle.

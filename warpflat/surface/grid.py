@@ -1,4 +1,4 @@
-"""Quads in rows and columns: rectangles, and any other piece that lies on a lattice, with concave corners, holes and cracks."""
+"""Quad meshes on a lattice of rows and columns: rectangles, and pieces with concave corners, holes and cracks."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from warpflat.kernels.grid_lists import number_faces
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.half_edges import half_edges_of, twins_of
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_by_row import RowByRow, row_by_row
+from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
 
 __all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
 
 
-# A rectangle around a piece may have so many times its places to be counted one by one.
+# Lattice places, per face, up to which the faces at each place are counted in an array.
 _DENSE = 8
 
 
 @dataclass(frozen=True, kw_only=True)
 class Lattice:
-    """A quad mesh of which every inner vertex has four faces, on a lattice.
+    """The rows and columns of a quad mesh whose inner vertices all have four faces.
 
     Attributes:
-        row, column: #V, from 0; the two sides of a crack lie at the same.
+        row, column: #V, from 0; both sides of a crack have the same.
         corner: #F by 4, vertices: below left, below right, above right, above left.
-        bends: #V, where the border turns: at corners and at the tips of cracks.
+        bends: #V, true where the border turns: at corners and at the tips of cracks.
     """
 
     row: IntArray
@@ -38,25 +38,31 @@ class Lattice:
 
     @property
     def face_row(self) -> IntArray:
-        """#F, of the corner below and to the left."""
+        """#F, the row of each face's corner below and to the left."""
         return self.row[self.corner[:, 0]]
 
     @property
     def face_column(self) -> IntArray:
-        """#F, likewise."""
+        """#F, the column of each face's corner below and to the left."""
         return self.column[self.corner[:, 0]]
 
 
 @once_per_faces
 def lattice_of(surface: Surface) -> Lattice | None:
-    """Rows and columns of a mesh, None where it has none: triangles, inner vertices of three or five faces, tubes, or a piece that
-    overlaps itself on the lattice. Along its first face's first side columns count up, along the second rows."""
+    """Return the rows and columns of a mesh, computed once per array of faces.
+
+    Columns count up along the first side of the first face, rows along its second side.
+
+    Returns:
+        None for a mesh that has none: one with triangles or inner vertices of three or five faces, a tube, or a piece that
+        overlaps itself on the lattice.
+    """
     faces, count = surface.faces, len(surface.vertices)
     if not surface.is_quad.all():
         return None
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     if numbered is not None:
-        return _of_numbers(faces, numbered)
+        return _from_numbers(faces, numbered)
     he = half_edges_of(surface)
     twin = twins_of(he).astype(np.int32)
     place, queue = (
@@ -84,8 +90,8 @@ def lattice_of(surface: Surface) -> Lattice | None:
     return read_only(Lattice(row=row, column=column, corner=corner, bends=_bends(surface)))
 
 
-def _of_numbers(faces: IntArray, numbered: RowByRow) -> Lattice:
-    """Of a grid that is numbered row by row, without a walk over it."""
+def _from_numbers(faces: IntArray, numbered: RowMajorGrid) -> Lattice:
+    """Return the lattice of a row-major grid, which follows from the vertex numbers."""
     place = np.array([divmod(at, 2) for at in numbered.place])
     to_right, up = place[1] - place[0], place[2] - place[1]
     i, j = np.divmod(numbered.vertices.ravel(), np.int32(numbered.columns))
@@ -97,7 +103,9 @@ def _of_numbers(faces: IntArray, numbered: RowByRow) -> Lattice:
 
 
 def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice | None:
-    """`lattice_of` a surface that a cut has made of another and left in one piece: no vertex or face has moved.
+    """Return the lattice of a surface that a cut has made of another and left in one piece.
+
+    It follows from the lattice before the cut, as no vertex or face has moved.
 
     Args:
         surface: with the faces of `whole`, in their order.
@@ -108,7 +116,7 @@ def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice |
     if lattice is None:
         return None
     corner = surface.faces
-    # Of a grid that is numbered row by row they are in this order already.
+    # In a row-major grid they are in this order already.
     if lattice.corner is not whole.faces:
         slot = np.argmax(whole.faces == lattice.corner[:, :1], axis=1)
         corner = np.take_along_axis(corner, (slot[:, None] + np.arange(4)) % 4, axis=1)
@@ -117,7 +125,7 @@ def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice |
 
 
 def _bends(surface: Surface) -> BoolArray:
-    """#V, where the border turns."""
+    """Return #V, true where the border turns."""
     count = len(surface.vertices)
     on_border = np.zeros(count, dtype=bool)
     on_border[border_of(surface)] = True
@@ -126,8 +134,8 @@ def _bends(surface: Surface) -> BoolArray:
 
 @once_per_faces
 def rows_and_columns(surface: Surface) -> IntArray | None:
-    """#rows by #columns vertices of a rectangular grid of quads, else None."""
-    numbered = row_by_row(surface)
+    """Return the vertices of a rectangular grid of quads, #rows by #columns; None for any other mesh."""
+    numbered = row_major_grid(surface)
     if numbered is not None:
         return numbered.vertices
     lattice = lattice_of(surface)

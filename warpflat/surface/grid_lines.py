@@ -1,4 +1,4 @@
-"""The rows and columns of a piece's quads, along which steps go in a soft cloth (`warpflat.kernels.line_solve`)."""
+"""The rows and columns of a piece's quads: the lines of the line smoother (`warpflat.kernels.line_solve`)."""
 
 from __future__ import annotations
 
@@ -19,7 +19,13 @@ __all__ = ["LineArrays", "join_lines", "lines_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class LineArrays:
-    """As `kernels.thread_lines.ThreadLines` has them: `offset` #L+1, `vertex` 2 #V, and how many of the lines are `rows`."""
+    """Lines of vertices along rows and columns.
+
+    Attributes:
+        offset: #L+1, the place in `vertex` where each line begins.
+        vertex: 2 #V, the vertices of the rows, then those of the columns.
+        rows: number of lines that are rows.
+    """
 
     offset: IntArray
     vertex: IntArray
@@ -28,7 +34,7 @@ class LineArrays:
 
 @once_per_faces
 def lines_of(surface: Surface) -> LineArrays | None:
-    """The rows and columns of quads on a lattice, ended where the border or a crack ends them; None of any other surface."""
+    """Return the rows and columns of quads on a lattice, from border (or crack) to border; None for any other surface."""
     grid = rows_and_columns(surface)
     if grid is not None:
         height, width = grid.shape
@@ -52,7 +58,7 @@ def _listed(counts: NDArray[np.integer], vertex: Sequence[IntArray], rows: int) 
 
 
 def _chains(edges: IntArray, line: IntArray, place: IntArray) -> tuple[NDArray[np.integer], IntArray]:
-    """Lengths of the chains of edges along lines of a lattice, and their vertices one after the other."""
+    """Return the number of vertices in each chain of edges along lines of a lattice, and these vertices, chain by chain."""
     a, b = edges[line[edges[:, 0]] == line[edges[:, 1]]].T
     back = place[a] > place[b]
     ends = np.where(back, b, a), np.where(back, a, b)
@@ -65,8 +71,17 @@ def _chains(edges: IntArray, line: IntArray, place: IntArray) -> tuple[NDArray[n
 
 
 def join_lines(parts: Sequence[LineArrays | None], counts: Sequence[int]) -> LineArrays | None:
-    """The lines of several pieces of so many vertices side by side; None where none has any. Each vertex of a piece without lines is a
-    line of its own: along that a step leads nowhere."""
+    """Join the lines of several pieces into one set.
+
+    Each vertex of a piece without lines becomes a line of its own, along which nothing moves.
+
+    Args:
+        parts: the lines of each piece, or None.
+        counts: number of vertices of each piece.
+
+    Returns:
+        The lines of all pieces; None if no piece has lines.
+    """
     if all(part is None for part in parts):
         return None
     lengths: tuple[list[NDArray[np.integer]], list[NDArray[np.integer]]] = ([], [])

@@ -17,7 +17,7 @@ from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.sorting import sort_with_order, stable_argsort
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = [
     "HalfEdges",
@@ -112,7 +112,7 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
 @once_per_faces
 def half_edges_of(surface: Surface) -> HalfEdges:
     """Return the half-edges of a surface's faces, computed once per array of faces."""
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     if numbered is None:
         return read_only(half_edges(surface.faces))
     edge, edges, count = numbered.edges()

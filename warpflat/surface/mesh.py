@@ -13,7 +13,16 @@ import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 
-__all__ = ["Surface", "forget", "is_large", "known_of_faces", "once_per_faces", "once_per_surface", "read_only", "tell"]
+__all__ = [
+    "Surface",
+    "drop_result",
+    "face_results",
+    "is_large",
+    "once_per_faces",
+    "once_per_surface",
+    "read_only",
+    "store_results",
+]
 
 Result = TypeVar("Result")
 
@@ -24,18 +33,18 @@ _UNKNOWN: Any = object()
 class Surface:
     """One piece of surface in space, checked and ready to be flattened.
 
-    Made by :func:`warpflat.make_surface`, which validates and mends; nothing checks it again.
+    Made by :func:`warpflat.make_surface`, which repairs and checks it; nothing checks it again.
 
     Attributes:
         vertices: #V by 3, positions [m], float64.
         faces: #F by 4, vertex indices, int32, consistently wound; a triangle has -1 in its last column.
         lines: feature lines by name: vertex indices along mesh edges, int32; a closed line repeats its first vertex.
-        name: what the piece is called in files and messages.
+        name: of the piece, in files and messages.
         input_vertices: #I by 3, positions [m] as they were read, in their order, for files that refer to it.
         input_index: #V, for each vertex its row in `input_vertices`.
-        notes: what was mended on the way in, one sentence each.
-        sources: files from which it was read; none of them is ever replaced by its own results.
-        of_faces: what has been worked out of the faces (see `once_per_faces`).
+        notes: repairs made when it was read, one sentence each.
+        sources: files from which it was read; its own results never replace them.
+        of_faces: results of functions of the faces alone (see `once_per_faces`).
     """
 
     vertices: FloatArray
@@ -49,7 +58,7 @@ class Surface:
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
     def __getstate__(self) -> dict[str, Any]:
-        """Without what can be worked out again."""
+        """Return the state to pickle, without results that can be computed again."""
         return {**vars(self), "of_faces": {}}
 
     @property
@@ -59,7 +68,7 @@ class Surface:
 
 
 def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
-    """A function of a surface, worked out once for each and kept as long as that lives; surfaces do not change."""
+    """Decorate a function of a surface: its result is computed once and kept as long as the surface lives. Surfaces do not change."""
     known: WeakKeyDictionary[Surface, Result] = WeakKeyDictionary()
     _known_of_surfaces[_name(measure)] = known
 
@@ -75,24 +84,26 @@ def once_per_surface(measure: Callable[[Surface], Result]) -> Callable[[Surface]
 _known_of_surfaces: dict[str, WeakKeyDictionary[Surface, Any]] = {}
 
 
-def tell(surface: Surface, results: Mapping[Callable[[Surface], Any], Any]) -> None:
-    """What functions `once_per_surface` would find out of a surface."""
+def store_results(surface: Surface, results: Mapping[Callable[[Surface], Any], Any]) -> None:
+    """Store the results that functions decorated with `once_per_surface` would compute of a surface."""
     for measure, result in results.items():
         _known_of_surfaces[_name(measure)][surface] = result
 
 
 def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], Result]:
-    """The same of what the places of the vertices do not change: a surface that was made from another by `dataclasses.replace`, with the
-    same array of faces, has its results too."""
+    """Decorate a function of a surface whose result does not depend on positions: it is computed once per array of faces.
+
+    A surface made from another by `dataclasses.replace`, with the same array of faces, shares its results.
+    """
     name = _name(measure)
 
     @wraps(measure)
     def remembered(surface: Surface) -> Result:
         known = surface.of_faces
         if known.get("faces") is not surface.faces:
-            known = known_of_faces(surface.faces)
+            known = face_results(surface.faces)
             object.__setattr__(surface, "of_faces", known)
-        # Asked for once: another thread may forget it.
+        # Read only once, as another thread may drop it.
         result: Result = known.get(name, _UNKNOWN)
         if result is _UNKNOWN:
             result = known[name] = measure(surface)
@@ -101,13 +112,13 @@ def once_per_faces(measure: Callable[[Surface], Result]) -> Callable[[Surface], 
     return remembered
 
 
-def forget(surface: Surface, measure: Callable[[Surface], Any]) -> None:
-    """Let go of what a function `once_per_faces` has worked out of a surface; it is worked out again when it is next asked for."""
+def drop_result(surface: Surface, measure: Callable[[Surface], Any]) -> None:
+    """Drop the kept result of a function decorated with `once_per_faces`; the next call computes it again."""
     surface.of_faces.pop(_name(measure), None)
 
 
-def known_of_faces(faces: IntArray, results: Mapping[Callable[[Surface], Any], Any] | None = None) -> dict[str, Any]:
-    """`Surface.of_faces` for surfaces that have these faces (#F by 4): what functions `once_per_faces` would find out of them."""
+def face_results(faces: IntArray, results: Mapping[Callable[[Surface], Any], Any] | None = None) -> dict[str, Any]:
+    """Make `Surface.of_faces` for surfaces with these faces (#F by 4) from results of functions decorated with `once_per_faces`."""
     return {"faces": faces} | {_name(measure): result for measure, result in (results or {}).items()}
 
 
@@ -116,17 +127,17 @@ def _name(measure: Callable[..., Any]) -> str:
 
 
 def read_only(arrays: Result) -> Result:
-    """The same object, its arrays not to be written to any more: what is kept for a surface is shared by all who ask for it."""
+    """Make the arrays of an object read-only and return it: kept results are shared."""
     for value in vars(arrays).values():
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
     return arrays
 
 
-# On the way to the relaxation of more triangles so much is freed that giving it back is worth a twentieth of the time.
-_MUCH_IS_FREED = 50_000
+# Vertices above which dropping intermediate results before the relaxation is worth the time it takes.
+_LARGE = 50_000
 
 
 def is_large(surface: Surface) -> bool:
-    """Whether what is worked out on the way to a piece's relaxation is worth to be let go of."""
-    return len(surface.vertices) > _MUCH_IS_FREED
+    """Return whether a surface is so large that intermediate results are dropped before its relaxation, to save memory."""
+    return len(surface.vertices) > _LARGE

@@ -1,4 +1,4 @@
-"""Where the cloth around a crack or a hole of a layout lies on itself."""
+"""Overlap of the cloth around a crack or a hole of a layout."""
 
 from __future__ import annotations
 
@@ -13,21 +13,21 @@ OVERLAP = 5e-4
 
 
 def overlap_width(ring: FloatArray) -> float:
-    """Width [m] of the widest place in which the cloth around a hole lies on itself; 0 if it does so nowhere.
+    """Return the width [m] of the widest place in which the cloth around a hole overlaps itself; 0 if it does not.
 
     Args:
         ring: #P by 2 [m], the border of the hole, closed, the first point not repeated, counter-clockwise.
     """
     import shapely
 
-    # Round a place that two sides reach across, the line runs the other way.
+    # The ring runs the other way around a cell that is covered twice.
     cells = shapely.get_parts(shapely.polygonize([shapely.node(shapely.LinearRing(ring))]))
     twice = [cell for cell in cells if _turns_around(ring, np.asarray(cell.representative_point().coords[0])) < 0]
     return max((2.0 * float(shapely.maximum_inscribed_circle(cell).length) for cell in twice), default=0.0)
 
 
 def overlapping(width: float) -> str:
-    """What is said of a cut whose sides lie over each other by so much [m]."""
+    """Return the message about a cut whose sides overlap by a width [m]."""
     return (
         f"overlaps by {width * 1e3:.1f} mm instead of gaping: there is no dart to sew; it needs more cloth there, "
         "not less"
@@ -35,7 +35,7 @@ def overlapping(width: float) -> str:
 
 
 def _turns_around(ring: FloatArray, point: FloatArray) -> int:
-    """How often a closed line runs round a point, counter-clockwise."""
+    """Return the winding number of a closed line about a point, counter-clockwise."""
     spoke = ring - point
     ahead = np.roll(spoke, -1, axis=0)
     cross = spoke[:, 0] * ahead[:, 1] - spoke[:, 1] * ahead[:, 0]

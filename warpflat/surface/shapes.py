@@ -25,7 +25,7 @@ _MAX_RESOLUTION = 2048
 
 
 def dome(*, size: float = 0.5, radius: float = 0.45, resolution: int = 33, triangles: bool = False) -> Surface:
-    """A square patch of a sphere: x and y within +-size/2, z = sqrt(radius^2 - x^2 - y^2).
+    """Return a square patch of a sphere: x and y within +-size/2, z = sqrt(radius^2 - x^2 - y^2).
 
     Args:
         size: side of the square below it [m].
@@ -43,7 +43,7 @@ def dome(*, size: float = 0.5, radius: float = 0.45, resolution: int = 33, trian
 
 
 def bodice(*, resolution: int = 65, triangles: bool = False) -> Surface:
-    """The front half of a torso with waist and bust, 0.45 m high; the line ``bust`` runs across at the bust points.
+    """Return the front half of a torso with waist and bust, 0.45 m high; the line ``bust`` runs across at the bust points.
 
     Args:
         resolution: vertices along each side.
@@ -61,7 +61,7 @@ def bodice(*, resolution: int = 65, triangles: bool = False) -> Surface:
 def cylinder(
     *, radius: float = 0.15, height: float = 0.4, angle: float = 180.0, resolution: int = 33, triangles: bool = False
 ) -> Surface:
-    """A part of an upright cylinder; its pattern is a rectangle.
+    """Return a part of an upright cylinder; its pattern is a rectangle.
 
     Args:
         radius: [m].
@@ -88,7 +88,7 @@ def cone(
     resolution: int = 33,
     triangles: bool = False,
 ) -> Surface:
-    """A part of a truncated cone, upright, such as half a skirt; its pattern is a ring's sector.
+    """Return a part of a truncated cone, upright, such as half a skirt; its pattern is a ring's sector.
 
     Args:
         bottom: radius at the bottom [m].
@@ -115,7 +115,7 @@ def strip(
     resolution: int = 33,
     triangles: bool = False,
 ) -> Surface:
-    """A strip bent into waves along its length; its pattern is the straight strip.
+    """Return a strip bent into waves along its length; its pattern is the straight strip.
 
     Args:
         length: from end to end along the ground [m].
@@ -135,7 +135,7 @@ def strip(
 
 
 def saddle(*, size: float = 0.4, curvature: float = 2.5, resolution: int = 33, triangles: bool = False) -> Surface:
-    """A saddle: z = curvature / 2 (x^2 - y^2), x and y within +-size/2.
+    """Return a saddle: z = curvature / 2 (x^2 - y^2), x and y within +-size/2.
 
     Args:
         size: side of the square below it [m].
@@ -151,7 +151,7 @@ def saddle(*, size: float = 0.4, curvature: float = 2.5, resolution: int = 33, t
 
 
 def hemisphere(*, radius: float = 0.2, opening: float = 80.0, resolution: int = 33, triangles: bool = False) -> Surface:
-    """A spherical cap with a round border, up to more than half the sphere.
+    """Return a spherical cap with a round border, up to more than half the sphere.
 
     The square grid is drawn onto the disc by the concentric map (Shirley and Chiu 1997) and the disc onto the cap along
     great circles, so quads stay of similar size; the border's four lines join at points of the round border.
@@ -189,7 +189,7 @@ SHAPES: dict[str, Callable[..., Surface]] = {
 
 
 def make_shape(name: str, **parameters: Any) -> Surface:
-    """The surface of that name.
+    """Return the surface of that name.
 
     Args:
         name: a key of `SHAPES`.
@@ -218,7 +218,7 @@ def _check_range(shape: str, key: str, value: float, lowest: float, highest: flo
 
 
 def _parameters(shape: str, across: int, up: int | None = None) -> tuple[FloatArray, FloatArray]:
-    """u and w at each vertex, both `up` by `across`."""
+    """Return u and w at each vertex, both `up` by `across`."""
     up = across if up is None else up
     if not 3 <= up <= _MAX_RESOLUTION:
         raise InputError(f"{shape}: resolution = {up}; must lie between 3 and {_MAX_RESOLUTION}")
@@ -227,7 +227,7 @@ def _parameters(shape: str, across: int, up: int | None = None) -> tuple[FloatAr
 
 
 def _grid(name: str, points: FloatArray, triangles: bool, *, rows: dict[str, int] | None = None) -> Surface:
-    """The surface of `points` (rows by columns by 3); further lines along `rows`."""
+    """Return the surface of `points` (rows by columns by 3); further lines along `rows`."""
     height, width = points.shape[:2]
     index = np.arange(height * width, dtype=np.int32).reshape(height, width)
     quads = np.stack([index[:-1, :-1], index[:-1, 1:], index[1:, 1:], index[1:, :-1]], axis=-1).reshape(-1, 4)

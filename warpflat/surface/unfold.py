@@ -1,8 +1,8 @@
 """Bent quads laid flat.
 
 Four points in space do not say along which diagonal their quad is creased: both ways of splitting it can be unfolded, into
-different flat quads. The mesh around tells. Along a crease, as along a ruling of a cylinder, the surface is straight, so its
-normal does not turn; across it does.
+different flat quads. The mesh around it decides: the surface is straight along a crease, as along a ruling of a cylinder, so its
+normal does not turn along the crease, but across it.
 """
 
 from __future__ import annotations
@@ -19,14 +19,19 @@ from warpflat.kernels.unfold import average_normals, find_bends, find_creases
 from warpflat.kernels.unfold import lay_cells as lay_each
 from warpflat.surface.connectivity import coincident_vertices
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 
-__all__ = ["ByVertex", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
+__all__ = ["VertexLists", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
 
 
 @dataclass(frozen=True, kw_only=True)
-class ByVertex:
-    """Lists of what is around each vertex: `offset` #V+1, where the entries of each vertex begin, and what is there."""
+class VertexLists:
+    """Lists of items around each vertex.
+
+    Attributes:
+        offset: #V+1, the place where the entries of each vertex begin.
+        entry: the items.
+    """
 
     offset: IntArray
     entry: IntArray
@@ -39,18 +44,17 @@ def quad_creases(
     border: IntArray | None = None,
     around: tuple[IntArray, IntArray] | None = None,
 ) -> NDArray[np.int8]:
-    """Along which diagonal each quad is creased.
+    """Find the diagonal along which each quad is creased.
 
     Args:
         vertices: #V by 3, positions [m]. Vertices at the same place count as one, so that a cut changes nothing.
         faces: #F by 4, -1 in the last column of a triangle.
-        border: the vertices on it, in the order of their numbers, if they are known.
-        around: the faces' corners around each vertex, if they are known: #V+1, where each vertex's begin, and 4 times the face
-            plus the corner.
+        border: the sorted vertices on the border, if they are known.
+        around: the result of `corners_around`, if it is known.
 
     Returns:
         #F, 0 for the diagonal of corners 0-2, 1 for 1-3, and -1 for a triangle and where a quad is flat, not convex, or
-        twisted, with neither diagonal straighter on the surface than the other. Where the mesh around tells nothing, as beside
+        twisted, with neither diagonal straighter on the surface than the other. Where the mesh around does not decide, as for
         a quad without neighbours, it is the longer one: a rectangle's diagonals are equal until it is creased, and then the
         other one is shorter.
     """
@@ -73,28 +77,36 @@ def quad_creases(
 
 
 def corners_around(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
-    """The faces' corners around each of so many vertices: #V+1, where each vertex's begin, and 4 times the face plus the corner."""
+    """List the faces' corners around each vertex.
+
+    Args:
+        faces: #F by 4, -1 in the last column of a triangle.
+        count: #V.
+
+    Returns:
+        #V+1, the place where the corners of each vertex begin, and the corners, each 4 times its face plus its column.
+    """
     if (faces[:, 3] >= 0).all():
         corner, offset = counting_sort(faces.ravel(), count)
         return offset, corner
-    # The fourth corners of triangles are those of one vertex more, come after all others, and are left out.
+    # The missing corners of triangles are sorted behind all others, as those of a vertex #V, and left out.
     corner, offset = counting_sort(np.where(faces >= 0, faces, np.int32(count)).ravel(), count + 1)
     return offset[:-1], corner[: offset[count]]
 
 
 @once_per_faces
-def corners_of(surface: Surface) -> ByVertex:
-    """The faces' corners around each vertex, 4 times the face plus the corner."""
-    numbered = row_by_row(surface)
+def corners_of(surface: Surface) -> VertexLists:
+    """Return the faces' corners around each vertex (see `corners_around`), computed once per array of faces."""
+    numbered = row_major_grid(surface)
     if numbered is not None:
         offset, entry = numbered.corners_around()
     else:
         offset, entry = corners_around(surface.faces, len(surface.vertices))
-    return read_only(ByVertex(offset=offset, entry=entry))
+    return read_only(VertexLists(offset=offset, entry=entry))
 
 
 def vertex_normals(surface: Surface) -> FloatArray:
-    """#V by 3, the mean normal of the faces around each vertex, by area, of length 1; 0 where there are none, or they cancel."""
+    """Return #V by 3, unit normals: the area-weighted mean of the faces around each vertex; 0 without faces, or where they cancel."""
     normal, at_vertex = np.empty((len(surface.faces), 3)), np.empty((len(surface.vertices), 3))
     launch_each(
         find_bends, len(normal), [surface.vertices, surface.faces], [normal, np.empty(len(normal), dtype=np.int8)]
@@ -105,12 +117,12 @@ def vertex_normals(surface: Surface) -> FloatArray:
 
 
 def lay_cells(vertices: FloatArray, faces: IntArray, crease: NDArray[np.int8], cell: IntArray) -> FloatArray:
-    """The cells of all faces laid flat; the four of a creased quad come from the one quad that it unfolds into.
+    """Lay the cells of all faces flat. The four cells of a creased quad come from the quad that it unfolds into.
 
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4, -1 in the last column of a triangle.
-        crease: #F, as `quad_creases` has it.
+        crease: #F, the result of `quad_creases`.
         cell: #F, the first of each face's cells (`corner_triangles`).
 
     Returns:

@@ -1,4 +1,4 @@
-"""A layout with a few mirrored faces, smoothed where they are until none is left."""
+"""Untangling: a layout with a few mirrored faces is smoothed around them until none is left."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ from warpflat.surface.vectors import cross, norm, points_at
 __all__ = ["signed_cell_areas", "untangle"]
 
 
-# So many sweeps without fewer mirrored triangles than ever before, and the rest will not help either.
+# Sweeps without a new least number of mirrored triangles after which it gives up.
 _PATIENCE = 25
-# Vertices that are so many rings away from mirrored triangles are ready to be moved; more, once sweeps come there.
+# Rings of vertices around mirrored triangles that are prepared for moving; more are prepared once sweeps reach their edge.
 _RINGS = 6
 
 
@@ -31,22 +31,21 @@ def untangle(
     most_sweeps: int = 200,
     suspects: NDArray[np.integer] | None = None,
 ) -> tuple[FloatArray, int]:
-    """Move the vertices of mirrored faces, and those beside, towards the mean of their neighbours until all faces agree.
+    """Move the vertices of mirrored faces, and their neighbours, towards the mean of their neighbours until no face is mirrored.
 
-    Meant for the odd face that a first layout turns over: far from such faces nothing moves, and nothing is looked at.
-    Neighbours count with one over the length of their edge on the body; a vertex of the border moves between its neighbours
-    on the border only.
+    It is meant for a few faces that a first layout turns over: far from them nothing moves. The weight of a neighbour is the
+    inverse of its edge's length on the body. A vertex on the border moves between its neighbours on the border only.
 
     Args:
         surface: the piece.
         positions: #V by 2 [m], the layout.
         least_area: a corner triangle with less than this share of its area on the body counts as mirrored.
-        most_sweeps: give up after so many, or once sweeps stop helping; a layout that is folded at large is not mended from
-            its edges.
-        suspects: where all that are mirrored is known, these corner triangles; no others are looked at to begin with.
+        most_sweeps: the largest number of sweeps; it also gives up once sweeps stop helping, as on a layout that is folded
+            at large.
+        suspects: corner triangles that hold all mirrored ones, if they are known.
 
     Returns:
-        #V by 2 positions [m], and how many corner triangles are still mirrored (0: done).
+        #V by 2 positions [m], and the number of corner triangles that are still mirrored (0: done).
     """
     corner, _, _ = corner_triangles(surface.faces)
     flat = np.array(positions, dtype=np.float64)
@@ -65,8 +64,8 @@ def untangle(
     for _ in range(most_sweeps):
         if not patch.inside[turned].all():
             patch = _Patch(surface, np.flatnonzero(patch.near), _RINGS)
-        moving = np.union1d(turned, patch.pulled[turned].indices)
-        flat[moving] = 0.5 * (flat[moving] + patch.pull[moving] @ flat / patch.total[moving])
+        moving = np.union1d(turned, patch.transposed[turned].indices)
+        flat[moving] = 0.5 * (flat[moving] + patch.weights[moving] @ flat / patch.total[moving])
         mirrored = crushed(patch.corner[np.unique(patch.around[moving].indices)])
         turned = np.unique(mirrored)
         fewest, since = (len(mirrored), 0) if len(mirrored) < fewest else (fewest, since + 1)
@@ -76,13 +75,16 @@ def untangle(
 
 
 class _Patch:
-    """Some vertices and those up to so many rings around them.
+    """Some vertices and a number of rings around them.
 
     Attributes:
-        near: #V, whether a vertex is one of these. inside: #V, whether its neighbours are, too.
-        pull: #V by #V, the weights of the neighbours that each of these moves between; of others none. pulled: its transpose. total: #V by
-            1, its rows' sums.
-        corner: #N by 3, the corner triangles at these vertices. around: #V by #N, which of them lie around each vertex.
+        near: #V, true for these vertices.
+        inside: #V, true for those whose neighbours are all among them.
+        weights: #V by #V, the weights of each of these vertices' neighbours; rows of other vertices are empty.
+        transposed: the transpose of `weights`.
+        total: #V by 1, the row sums of `weights`.
+        corner: #N by 3, the corner triangles at these vertices.
+        around: #V by #N, 1 where a corner triangle lies at a vertex.
     """
 
     def __init__(self, surface: Surface, vertices: NDArray[np.integer], rings: int) -> None:
@@ -106,8 +108,8 @@ class _Patch:
         ends = points_at(surface.vertices, edges.T)
         weight = np.tile(1.0 / np.maximum(norm(ends[:, 1] - ends[:, 0]), np.finfo(float).tiny), 2)
         keep = self.near[start] & (~border[start] | np.tile(on_rim, 2))
-        self.pull = csr_array((weight[keep], (start[keep], end[keep])), shape=(count, count))
-        self.pulled, self.total = self.pull.T.tocsr(), self.pull.sum(axis=1)[:, None]
+        self.weights = csr_array((weight[keep], (start[keep], end[keep])), shape=(count, count))
+        self.transposed, self.total = self.weights.T.tocsr(), self.weights.sum(axis=1)[:, None]
         self.corner, _, _ = corner_triangles(surface.faces[faces])
         offset = np.arange(0, self.corner.size + 1, 3)
         self.around = csc_array(
@@ -116,7 +118,7 @@ class _Patch:
 
 
 def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> IntArray:
-    """The faces that have some of these vertices, in their order."""
+    """Return the faces at some vertices, sorted."""
     around = corners_of(surface)
     begin, counts = around.offset[vertices], np.diff(around.offset)[vertices]
     first = np.cumsum(counts) - counts
@@ -124,7 +126,7 @@ def _faces_at(surface: Surface, vertices: NDArray[np.integer]) -> IntArray:
 
 
 def signed_cell_areas(corner: IntArray, positions: FloatArray) -> FloatArray:
-    """#C, signed areas of triangles (#C by 3) in the plane [m2]; 0 or less where one is mirrored or collapsed."""
+    """Return #C, signed areas [m2] of triangles (#C by 3) in the plane; 0 or less where one is mirrored or collapsed."""
     area = np.empty(len(corner))
     given = [np.ascontiguousarray(positions), np.ascontiguousarray(corner, dtype=np.int32)]
     launch_each(measure_flat_cells, len(corner), given, [area])

@@ -44,8 +44,8 @@ from warpflat.solver.multigrid.grid_coarsening import (
 )
 from warpflat.surface.cells import cells_of, creases_of
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.mesh import Surface, once_per_surface, tell
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.mesh import Surface, once_per_surface, store_results
+from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.triangles import triangulate
 
 __all__ = [
@@ -222,7 +222,7 @@ def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     For triangle meshes this includes all that depends on no layout. Those of a grid, which starts from a resampled
     grid, are not needed so soon, and do not take long.
     """
-    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_by_row(surface) is not None:
+    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_major_grid(surface) is not None:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
@@ -242,7 +242,7 @@ def _prepare_levels(surface: Surface) -> None:
 def _coarse_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
     """Return a coarser mesh of quads, without creases: these make no difference to a correction of the finer level."""
     part = _coarse_surface(surface, vertices, faces, of_faces)
-    tell(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
+    store_results(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
     return part
 
 

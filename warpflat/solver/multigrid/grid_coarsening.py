@@ -24,7 +24,7 @@ from scipy.sparse import csr_array
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, row_places
 from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
-from warpflat.surface.mesh import Surface, known_of_faces, once_per_faces, once_per_surface, read_only
+from warpflat.surface.mesh import Surface, face_results, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
 __all__ = [
@@ -182,7 +182,7 @@ def _quad_counts(shape: tuple[int, ...], side: int, multiple: int) -> list[int]:
 @lru_cache(maxsize=16)
 def _grid_faces_known(rows: int, columns: int) -> dict[str, Any]:
     """Return what is known of the faces of a resampled grid; pieces of about the same proportions share it."""
-    return known_of_faces(_faces_of(rows, columns))
+    return face_results(_faces_of(rows, columns))
 
 
 def _faces_of(rows: int, columns: int) -> IntArray:
@@ -278,7 +278,7 @@ def _keep_lines(
         face_of=_any_face(surface, kept[:-1, :-1].ravel()),
         transfer=Transfer(lambda: _bilinear(grid, keep)),
         make_interpolation=lambda surface: GridProlongation(grid, _line_places(surface), keep),
-        of_faces=known_of_faces(faces),
+        of_faces=face_results(faces),
     )
 
 
@@ -370,7 +370,7 @@ def _coarsen_lattice(lattice: Lattice) -> CoarsenedGrid | None:
         face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _bilinear_in_blocks(lattice, keep, block, blocks, faces)),
         make_interpolation=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
-        of_faces=known_of_faces(faces, {lattice_of: read_only(coarse)}),
+        of_faces=face_results(faces, {lattice_of: read_only(coarse)}),
     )
 
 

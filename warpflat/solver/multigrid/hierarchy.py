@@ -19,8 +19,8 @@ from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
 from warpflat.surface.cells import cells_of
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
-from warpflat.surface.mesh import Surface, forget, is_large
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.mesh import Surface, drop_result, is_large
+from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.untangle import untangle
 
 __all__ = [
@@ -116,10 +116,10 @@ def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) ->
     """
     if is_large(network.surface):
         for made in (network, *(level.network for level in coarse_levels)):
-            forget(made.surface, half_edges_of)
+            drop_result(made.surface, half_edges_of)
             if made.surface.is_quad.all():
                 made.spring_arrays.around.forget_numbers()
-        if row_by_row(network.surface) is None:
+        if row_major_grid(network.surface) is None:
             # Make the transfers now, so that the memory they need on the way is returned, too.
             for level in coarse_levels:
                 level.coarsening.transfer.make()

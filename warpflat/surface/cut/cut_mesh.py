@@ -1,9 +1,8 @@
 """Cutting a mesh along paths of edges: the vertices on the path are doubled, nothing else changes.
 
 A cut is found in three steps. The edges of the path are marked. Around each vertex on the path the faces are gathered
-into fans, faces that still hang together across unmarked edges. The first fan keeps the vertex, every further fan gets
-a copy of it. That covers a dart, a slit, a piece that falls in two, a closed cut and any branching of cuts alike: how
-many fans a vertex has says how often it is needed.
+into fans: faces that are still connected across unmarked edges. The first fan keeps the vertex, every further fan gets
+a copy of it. This treats a dart, a slit, a piece that falls in two, a closed cut and any branching of cuts alike.
 
 Everything here is a pure function: arrays in, new arrays and maps to the uncut mesh out.
 """
@@ -58,7 +57,7 @@ class Cut:
         face_component: #F, which connected piece of the cut mesh a face belongs to, numbered by their first faces.
         component_count: pieces after the cut.
         components_before: pieces before it.
-        of_faces: what has been worked out of the faces, for a surface that has them (see `warpflat.surface.mesh.once_per_faces`).
+        of_faces: kept results of these faces, for a surface that has them (see `warpflat.surface.mesh.once_per_faces`).
     """
 
     faces: IntArray
@@ -159,7 +158,7 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
     cut_mesh = _mesh_of(new_faces)
     labels = components_of(cut_mesh)
     after = int(labels.max(initial=-1)) + 1
-    # Sewn up again along the cut, what it parted is one.
+    # Joined again across the cut, its components are those before it.
     beside = (labels[near[he.face[np.concatenate(half)]]] for half in zip(*sides, strict=True))
     before = int(join_labels(after, *beside).max(initial=-1)) + 1 if after > 1 else after
     return Cut(
@@ -176,7 +175,7 @@ def cut_along_many(faces: IntArray, paths: Sequence[ArrayLike], *, vertex_count:
 
 
 def faces_at(faces: IntArray, vertices: IntArray) -> NDArray[np.int64]:
-    """The faces (of #F by 4) that have one of these vertices, rising."""
+    """Return the faces (of #F by 4) that have one of these vertices, rising."""
     # With room for the -1 of triangles at its end.
     there = np.zeros(max(int(faces.max(initial=0)), int(vertices.max(initial=0))) + 2, dtype=bool)
     there[vertices] = True
@@ -186,7 +185,7 @@ def faces_at(faces: IntArray, vertices: IntArray) -> NDArray[np.int64]:
 
 
 def _mesh_of(faces: IntArray) -> Surface:
-    """A surface of which nothing but the faces is known."""
+    """Return a surface of which nothing but the faces is known."""
     nowhere = np.empty((0, 3))
     return Surface(
         vertices=nowhere, faces=faces, name="", input_vertices=nowhere, input_index=np.empty(0, dtype=np.int32)
@@ -198,7 +197,7 @@ def _edge(chain: IntArray, index: int) -> str:
 
 
 def _checked_path(path: ArrayLike, vertex_count: int) -> IntArray:
-    """The path as integers, once it is known to be one: long enough, in range, no vertex visited twice."""
+    """Return the path as integers, once it is known to be one: long enough, in range, no vertex visited twice."""
     chain = np.asarray(path)
     if chain.ndim != 1 or (chain.size and chain.dtype.kind not in "iu"):
         raise InputError(f"a cut path is a row of vertex indices, got shape {chain.shape} of {chain.dtype}")
@@ -229,7 +228,7 @@ def _sides(
     order: IndexArray,
     stride: np.int64,
 ) -> tuple[IndexArray, IndexArray]:
-    """For each edge of the path the half-edge on its left (runs along) and on its right (runs against)."""
+    """Return, for each edge of the path, the half-edge on its left (along it) and the one on its right (against it)."""
     a, b = chain[:-1].astype(np.int64), chain[1:].astype(np.int64)
     if len(order) == 0:
         raise InputError(f"cut path: vertex {int(a[0])} belongs to no face")
@@ -308,7 +307,7 @@ def _double(
 
 
 def _seams(chain: IntArray, left_ends: IntArray, right_ends: IntArray) -> list[Seam]:
-    """The path as stretches along which both sides run on without a break."""
+    """Return the path as stretches along which both sides run on without a break."""
     count = len(left_ends)
     joined = (left_ends[:-1, 1] == left_ends[1:, 0]) & (right_ends[:-1, 1] == right_ends[1:, 0])
     starts = [0, *(np.flatnonzero(~joined) + 1).tolist()]
@@ -337,7 +336,16 @@ def _kind(
     parted: bool,
     fans: dict[int, int],
 ) -> CutKind:
-    """What the cut is to a pattern maker; `touched`: the components beside it, `parted`: whether one fell in two."""
+    """Return the kind of a cut (see :class:`Cut`).
+
+    Args:
+        chains: the paths.
+        faces: #F by 4, after the cut.
+        labels: #F, the component of each face after the cut.
+        touched: the components beside the cut.
+        parted: true if the cut has made one component two.
+        fans: the number of fans at each vertex of the paths.
+    """
     if len(chains) > 1:
         return "network"
     chain = chains[0]

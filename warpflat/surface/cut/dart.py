@@ -1,4 +1,4 @@
-"""Darts on a pattern: what the crack of a relaxed cut measures, and the dart a pattern maker draws in its place.
+"""Darts on a pattern: measures of the crack that a relaxed cut opens, and the dart drawn in its place.
 
 A crack opens with curved edges that need not be equally long. A drawn dart has a point short of the bust point, and two
 straight legs of one length, since they are sewn to each other.
@@ -174,7 +174,7 @@ def shape_dart(
 
     The tip moves from the crack's tip towards the border along the bisector; the intake on the outline stays. Both legs
     get the mean of their lengths: each end moves along its own leg, by half the difference, and takes the outline
-    beside it along, fading out over `blend`. So the ends lie on the outline and the outline is smooth when sewn.
+    beside it along, less and less over `blend`. So the ends lie on the outline and the outline is smooth when sewn.
 
     Args:
         positions: #P by 2, the layout [m], not mirrored.
@@ -197,13 +197,13 @@ def shape_dart(
     leg = 0.5 * sum(legs)
     ends = [tip + _unit(x[side[0]] - tip) * leg for side in (a, b)]
     if blend is None:
-        # A cosine fade is steepest in its middle: pi/2 times shift over blend.
+        # The cosine is steepest in its middle: pi/2 times shift over blend.
         blend = max(_BLEND, _BLEND_PER_SHIFT * abs(legs[0] - leg))
     moved: dict[int, FloatArray] = {}
     beside = []
     for side, end in zip((a, b), ends, strict=True):
         run = _outwards(outline, side)
-        points, touched = _faded(x[run], end, blend)
+        points, touched = _with_start_moved(x[run], end, blend)
         beside.append(points)
         moved.update(zip(run[touched].tolist(), points[touched], strict=True))
     folded = 0 if fold == "left" else 1
@@ -232,16 +232,16 @@ def _check_shape(measure: DartMeasure, mouth: int, tip_back: float, blend: float
         raise InputError(f"fold is 'left' or 'right', got {fold!r}")
 
 
-def _faded(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
-    """A line with its first point moved to `end` and the next ones along with it, less and less; which ones moved."""
+def _with_start_moved(points: FloatArray, end: FloatArray, blend: float) -> tuple[FloatArray, BoolArray]:
+    """Return a line with its first point moved to `end` and the next ones less and less over `blend` [m]; and #P, true for those moved."""
     reach = arc_lengths(points)
     fade = (
         np.where(reach < blend, 0.5 + 0.5 * np.cos(np.pi * reach / blend), 0.0) if blend > 0 else np.zeros(len(reach))
     )
     fade[0] = 1.0
-    falloff_weights = points + np.multiply.outer(fade, end - points[0])
-    falloff_weights[0] = end
-    return falloff_weights, fade > 0
+    moved = points + np.multiply.outer(fade, end - points[0])
+    moved[0] = end
+    return moved, fade > 0
 
 
 def fish_eye_measure(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> FishEyeMeasure:
@@ -314,7 +314,7 @@ def shape_fish_eye(positions: ArrayLike, left: ArrayLike, right: ArrayLike, *, t
 
 
 def mouth_first(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[FloatArray, IntArray, IntArray]:
-    """The layout and both sides running from the border to the tip; turned round, left and right change places.
+    """Return the layout and both sides of a crack, from the border to the tip; reversed sides change places.
 
     Args and errors are those of :func:`dart_measure`.
     """
@@ -342,7 +342,7 @@ def _sides(positions: ArrayLike, left: ArrayLike, right: ArrayLike) -> tuple[Flo
 
 
 def _outwards(outline: ArrayLike, side: IntArray) -> IntArray:
-    """The outline from a crack's end on the border away from the crack, half way round at most."""
+    """Return the outline from a crack's end on the border away from the crack, half way round at most."""
     loop = np.asarray(outline, dtype=np.int32)
     at = np.flatnonzero(loop == side[0])
     if len(at) == 0:
@@ -356,18 +356,18 @@ def _outwards(outline: ArrayLike, side: IntArray) -> IntArray:
 
 
 def _fold_point(
-    tip: FloatArray, ends: Sequence[FloatArray], leg: float, beside: FloatArray, end: FloatArray
+    tip: FloatArray, ends: Sequence[FloatArray], leg: float, outline: FloatArray, end: FloatArray
 ) -> FloatArray:
-    """Where the fold line must end so that the folded cloth is cut off at the outline beside the dart.
+    """Return the end of the fold line at which the folded cloth ends on the outline beside the dart.
 
-    Pressed to one side, half of the dart lies mirrored in that leg on the cloth beside it; the mirrored fold line ends
-    where it meets the outline. If it does not meet it, the fold is cut at the length of the legs.
+    When the dart is pressed to one side, half of it lies on the cloth beside it, mirrored in that leg. The mirrored fold line ends
+    where it meets the outline. If it does not meet it, the fold is as long as the legs.
     """
     fold = _unit(0.5 * (ends[0] + ends[1]) - tip)
     along = _unit(end - tip)
     mirrored = 2 * (fold @ along) * along - fold
     reach = leg
-    for p, q in pairwise(beside):
+    for p, q in pairwise(outline):
         side = q - p
         cross = mirrored[0] * side[1] - mirrored[1] * side[0]
         if abs(cross) <= 1e-12 * float(np.linalg.norm(side)):
@@ -382,7 +382,7 @@ def _fold_point(
 
 
 def _angle(u: FloatArray, v: FloatArray) -> float:
-    """From u to v [rad], counterclockwise positive."""
+    """Return the angle from u to v [rad], counter-clockwise positive."""
     return float(np.arctan2(u[0] * v[1] - u[1] * v[0], u @ v))
 
 

@@ -15,7 +15,7 @@ STRAIGHT, STRAIGHT_SHARE = 2e-3, 0.04
 
 
 def are_curved(*legs: FloatArray) -> bool:
-    """Whether one of some legs (#P by 2 [m] each) leaves its chord so far that the wedge cannot be folded."""
+    """Return whether one of the legs (#P by 2 [m] each) leaves its chord so far that the wedge cannot be folded."""
     import shapely
 
     for leg in legs:
@@ -26,7 +26,7 @@ def are_curved(*legs: FloatArray) -> bool:
 
 
 def check_tip_back(tip_back: float, room: float, of: str = "dart's length") -> None:
-    """See that a tip can be moved back so far [m] within the room [m] that there is."""
+    """Check that a tip can be moved back by a distance [m] within the room [m] that there is; `of` names the room."""
     if not (np.isfinite(tip_back) and 0 <= tip_back < room):
         raise InputError(
             f"tip_back is {tip_back * 1e3:.1f} mm; it must be 0 or more and less than the {of}, {room * 1e3:.1f} mm"
@@ -34,7 +34,7 @@ def check_tip_back(tip_back: float, room: float, of: str = "dart's length") -> N
 
 
 def pull_back(left: FloatArray, right: FloatArray, tip_back: float) -> tuple[FloatArray, FloatArray]:
-    """Both legs of a dart with their tip moved back towards the border.
+    """Return both legs of a dart with their tip moved back towards the border.
 
     Each is turned and shrunk about its end on the border, both by one share: legs of one length stay so, and a curved
     leg keeps its curve.
@@ -65,11 +65,11 @@ def pull_back(left: FloatArray, right: FloatArray, tip_back: float) -> tuple[Flo
 
 
 def pull_back_eye(left: FloatArray, right: FloatArray, station: int, tip_back: float) -> tuple[FloatArray, FloatArray]:
-    """Both sides of a fish-eye dart with their tips moved towards each other, as wide as before.
+    """Return both sides of a fish-eye dart with their tips moved towards each other, as wide as before.
 
     Args:
         left, right: #P by 2 [m], matched, from the first tip to the last one.
-        station: which of their points are the widest; these stay.
+        station: the index of the widest points, which stay.
         tip_back: of either tip [m].
 
     Raises:
@@ -94,7 +94,7 @@ def pull_back_eye(left: FloatArray, right: FloatArray, station: int, tip_back: f
 
 
 def _ending_at(leg: FloatArray, tip: FloatArray) -> FloatArray:
-    """A line turned and scaled about its first point so that it ends at `tip`."""
+    """Return a line turned and scaled about its first point so that it ends at `tip`."""
     plane = leg[:, 0] + 1j * leg[:, 1]
     goal = complex(tip[0], tip[1])
     moved = plane[0] + (plane - plane[0]) * ((goal - plane[0]) / (plane[-1] - plane[0]))

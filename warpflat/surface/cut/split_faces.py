@@ -69,9 +69,7 @@ def split_faces_along(surface: Surface, path: SurfacePath, *, snap: float = 0.1)
 
 def _snap_places(surface: Surface, path: SurfacePath, snap: float) -> list[Place]:
     """Move the places of a path that are near a vertex or edge onto it, and take out the detours that this closes."""
-    edges = border_edges(surface.faces)
-    border: set[tuple[int, ...]] = {tuple(sorted(edge)) for edge in edges.tolist()}
-    border |= {(v,) for v in edges.ravel().tolist()}
+    border = _on_border(surface)
     places: list[Place] = []
     points: list[int] = []
     last = len(path.points) - 1
@@ -83,7 +81,7 @@ def _snap_places(surface: Surface, path: SurfacePath, snap: float) -> list[Place
         if places and free == places[-1]:
             # Beside a border vertex that the path has reached already, moving onto it parts nothing.
             continue
-        while is_end and index and len(places) > 1 and _without_small(places[-1], snap, set()) == place:
+        while is_end and len(places) > 1 and _without_small(places[-1], snap, set()) == place:
             del places[-1], points[-1]
         if place not in places:
             places.append(place)
@@ -97,6 +95,12 @@ def _snap_places(surface: Surface, path: SurfacePath, snap: float) -> list[Place
     if len(places) < (3 if path.closed else 2):
         raise InputError(f"the path at {describe_place(places[0])} is too short: it lies within one snapping distance")
     return places
+
+
+def _on_border(surface: Surface) -> set[tuple[int, ...]]:
+    """Return the edges and the vertices of the border, as sorted tuples."""
+    edges = border_edges(surface.faces)
+    return {tuple(sorted(edge)) for edge in edges.tolist()} | {(v,) for v in edges.ravel().tolist()}
 
 
 def _check_detour(surface: Surface, path: SurfacePath, first: int, last: int, place: Place) -> None:

@@ -1,4 +1,4 @@
-"""PLY and STL files hold what their headers tell of: of an ASCII PLY cut short trimesh takes the rows that are there."""
+"""Checks that PLY and STL files are as long as their headers say; trimesh would read an ASCII PLY that is cut short."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ __all__ = ["check_ply", "check_stl"]
 
 
 def check_ply(path: Path) -> None:
-    """See that an ASCII file has every row that its header tells of, each with every number of its lists.
+    """Check that an ASCII file has all rows that its header announces, each with all numbers of its lists.
 
-    The length of a binary file is checked by trimesh. What is no header is left for it, too.
+    Trimesh checks the length of binary files, and refuses what is no header.
 
     Raises:
         InputError: without the file's name, but with the line's number.
@@ -36,7 +36,7 @@ def check_ply(path: Path) -> None:
 
 
 def check_stl(path: Path) -> None:
-    """See that a binary file is as long as its count of triangles asks for; one of text ends with a word, which trimesh looks for.
+    """Check that a binary file is as long as its number of triangles requires; trimesh checks the end of text files.
 
     Raises:
         InputError: without the file's name.
@@ -52,7 +52,7 @@ def check_stl(path: Path) -> None:
 
 
 def _elements(head: str) -> list[tuple[str, int, list[bool]]]:
-    """Each element's name, its count, and which of its properties are lists."""
+    """Return each element's name, its count, and which of its properties are lists."""
     elements: list[tuple[str, int, list[bool]]] = []
     for line in head.splitlines():
         words = line.split()
@@ -64,7 +64,7 @@ def _elements(head: str) -> list[tuple[str, int, list[bool]]]:
 
 
 def _fault(words: list[str], properties: list[bool]) -> str | None:
-    """What is wrong with a row, if anything."""
+    """Return what is wrong with a row, or None."""
     at = 0
     for is_list in properties:
         if at >= len(words):

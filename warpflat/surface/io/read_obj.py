@@ -25,7 +25,7 @@ _CONTINUED = "\x1f"
 
 @dataclass(kw_only=True)
 class ObjMesh:
-    """What an OBJ file holds.
+    """The contents of an OBJ file.
 
     Attributes:
         vertices: #V by 3, in file units.
@@ -42,7 +42,7 @@ class ObjMesh:
 
 @dataclass
 class _Statements:
-    """The lines that matter: text after the keyword, line number, and how many `v` stood above."""
+    """The statements of a file: text after the keyword, line number, and number of `v` above."""
 
     vertices: list[str] = field(default_factory=list)
     vertex_line: list[int] = field(default_factory=list)
@@ -54,7 +54,7 @@ class _Statements:
 
 
 def read_obj(path: Path) -> ObjMesh:
-    """Read a file.
+    """Read an OBJ file.
 
     Raises:
         InputError: without the file's name, but with the line's number: for what is not OBJ, or not numbers.
@@ -80,7 +80,7 @@ def read_obj(path: Path) -> ObjMesh:
 
 
 def _check_last_line(text: str) -> None:
-    """See that a file does not break off within a face's corner: nothing else in it tells how long it should be."""
+    """Check that a file does not end within a face's corner: it does not say how long it should be."""
     _, _, last = text.rpartition("\n")
     if last.startswith("f ") and last.rstrip() == last and len({word.count("/") for word in last.split()[1:]}) > 1:
         raise InputError(f"is cut short: its last line is 'f {last[2:42]}', whose corners are not alike")
@@ -120,7 +120,7 @@ def _collect(text: str) -> _Statements:
 
 
 def _numbers(found: _Statements) -> FloatArray:
-    """#V by 3; a fourth weight or colours after the position are left out."""
+    """Return #V by 3; a fourth weight or colours after the position are left out."""
     rows = [text.split(None, 3)[:3] for text in found.vertices]
     try:
         return np.array(rows, dtype=np.float64).reshape(len(rows), 3)
@@ -164,7 +164,7 @@ def _face_message(found: _Statements, face: int, what: str) -> str:
 
 
 def _split_per_texture(found: _Statements, total: int) -> bool:
-    """Whether each corner's texture coordinate has its vertex's number: an exporter that writes one `v` per `vt`."""
+    """Return whether all corners' texture coordinates have the numbers of their vertices: the exporter writes one `v` per `vt`."""
     if found.texture != total:
         return False
     pair = re.compile(r"^([-+]?\d+)/\1(/\S*)?$")
@@ -188,7 +188,7 @@ def _line_elements(found: _Statements, total: int) -> dict[str, list[list[int]]]
 
 
 def chain_lines(parts: list[list[int]]) -> list[list[int]]:
-    """Chains joined end to end where exactly two ends meet, as exporters that write every edge by itself need it."""
+    """Join chains end to end where exactly two ends meet, since some exporters write every edge by itself."""
     ends: dict[int, list[int]] = {}
     for number, part in enumerate(parts):
         for vertex in {part[0], part[-1]}:

@@ -1,7 +1,7 @@
 """OFF, as far as a surface needs it: positions, and polygons of any size.
 
-A reader of our own because trimesh takes a line for a face, and what a file holds for what it should hold. In the format line ends
-mean nothing but the end of a face's or a vertex's colour.
+A reader of our own, as trimesh takes each line for a face and does not notice files that are cut short. In the format, line ends
+only end the colour of a face or a vertex.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ _HEADER = re.compile(r"\s*(ST)?(C)?(N)?OFF\b[ \t]*")
 
 
 def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
-    """Read a file.
+    """Read an OFF file.
 
     Returns:
         #V by 3, positions in the file's unit; #F by the largest corner count, vertex indices filled up with -1.
@@ -57,7 +57,7 @@ def read_off(path: Path) -> tuple[FloatArray, NDArray[np.int64]]:
 
 
 def _by_threes(rows: list[list[str]], count: int) -> tuple[list[list[str]], list[list[str]]]:
-    """The first `count` threes of words, wherever lines end, and the rows after them."""
+    """Return the first `count` threes of words, wherever lines end, and the rows after them."""
     words: list[str] = []
     taken = 0
     while taken < len(rows) and len(words) < 3 * count:
@@ -68,7 +68,7 @@ def _by_threes(rows: list[list[str]], count: int) -> tuple[list[list[str]], list
 
 
 def _polygons(rows: list[list[str]], count: int, points: int) -> NDArray[np.int64]:
-    """#F by the largest corner count. A face may run over several lines; what follows it on its last one is its colour."""
+    """Return #F by the largest corner count. A face may run over several lines; what follows it on its last one is its colour."""
     corners: list[list[str]] = []
     lines = iter(rows)
     for row in lines:

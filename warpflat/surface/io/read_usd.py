@@ -20,7 +20,7 @@ _PROGRAM = "from warpflat.surface.io.usd_stage import answer; answer()"
 
 
 def read_usd(path: Path, *, prim: str | None = None, metres_per_unit: float | None = None) -> UsdMesh:
-    """Read one mesh prim.
+    """Read one mesh prim of a USD file, in a process of its own.
 
     Args:
         path: .usd, .usda, .usdc or .usdz.

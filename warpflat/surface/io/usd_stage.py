@@ -1,6 +1,6 @@
 """A mesh of a USD stage, in metres and Y up, with the curves that are drawn beside it.
 
-This module is all that the process loads in which a file is read: see :mod:`warpflat.surface.io.read_usd`.
+The process that reads a file loads this module only: see :mod:`warpflat.surface.io.read_usd`.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from warpflat.core.text import shown
 
 __all__ = ["UNREADABLE", "UsdMesh", "answer", "read_stage"]
 
-# What reading may take besides what the library itself does, and how much more per byte of the file: lists of corners pack tightly.
+# Memory that reading may take beside the library's own, and more per byte of the file, since lists of corners pack tightly [bytes].
 _MEMORY, _MEMORY_PER_BYTE = 2**30, 200
 _SECONDS, _BYTES_PER_SECOND = 20, 10**6
 
@@ -40,7 +40,7 @@ class UsdMesh:
         corners: the vertex indices of all faces' corners, one face after the other, wound as USD's right-handed faces are.
         curves: linear BasisCurves beside or below the mesh, or in the group MESH_lines beside it (as in a film of ours), by
             name, #P by 3 [m]; a periodic one repeats its first point.
-        notes: what could not be taken over, one sentence each.
+        notes: what could not be read, one sentence each.
         layers: the files of which the stage is composed.
     """
 
@@ -54,7 +54,7 @@ class UsdMesh:
 
 
 def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
-    """Read one mesh prim.
+    """Read one mesh prim of a stage.
 
     Args:
         path: .usd, .usda, .usdc or .usdz.
@@ -66,7 +66,7 @@ def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -
     """
     from pxr import UsdUtils
 
-    # While there is a delegate, USD prints no warnings of its own: they become a note, or a part of the error.
+    # With a delegate USD prints no warnings: they become a note, or a part of the error.
     warnings = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         mesh = _read(path, prim, metres_per_unit)
@@ -147,7 +147,7 @@ def _read(path: Path, prim: str | None, metres_per_unit: float | None) -> UsdMes
     cache = UsdGeom.XformCache(Usd.TimeCode.EarliestTime())
 
     def to_metres(points: Any, of: Any) -> tuple[FloatArray, bool]:
-        """World positions [m], Y up, and whether the transform mirrors."""
+        """Return world positions [m], Y up, and whether the transform mirrors."""
         matrix = np.array(cache.GetLocalToWorldTransform(of), dtype=np.float64)
         world = np.asarray(points, dtype=np.float64).reshape(-1, 3) @ matrix[:3, :3] + matrix[3, :3]
         if z_up:

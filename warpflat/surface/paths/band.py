@@ -1,6 +1,6 @@
-"""Bands: long, narrow pieces, and the line through the middle of one, however it curls.
+"""Bands (long, narrow pieces) and the line through their middle, also where they curl.
 
-A waistband or a binding goes around the body, and a plane may cut it crosswise only.
+A waistband or a binding goes around the body, so a plane may cut it crosswise only.
 """
 
 from __future__ import annotations
@@ -20,25 +20,25 @@ __all__ = ["line_along_band"]
 
 # A line is short against its piece below this share of the way between the places of the border that are furthest apart.
 _SHORT = 0.5
-# That way is at least so many widths long in a band. A front with a deep neckline, whose centre line is as short, is no band.
+# That way is at least this many widths long in a band. A front with a deep neckline, whose centre line is as short, is no band.
 _NARROW = 6.0
 # And its area is at least this share of that way times its greatest width: a body with two long straps is no band.
 _EVEN = 0.5
 # Where the border turns by more than this, an end of the band has a corner (cosine).
 _CORNER = np.cos(np.radians(36.0))
-# How dear the way along the border is: a step costs its length over the distance to the border and this share of the width.
+# The cost of a step is its length over the sum of its distance to the border and this share of the width.
 _ROOM = 0.1
 
 
 def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
-    """The line through the middle of a band, along edges, from the border at one end of it to the border at the other.
+    """Return the line through the middle of a band, along edges, from the border at one end to the border at the other.
 
     Args:
         surface: one piece.
-        line: vertex indices along edges; it will do unless it is short against the piece.
+        line: vertex indices along edges; only a line that is short against the piece is replaced.
 
     Returns:
-        Vertex indices, in either direction; None where the given line will do, or the piece is no band: as wide as that, or a
+        Vertex indices, in either direction; None where the given line is long enough, or the piece is no band: too wide, or a
         ring, which has no ends.
     """
     # No place is further from another than half of the border is long.
@@ -62,7 +62,7 @@ def line_along_band(surface: Surface, line: IntArray) -> IntArray | None:
 
 
 def _furthest(surface: Surface, border: IntArray, place: int) -> tuple[int, float]:
-    """The vertex of the border furthest from a vertex, and how far that is [m]."""
+    """Return the vertex of the border furthest from a vertex, and its distance [m]."""
     away = distance_from(surface, [place])[border]
     return int(border[away.argmax()]), float(away.max())
 
@@ -74,7 +74,7 @@ def _area(surface: Surface) -> float:
 
 
 def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArray:
-    """The border vertices of the end of a band whose furthest place is `tip`: those from it to corners no more than `most` [m] away."""
+    """Return the border vertices of the end of a band at `tip`: those from it to corners at most `most` [m] away."""
     end = [tip]
     at = int(np.flatnonzero(border == tip)[0])
     for loop in (np.roll(border, -at), np.roll(border[::-1], at + 1)):
@@ -90,7 +90,7 @@ def _end_at(surface: Surface, border: IntArray, tip: int, most: float) -> IntArr
 
 
 def _path_between(graph: EdgeGraph, weight: FloatArray, starts: IntArray, ends: IntArray) -> IntArray:
-    """The path of least weight from any of some vertices to any of others."""
+    """Return the path of least weight from any of some vertices to any of others."""
     from scipy.sparse.csgraph import dijkstra
 
     cost, before, _ = dijkstra(graph.matrix(weight), indices=starts, return_predecessors=True, min_only=True)

@@ -28,19 +28,19 @@ _UPRIGHT = 0.95
 # A border turns away from the viewer where its faces do by more than this sine, and the piece where that share of its border does.
 _AWAY = 0.05
 _AWAY_SHARE = 0.02
-# A border vertex is a corner where the border turns by so much [rad] on the surface, and four are its corners if no other turns by
-# this share of what each of them does.
+# A border vertex is a corner where the border turns by this angle [rad] on the surface. Four are its corners if no other turns by
+# this share of the angle of each of them.
 _CORNER = np.pi / 6
 _SHARPER = 0.6
 # A corner out of sight lies no further than this share of the border from the outermost point that is seen.
 _NEAR = 0.05
-# The best way to name four sides puts them apart by so much of the piece's size, and the others by no more than this share of that.
+# The best way to name four sides separates them by this share of the piece's size, and any other way by at most this share of that.
 _APART = 0.1
 _PLAINLY = 0.9
 
 
 def viewing_frame(surface: Surface) -> FloatArray:
-    """3 by 3, rows: right, up and towards the viewer, for somebody who looks at the piece from outside.
+    """Return 3 by 3, rows: right, up and towards the viewer, for somebody who looks at the piece from outside.
 
     Outside is where the faces are wound counter-clockwise. Up is Y; a piece that faces up or down is seen with +Z, the
     body's front, at the bottom. A piece that goes all around is seen from +Z.
@@ -66,7 +66,7 @@ def line_on_border(
     direction: Literal["shortest", "with", "against"] = "shortest",
     as_read: bool = False,
 ) -> IntArray:
-    """A stretch of the border.
+    """Return a stretch of the border.
 
     Give a `side`, or `start` and `end`. Sides are those that a viewer sees from outside (see :func:`viewing_frame`):
     the longest border loop is split at its four outermost corners, those that lie furthest towards the corners of the
@@ -76,17 +76,17 @@ def line_on_border(
     Where the sides curl but a little out of sight, each corner seen is moved to the one of the border beside it.
 
     Args:
-        surface: where.
+        surface: the surface.
         side: "top", "bottom", "left" or "right".
         start, end: a vertex on the border, or a point [m] that stands for the nearest one; equal ones give the whole
             loop, closed.
-        direction: which way from `start` to `end`: the shorter one in metres, the one in which the border runs (the
-            surface to its left, seen from outside), or the one against it.
+        direction: from `start` to `end`, "shortest": the way that is shorter in metres; "with": as the border runs (the surface to
+            its left, seen from outside); "against": the other way.
         as_read: indices count the vertices of the file (from 0) instead of the surface's.
 
     Raises:
         InputError: for an unknown side or direction, a place that is not on the border, or a border whose four corners, or which
-            way up they lie, cannot be told.
+            way up they lie, cannot be decided.
     """
     loops = border_loops(surface.faces, surface.vertices)
     if side is not None:
@@ -101,7 +101,7 @@ def line_on_border(
 
 
 def _between(loop: IntArray, i: int, j: int) -> IntArray:
-    """The loop from position i to position j, both included; the whole of it, closed, if they are one."""
+    """Return the loop from position i to position j, both included; the whole loop, closed, if they are one."""
     return np.roll(loop, -i)[np.arange((j - i - 1) % len(loop) + 2) % len(loop)]
 
 
@@ -116,10 +116,10 @@ def _side(surface: Surface, loop: IntArray, side: str) -> IntArray:
 
 
 def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
-    """Positions in the loop of the corners "bl", "br", "tr" and "tl".
+    """Return the positions in the loop of the corners "bl", "br", "tr" and "tl".
 
     Raises:
-        InputError: there are no four, or more; `side` is what was asked for.
+        InputError: there are fewer than four, or more; it names the `side` that the user asked for.
     """
     right, up, towards = viewing_frame(surface)
     x, y = surface.vertices[loop] @ right, surface.vertices[loop] @ up
@@ -150,8 +150,10 @@ def _corners(surface: Surface, loop: IntArray, side: str) -> dict[str, int]:
 
 
 def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int) -> int:
-    """The position in the loop where the border turns most, not far from one: where a side curls a little out of sight, the outermost
-    point that is seen lies beside the corner."""
+    """Return the position near `place` where the border turns most.
+
+    Where a side curls a little out of sight, the outermost point that is seen lies beside the corner.
+    """
     station = arc_lengths(surface.vertices[loop], closed=True)
     way = np.abs(station[:-1] - station[place])
     near = np.minimum(way, station[-1] - way) < _NEAR * station[-1]
@@ -159,7 +161,7 @@ def _corner_near(surface: Surface, loop: IntArray, turn: FloatArray, place: int)
 
 
 def _four_sharpest(turn: FloatArray) -> IndexArray | None:
-    """Positions of the four corners of a border that turns at these and hardly anywhere else, in order; None of any other."""
+    """Return the positions of four corners, in order, of a border that hardly turns anywhere else; None for any other border."""
     order = np.argsort(-turn, kind="stable")
     least = float(turn[order[3]]) if len(turn) > 3 else 0.0
     if least < _CORNER or (len(turn) > 4 and turn[order[4]] > _SHARPER * least):
@@ -168,10 +170,10 @@ def _four_sharpest(turn: FloatArray) -> IndexArray | None:
 
 
 def _named(surface: Surface, loop: IntArray, at: IndexArray, side: str) -> dict[str, int]:
-    """The four corners by name, such that the sides between them lie where their names say.
+    """Name four corners so that the sides between them lie where their names say.
 
     Raises:
-        InputError: that could be in two ways.
+        InputError: two ways of naming them fit.
     """
     # Sides from each corner to the next; the mean place of each, weighed by length.
     middle = np.empty((4, 3))
@@ -193,7 +195,7 @@ def _named(surface: Surface, loop: IntArray, at: IndexArray, side: str) -> dict[
 
 
 def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:
-    """Right and up for somebody who stands before the piece, whether or not it faces up or down."""
+    """Return right and up for somebody who stands before the piece, also if it faces up or down."""
     towards, up = viewing_frame(surface)[2] * [1.0, 0.0, 1.0], np.array([0.0, 1.0, 0.0])
     size = float(np.linalg.norm(towards))
     right = np.cross(up, towards / size) if size > _FACING else np.array([1.0, 0.0, 0.0])
@@ -201,7 +203,7 @@ def _standing(surface: Surface) -> tuple[FloatArray, FloatArray]:
 
 
 def _turned_away(surface: Surface, towards: FloatArray) -> float:
-    """Share of the border's length beside which the surface turns away from the viewer."""
+    """Return the share of the border's length beside which the surface turns away from the viewer."""
     triangles, face = triangulate(surface.faces)
     p = surface.vertices[triangles]
     vector = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -214,7 +216,7 @@ def _turned_away(surface: Surface, towards: FloatArray) -> float:
 
 
 def _turns(surface: Surface, loop: IntArray) -> FloatArray:
-    """By how much [rad] the border turns at each of its vertices, on the surface: half a turn less the angles of the faces there."""
+    """Return the angle [rad] by which the border turns at each of its vertices on the surface: pi less the angles of the faces there."""
     sides = half_edges_of(surface)
     x, ahead, before = surface.vertices, sides.head, np.empty_like(sides.tail)
     before[sides.next] = sides.tail

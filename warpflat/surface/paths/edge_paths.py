@@ -25,12 +25,12 @@ _NEAR_EDGES = 2.0
 
 
 def are_joined(edges: IntArray, a: ArrayLike, b: ArrayLike) -> BoolArray:
-    """Whether there are edges a-b (#N each) among the edges of a mesh, which are sorted (`mesh_edges`)."""
+    """Return #N, true where a-b (#N each) is among the edges of a mesh, which are sorted (see `mesh_edges`)."""
     low, high = np.minimum(a, b), np.maximum(a, b)
-    begin, end = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
+    first, last = (np.searchsorted(edges[:, 0], low, side=side) for side in ("left", "right"))
     joined = np.zeros(np.shape(low), dtype=bool)
-    for k in range(int((end - begin).max(initial=0))):
-        joined |= (begin + k < end) & (edges[np.minimum(begin + k, len(edges) - 1), 1] == high)
+    for k in range(int((last - first).max(initial=0))):
+        joined |= (first + k < last) & (edges[np.minimum(first + k, len(edges) - 1), 1] == high)
     return joined
 
 
@@ -49,11 +49,11 @@ class EdgeGraph:
         self.length = _edge_lengths(surface)
 
     def are_joined(self, a: ArrayLike, b: ArrayLike) -> BoolArray:
-        """Whether edges a-b exist."""
+        """Return #N, true where an edge a-b (#N each) exists."""
         return are_joined(self.edges, a, b)
 
     def matrix(self, weight: FloatArray) -> csr_matrix:
-        """#V by #V, the weight of each edge."""
+        """Return #V by #V, the weight of each edge."""
         from scipy.sparse import coo_matrix
 
         a, b = self.edges.T
@@ -63,13 +63,13 @@ class EdgeGraph:
         return coo_matrix((safe, both), shape=(self.size, self.size)).tocsr()
 
     def path(self, start: int, end: int, weight: FloatArray | None = None) -> IntArray:
-        """The path of least weight (by default: of least length) from `start` to `end`."""
+        """Return the path of least weight (by default: of least length) from `start` to `end`."""
         return path_in(self.matrix(self.length if weight is None else weight), start, end)
 
 
 @once_per_surface
 def _edge_lengths(surface: Surface) -> FloatArray:
-    """#E [m]."""
+    """Return #E, the lengths of edges [m]."""
     a, b = half_edges_of(surface).edges.T
     length = np.asarray(np.linalg.norm(surface.vertices[b] - surface.vertices[a], axis=1))
     length.flags.writeable = False
@@ -77,7 +77,7 @@ def _edge_lengths(surface: Surface) -> FloatArray:
 
 
 def path_in(matrix: csr_matrix, start: int, end: int) -> IntArray:
-    """The path of least weight in a matrix of weights, or an empty array if there is none."""
+    """Return the path of least weight in a matrix of weights, or an empty array if there is none."""
     from scipy.sparse.csgraph import dijkstra
 
     _, before = dijkstra(matrix, indices=start, return_predecessors=True)
@@ -91,7 +91,7 @@ def path_in(matrix: csr_matrix, start: int, end: int) -> IntArray:
 
 
 def as_vertex(surface: Surface, place: int | ArrayLike, *, as_read: bool = False, among: IntArray | None = None) -> int:
-    """The vertex that a user means by an index or by a point.
+    """Return the vertex that a user names by an index or by a point.
 
     Args:
         surface: where.
@@ -133,7 +133,7 @@ def _by_index(surface: Surface, place: object, as_read: bool) -> int:
         return index
     at = np.flatnonzero(surface.input_index == index)
     if len(at) == 0:
-        # Welded or merged away: what lies in its place is what the user sees there.
+        # It was welded or merged away: the vertex now at its place stands for it.
         point = surface.input_vertices[index]
         distance = np.linalg.norm(surface.vertices - point, axis=1)
         if distance.min() > 1e-4 * np.linalg.norm(np.ptp(surface.vertices, axis=0)):
@@ -143,5 +143,5 @@ def _by_index(surface: Surface, place: object, as_read: bool) -> int:
 
 
 def path_length(surface: Surface, paths: Sequence[ArrayLike]) -> float:
-    """The length of paths along edges (each a row of vertices), summed [m]."""
+    """Return the length of paths along edges (each a row of vertices), summed [m]."""
     return float(sum(polyline_length(surface.vertices[np.asarray(path)]) for path in paths))

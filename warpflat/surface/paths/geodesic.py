@@ -3,12 +3,12 @@
 The distance d at a vertex v is the least d(p) + |v - p| over the points p of the sides opposite to it, with d linear
 along each side (the Hopf-Lax form of the eikonal equation; Bornemann and Rasch 2006). It is exact where the front is
 straight, on whatever triangles, hence for a straight line on a surface that can be developed; the heat method is off
-by a quarter of an edge and more there. It is found from above: distances along edges are no shorter, and going
-through the vertices in the order of these, each takes the best p that it sees and, if that has brought it nearer, lets
-its neighbours look again. With every vertex's p held, the equations are linear, and triangular but for ways in circles.
+by a quarter of an edge and more there. Distances are found from above, starting from those along edges: in the order of
+these, each vertex takes the best p among its opposite sides and, if that shortens its distance, marks its neighbours for
+another look. With every vertex's p fixed the equations are linear, and triangular unless paths run in circles.
 
-The station of the nearest point is constant along the way to it: the same linear system carries it. Beyond the ends of
-the line, where the nearest point is one end for all, the direction in which the way leaves that end is carried instead.
+The station of the nearest point is constant along the path to it, so the same linear system propagates it. Beyond the ends
+of the line, where the nearest point is one end for all, the direction in which the path leaves that end is propagated instead.
 """
 
 from __future__ import annotations
@@ -34,20 +34,20 @@ __all__ = ["distance_from", "extend_to_border", "signed_distance_and_station"]
 
 
 def distance_from(surface: Surface, line: ArrayLike) -> FloatArray:
-    """#V, the distance [m] along the surface from a line.
+    """Return #V, the distance [m] along the surface from a line.
 
     Args:
-        surface: where.
+        surface: the surface.
         line: vertex indices along edges (or a single vertex).
     """
     path = np.asarray(line, dtype=np.int64).ravel()
     if len(path) == 0 or path.min() < 0 or path.max() >= len(surface.vertices):
         raise InputError(f"a line on {surface.name!r} needs vertices from 0 to {len(surface.vertices) - 1}")
-    return _Ways(surface, _short_triangles(surface), path).distance
+    return _GeodesicField(surface, _short_triangles(surface), path).distance
 
 
 def _short_triangles(surface: Surface) -> IntArray:
-    """#T by 3, quads split along their shorter diagonal."""
+    """Return the faces as triangles (#T by 3), quads split along their shorter diagonal."""
     if not surface.is_quad.any():
         return np.ascontiguousarray(surface.faces[:, :3])
     lengths, quads = unfold_quad_diagonals(surface.vertices, surface.faces)
@@ -59,16 +59,16 @@ def _short_triangles(surface: Surface) -> IntArray:
 def signed_distance_and_station(
     surface: Surface, line: ArrayLike, *, extend: bool = True
 ) -> tuple[FloatArray, FloatArray]:
-    """Coordinates of a first layout: how far each vertex lies from a line, and beside which place of it.
+    """Return coordinates of a first layout: each vertex's distance from a line, and the station of its nearest point on it.
 
-    Where the nearest point of the line is one of its ends and the way to it is not at right angles to the line,
-    distance and direction are taken as polar coordinates about that end, so that places beyond an end do not all get
+    Where the nearest point of the line is one of its ends and the path to it is not at right angles to the line,
+    distance and direction are taken as polar coordinates about that end, so that vertices beyond an end do not all get
     its station.
 
     Args:
-        surface: where.
+        surface: the surface.
         line: vertex indices along edges, not closed.
-        extend: carry an end inside of the piece on to the border, straight ahead.
+        extend: true to extend an end inside the piece straight ahead to the border.
 
     Returns:
         #V, the signed distance x [m], positive to the right of the line, seen from outside (the side from which faces
@@ -87,16 +87,16 @@ def signed_distance_and_station(
     station = arc_lengths(surface.vertices[path])
     station -= station[before]
     triangles = _short_triangles(surface)
-    ways = _Ways(surface, triangles, path.astype(np.int64))
-    along = ways.carry(path.astype(np.int64), station)
+    field = _GeodesicField(surface, triangles, path.astype(np.int64))
+    along = field.propagate(path.astype(np.int64), station)
     known, side, about_ends = _directions_at_line(surface, triangles, path)
-    columns = ways.carry(known, np.column_stack([side, *about_ends])).T
-    x, y = ways.distance * np.sign(columns[0]), along
+    columns = field.propagate(known, np.column_stack([side, *about_ends])).T
+    x, y = field.distance * np.sign(columns[0]), along
     for (right, up), end, outwards in ((columns[1:3], station[0], -1.0), (columns[3:], station[-1], 1.0)):
         beyond = outwards * up > 0
-        scale = ways.distance / np.where(beyond, np.hypot(right, up), 1.0)
+        scale = field.distance / np.where(beyond, np.hypot(right, up), 1.0)
         x, y = np.where(beyond, scale * right, x), np.where(beyond, end + scale * up, y)
-    # A way from beyond the line's reach of known places may end on the line itself, which has no side.
+    # A path may end on the line itself, which has no side.
     lost = columns[0] == 0
     lost[path] = False
     sides = _sides(surface, path) if lost.any() else None
@@ -104,10 +104,10 @@ def signed_distance_and_station(
 
 
 def extend_to_border(surface: Surface, line: IntArray) -> tuple[IntArray, int]:
-    """The line carried on straight ahead, along edges, from each end that is inside to the border.
+    """Extend a line straight ahead, along edges, from each end that is inside to the border.
 
     Returns:
-        The longer line, and the position of the old line's first vertex in it. An end from which no way leads to the
+        The longer line, and the position of the old line's first vertex in it. An end from which no path leads to the
         border clear of the line stays where it is.
     """
     border = _on_border(surface)
@@ -125,7 +125,7 @@ def _on_border(surface: Surface) -> set[int]:
 
 
 def _ahead(surface: Surface, path: list[int]) -> list[int]:
-    """The vertices from the end of a path straight on to the border, or none."""
+    """Return the vertices from the end of a path straight on to the border, or none."""
     import potpourri3d
 
     points = surface.vertices[path]
@@ -153,21 +153,21 @@ def _ahead(surface: Surface, path: list[int]) -> list[int]:
 
 # Rounds over all vertices; a mesh of needles may take that many, any other a few.
 _MOST_ROUNDS = 200
-# How far back in the order of vertices a shorter way is made known at once, as a share of all.
+# Share of all vertices, back in their order, within which a shorter distance is passed on at once.
 _REACH = 0.1
-# Less of the largest distance, or of the largest value carried, is rounding.
+# Changes below this share of the largest distance, or of the largest value propagated, are rounding.
 _ROUNDING = 1e-14
 
 
-class _Ways:
-    """The shortest ways to a line: each vertex's distance, and the place on an opposite side where its way passes.
+class _GeodesicField:
+    """The shortest paths to a line: each vertex's distance, and the point on an opposite side through which its path passes.
 
     Attributes:
         distance: #V [m].
     """
 
     def __init__(self, surface: Surface, triangles: IntArray, line: NDArray[np.int64]) -> None:
-        # Ways along edges are no shorter, and nearly in the right order: in here vertices are numbered by these.
+        # Paths along edges are no shorter, and nearly in the right order: inside this class vertices are numbered by their lengths.
         along_edges = _along_edges(surface, line)
         order = np.argsort(along_edges, kind="stable").astype(np.int32)
         self._here = np.arange(len(order), dtype=np.int32)
@@ -183,49 +183,58 @@ class _Ways:
         launch_each(see_sides, corner.size, [surface.vertices[order], corner, slot], [ends, seen])
         waiting, shortened = 1 + self._on_line, np.empty(1, dtype=np.int32)
         crowd = np.add.reduceat(1 - self._on_line, self._here[::CROWD], dtype=np.int32)
-        self._ways = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
+        self._paths = self._here.copy(), self._here.copy(), np.zeros(len(order)), np.zeros(len(order))
         for _ in range(_MOST_ROUNDS):
             shortened[0] = 0
             wp.launch(
                 find_ways,
                 dim=1,
                 inputs=[offset, ends, seen, int(_REACH * len(order)), tolerance],
-                outputs=[distance, waiting, crowd, *self._ways, shortened],
+                outputs=[distance, waiting, crowd, *self._paths, shortened],
                 device="cpu",
             )
             if shortened[0] == 0:
                 break
-        # The most that is held at once, and not needed any more.
+        # These arrays are the largest, and are not needed any more.
         del corner, slot, offset, ends, seen
-        self._order, self._straight = self._order_of_ways()
-        self.distance = self._carry(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
+        self._order, self._straight = self._order_of_paths()
+        self.distance = self._solve(self._on_line, distance[:, None], grows=1.0)[self._rank, 0]
 
-    def _order_of_ways(self) -> tuple[IntArray, bool]:
-        """The vertices, each after those that its way leads to, as far as ways do not go in circles; whether none does."""
+    def _order_of_paths(self) -> tuple[IntArray, bool]:
+        """Return the vertices, each after those that its path leads to, as far as paths run in no circles; and whether none does."""
         from scipy.sparse import csr_array
         from scipy.sparse.csgraph import connected_components
 
-        first, second, share, _ = self._ways
+        first, second, share, _ = self._paths
         count = len(self._here)
         ends = np.stack(
             [np.where(share < 1, first, self._here), np.where(share > 0, second, self._here)], axis=1
         ).ravel()
         offset = np.arange(0, len(ends) + 1, 2, dtype=np.int32)
         graph = csr_array((np.ones(len(ends), dtype=np.int8), ends, offset), shape=(count, count))
-        # Strongly connected components come numbered in such an order, of which nothing but the number of rounds depends.
+        # Strongly connected components are numbered in such an order. Only the number of rounds depends on it.
         parts, label = connected_components(graph, connection="strong")
         straight = parts == count and bool((label[ends].reshape(-1, 2) <= label[:, None]).all())
         return counting_sort(label, parts)[0], straight
 
-    def _carry(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
-        """#V by #K, what each vertex gets from where its way passes, `grows` times the leg more; the fixed keep theirs."""
+    def _solve(self, fixed: IntArray, value: FloatArray, *, grows: float) -> FloatArray:
+        """Solve for values along the paths.
+
+        Args:
+            fixed: #V, 1 for vertices that keep their values.
+            value: #V by #K, start values, which are overwritten.
+            grows: factor of the length of the path's leg that is added to the value where it passes the opposite side.
+
+        Returns:
+            #V by #K.
+        """
         change = np.empty(value.shape[1])
         for _ in range(_MOST_ROUNDS):
             change[:] = 0.0
             wp.launch(
                 carry_along,
                 dim=1,
-                inputs=[*self._ways, self._order, fixed, grows],
+                inputs=[*self._paths, self._order, fixed, grows],
                 outputs=[value, change],
                 device="cpu",
             )
@@ -233,17 +242,17 @@ class _Ways:
                 break
         return value
 
-    def carry(self, known: NDArray[np.int64], values: FloatArray) -> FloatArray:
-        """#V (by #K), the values (#N, or #N by #K) of `known` vertices, the line's among them, carried to all others."""
+    def propagate(self, known: NDArray[np.int64], values: FloatArray) -> FloatArray:
+        """Propagate values (#N, or #N by #K) of `known` vertices, which include the line, to all others: #V (by #K)."""
         fixed, at = self._on_line.copy(), self._rank[known]
         fixed[at] = 1
         start = np.zeros((len(fixed), *values.shape[1:]))
         start[at] = values
-        return self._carry(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
+        return self._solve(fixed, start.reshape(len(fixed), -1), grows=0.0).reshape(start.shape)[self._rank]
 
 
 def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
-    """#V, the distance [m] from the line along edges."""
+    """Return #V, the distance [m] from the line along edges."""
     from scipy.sparse import csr_array
     from scipy.sparse.csgraph import dijkstra
 
@@ -260,7 +269,7 @@ def _along_edges(surface: Surface, line: NDArray[np.int64]) -> FloatArray:
 def _directions_at_line(
     surface: Surface, triangles: IntArray, path: IntArray
 ) -> tuple[NDArray[np.int64], FloatArray, tuple[FloatArray, FloatArray]]:
-    """The vertices of the line and those joined to it, and where they lie.
+    """Find the vertices of the line and those joined to it, and their positions relative to it.
 
     Returns:
         #N, the vertices; #N, more or less than 0 to the right or left of the line; and for either end of it, #N by 2, right
@@ -296,7 +305,7 @@ def _directions_at_line(
 def _around(
     vertices: FloatArray, triangles: IntArray, path: IntArray
 ) -> tuple[IntArray, FloatArray, FloatArray, IntArray]:
-    """The triangles around each vertex of a line, one after the other.
+    """List the triangles around each vertex of a line.
 
     Returns:
         #R by 2, their other two vertices, anticlockwise; #R, the angle between these [rad]; #R by 2, how far they are [m]; #P+1, where
@@ -315,7 +324,7 @@ def _around(
 
 
 def _sides(surface: Surface, path: IntArray) -> FloatArray | None:
-    """#V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
+    """Return #V, -1 to the left of the line and +1 to the right of it; None where the line does not part the surface."""
     he = half_edges_of(surface)
     position = np.full(len(surface.vertices), -2, dtype=np.int64)
     position[path] = np.arange(len(path))

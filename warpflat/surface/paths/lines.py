@@ -1,4 +1,4 @@
-"""Feature lines: paths along mesh edges, found from what a pattern maker would say.
+"""Feature lines: paths along mesh edges, found from vertices, end points, planes or curves.
 
 Every function returns vertex indices of the surface, int32, along mesh edges; a closed line repeats its first vertex.
 Stretches of the border are in :mod:`warpflat.surface.paths.border`.
@@ -20,12 +20,12 @@ from warpflat.core.text import shown
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, are_joined, as_vertex, path_in
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 
-# How dearly a path pays for leaving the plane or curve it is to follow: its cost per length grows by this factor times
-# the squared distance in edge lengths.
+# The cost per length of a path that leaves the plane or curve it should follow grows by this factor times the squared distance in
+# edge lengths.
 _FOLLOW = 2.0
 # A weight too small to lengthen a path: it only chooses among paths of one length, as on a grid.
 _TIE = 1e-4
@@ -36,12 +36,12 @@ _OFF_PIECE = 2.0
 
 
 def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = False) -> IntArray:
-    """A line given vertex by vertex.
+    """Check a line given vertex by vertex, and return it.
 
     Args:
-        surface: where.
+        surface: the surface.
         indices: vertex indices in order.
-        as_read: they count the vertices of the file (from 0) instead of the surface's.
+        as_read: indices count the vertices of the file (from 0) instead of the surface's.
 
     Raises:
         InputError: if a vertex does not exist, or where two in a row are not joined by an edge.
@@ -68,16 +68,16 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
 
 
 def _are_neighbors(surface: Surface, a: IntArray, b: IntArray) -> BoolArray:
-    """Whether edges join them (#N each)."""
-    numbered = row_by_row(surface)
+    """Return #N, true where an edge joins `a` and `b` (#N each)."""
+    numbered = row_major_grid(surface)
     return are_joined(half_edges_of(surface).edges, a, b) if numbered is None else numbered.are_joined(a, b)
 
 
 def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike, *, as_read: bool = False) -> IntArray:
-    """The shortest path along edges between two places; of paths of one length, the one closest to the straight line.
+    """Return the shortest path along edges between two places; of several of one length, the one closest to the straight line.
 
     Args:
-        surface: where.
+        surface: the surface.
         start, end: a vertex index, or a point [m] that stands for the nearest vertex.
         as_read: indices count the vertices of the file (from 0) instead of the surface's.
     """
@@ -93,13 +93,13 @@ def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike,
 
 
 def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntArray:
-    """The chain of edges that follows the section with a plane most closely.
+    """Return the chain of edges that follows the section with a plane most closely.
 
     Of several sections the longest counts. One that runs from border to border gives an open line, one that runs around
     the surface a closed line. Its direction is that in which the plane's normal lies to the right, seen from outside.
 
     Args:
-        surface: where.
+        surface: the surface.
         point: a point of the plane [m].
         normal: the plane's normal, any length.
 
@@ -132,7 +132,7 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
     off = np.abs(height)[graph.edges].mean(axis=1) / mean
     weight = graph.length * (1 + _FOLLOW * off**2)
     if closed:
-        line = _around(graph, crossing, station, inside, weight, height)
+        line = _path_around(graph, crossing, station, inside, weight, height)
     else:
         ends = [edge[np.argmin(np.abs(height[edge]))] for edge in graph.edges[crossing[[0, -1]]]]
         if ends[0] == ends[1]:
@@ -145,7 +145,7 @@ def line_on_plane(surface: Surface, point: ArrayLike, normal: ArrayLike) -> IntA
 def _longest_section(
     surface: Surface, height: FloatArray, above: BoolArray
 ) -> tuple[NDArray[np.int64], FloatArray, bool]:
-    """The edges that the longest section crosses, in order; the arc length at each [m]; whether it is closed."""
+    """Return the edges that the longest section crosses, in order; the arc length at each [m]; and whether it is closed."""
     he = half_edges_of(surface)
     up = above[he.tail] & ~above[he.head]
     down = ~above[he.tail] & above[he.head]
@@ -154,7 +154,7 @@ def _longest_section(
     share = ha / np.where(ha == hb, 1.0, ha - hb)
     place = a + np.clip(share, 0, 1)[:, None] * (b - a)
     # Going around a face, the section enters where the side drops below the plane and leaves where it rises next:
-    # what is above lies to the left of the way.
+    # the side above lies to the left.
     follow: dict[int, int] = {}
     entries = np.flatnonzero(up)
     for h in entries.tolist():
@@ -179,7 +179,7 @@ def _longest_section(
     return np.array(chain, dtype=np.int64), station, best[2]
 
 
-def _around(
+def _path_around(
     graph: EdgeGraph,
     crossing: NDArray[np.int64],
     station: FloatArray,
@@ -187,7 +187,7 @@ def _around(
     weight: FloatArray,
     height: FloatArray,
 ) -> IntArray:
-    """The closed path that goes around once with a closed section.
+    """Return the closed path that goes around once with a closed section.
 
     The band of edges along the section is laid out twice, one turn after the other; the path runs from a vertex to its
     own copy one turn later.
@@ -214,12 +214,12 @@ def _around(
 
 
 def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") -> IntArray:
-    """The path along edges that follows a drawn curve most closely.
+    """Return the path along edges that follows a drawn curve most closely.
 
     Points that lie on vertices are kept; between them the path is drawn to the curve.
 
     Args:
-        surface: where.
+        surface: the surface.
         points: #P by 3, a polyline [m] near the surface; closed if it repeats its first point.
         name: what messages call it.
 
@@ -251,15 +251,15 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
         if j - i == 1 and graph.are_joined(start, end):
             line.append(end)
             continue
-        line += _along(surface, graph, curve[i : j + 1], start, end, edge)
+        line += _path_along(surface, graph, curve[i : j + 1], start, end, edge)
     line = _without_detours(line)
     if len(line) < 2:
         raise InputError(f"curve {shown(name)} is shorter than the edges of {surface.name!r} around it")
     return np.array(line, dtype=np.int32)
 
 
-def _along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, end: int, edge: float) -> list[int]:
-    """The vertices after `start` on the path to `end` that keeps to a stretch of a curve."""
+def _path_along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, end: int, edge: float) -> list[int]:
+    """Return the vertices after `start` on the path to `end` that follows a stretch of a curve."""
     from scipy.spatial import cKDTree
 
     if start == end:
@@ -267,8 +267,8 @@ def _along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, en
         _, via = cKDTree(surface.vertices).query(curve[middle])
         if int(via) == start:
             return []
-        out = _along(surface, graph, curve[: middle + 1], start, int(via), edge)
-        return out + _along(surface, graph, curve[middle:], int(via), end, edge)
+        out = _path_along(surface, graph, curve[: middle + 1], start, int(via), edge)
+        return out + _path_along(surface, graph, curve[middle:], int(via), end, edge)
     steps = np.maximum(np.ceil(segment_lengths(curve) / (0.25 * edge)).astype(int), 1)
     fine = [np.linspace(p, q, n, endpoint=False) for p, q, n in zip(curve[:-1], curve[1:], steps, strict=True)]
     off, _ = cKDTree(np.concatenate([*fine, curve[-1:]])).query(surface.vertices[graph.edges].mean(axis=1))
@@ -277,7 +277,7 @@ def _along(surface: Surface, graph: EdgeGraph, curve: FloatArray, start: int, en
 
 
 def _without_detours(line: list[int]) -> list[int]:
-    """A path without steps that are taken straight back."""
+    """Return a path without steps that are taken straight back."""
     out: list[int] = []
     for vertex in line:
         if len(out) > 1 and out[-2] == vertex:
@@ -288,7 +288,7 @@ def _without_detours(line: list[int]) -> list[int]:
 
 
 def with_lines(surface: Surface, lines: Mapping[str, ArrayLike]) -> Surface:
-    """The surface with further feature lines; one of the same name is replaced.
+    """Return the surface with further feature lines; a line of the same name is replaced.
 
     Raises:
         InputError: if a line does not run along edges, or its name cannot be written.

@@ -1,4 +1,4 @@
-"""Paths drawn on a surface that need not follow its edges: geodesics and polylines of geodesics.
+"""Paths on a surface that need not follow its edges: geodesics and polylines of geodesics.
 
 A path is a row of points, each at a vertex, on an edge or inside a triangle, two neighbours always in one triangle.
 Quads are taken as two triangles (:func:`path_triangles`). :func:`warpflat.surface.cut.split_faces.split_faces_along` turns a path
@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length, project_on_segments
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -70,7 +71,7 @@ class SurfacePath:
 
 
 def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
-    """The triangles that paths run over: #T by 3 vertices, and #T, the face of each.
+    """Return the triangles that paths run over: #T by 3 vertices, and #T, the face of each.
 
     A quad is split along its corners 0-2, or along 1-3 where only that diagonal lies inside it.
     """
@@ -85,7 +86,7 @@ def path_triangles(surface: Surface) -> tuple[IntArray, IntArray]:
 
 
 def make_path(surface: Surface, places: Sequence[Place], *, closed: bool = False) -> SurfacePath:
-    """A path from its places, which lie in order, neighbours in one triangle."""
+    """Make a path from its places, in order, of which each two neighbours lie in one triangle."""
     support = np.full((len(places), 3), -1, dtype=np.int32)
     weights = np.zeros((len(places), 3))
     for row, place in enumerate(places):
@@ -96,7 +97,7 @@ def make_path(surface: Surface, places: Sequence[Place], *, closed: bool = False
 
 
 def _tidy(corners: Sequence[int], weights: ArrayLike) -> Place:
-    """A place as vertex to weight: rounding noise dropped, so that a point at a vertex is exactly there."""
+    """Make a place from weights without their rounding noise, so that a point at a vertex is exactly there."""
     w = np.clip(np.asarray(weights, dtype=float), 0.0, None)
     w[w < _AT_CORNER * w.sum()] = 0.0
     w /= w.sum()
@@ -104,7 +105,7 @@ def _tidy(corners: Sequence[int], weights: ArrayLike) -> Place:
 
 
 def locate(surface: Surface, point: ArrayLike | int) -> Place:
-    """The place on the surface nearest to a point, as vertex to weight: one vertex, two of an edge, or three.
+    """Return the place on the surface nearest to a point.
 
     Args:
         surface: the surface.
@@ -146,7 +147,7 @@ def locate(surface: Surface, point: ArrayLike | int) -> Place:
 
 
 def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> SurfacePath:
-    """The straightest path on the surface between two points.
+    """Return the straightest path on the surface between two points.
 
     The shortest path along edges is shortened by edge flips until it is straight (Sharp and Crane 2020, "You can find
     geodesic paths in triangle meshes by just flipping edges"). It is a geodesic, and the shortest one unless a bump as
@@ -160,8 +161,6 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         InputError: if both ends are one point, or lie on parts of the surface that are not connected.
     """
     import potpourri3d
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
 
     ends = [locate(surface, a), locate(surface, b)]
     if ends[0] == ends[1]:
@@ -171,8 +170,7 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
         return make_path(surface, ends)
     size = len(surface.vertices)
     row, column = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
-    graph = coo_matrix((np.ones(len(row), dtype=np.int8), (row, column)), shape=(size, size))
-    part = connected_components(graph, directed=False)[1]
+    part = join_labels(size, row, column)
     if part[next(iter(ends[0]))] != part[next(iter(ends[1]))]:
         raise InputError(
             f"no path from {describe_place(ends[0])} to {describe_place(ends[1])}: they lie on separate parts of the "
@@ -201,7 +199,7 @@ def geodesic_path(surface: Surface, a: ArrayLike | int, b: ArrayLike | int) -> S
 
 
 def polyline_path(surface: Surface, points: Sequence[ArrayLike | int], *, closed: bool = False) -> SurfacePath:
-    """Geodesics from each point to the next, as one path.
+    """Join geodesics from each point to the next to one path.
 
     Args:
         surface: the surface.
@@ -228,7 +226,7 @@ def polyline_path(surface: Surface, points: Sequence[ArrayLike | int], *, closed
 
 
 def simplify_places(places: Sequence[Place]) -> list[Place]:
-    """Drop what a straight path does not need: repetitions, points inside a triangle, points between two of one edge.
+    """Drop places that a straight path does not need: repetitions, points inside a triangle, points between two of one edge.
 
     The ends stay.
     """
@@ -257,13 +255,13 @@ class VertexStar:
         self._start = np.searchsorted(np.sort(corner), np.arange(int(corner.max(initial=-1)) + 2))
 
     def around(self, vertex: int) -> NDArray[np.int64]:
-        """The triangles at a vertex, in their order; none for a vertex in no triangle."""
+        """Return the triangles at a vertex, sorted; none for a vertex in no triangle."""
         if vertex + 1 >= len(self._start):
             return np.empty(0, dtype=np.int64)
         return self._order[self._start[vertex] : self._start[vertex + 1]]
 
     def sharing(self, vertices: Sequence[int]) -> list[int]:
-        """The triangles that have all these vertices."""
+        """Return the triangles that have all these vertices."""
         first, *rest = dict.fromkeys(vertices)
         found = self.around(first)
         for vertex in rest:
@@ -272,7 +270,7 @@ class VertexStar:
 
 
 def _insert(triangles: IntArray, new: int, place: Place) -> IntArray:
-    """The triangles with a vertex added inside one of them, or on an edge, whose triangles are then divided too."""
+    """Insert a vertex inside a triangle or on an edge, and return the triangles, of which those at that place are divided."""
     hit = np.isin(triangles, list(place)).sum(axis=1) == len(place)
     parts = []
     for corner in range(3):
@@ -299,26 +297,28 @@ def _retrace(
     start: int,
     stop: int,
 ) -> list[Place]:
-    """Find the vertex or edge that each point of a drawn path lies on, walking from triangle to triangle.
+    """Find the vertex or edge on which each point of a path lies, from triangle to triangle.
 
-    The solver gives positions only. Each point lies on the rim of the triangles around the one before.
+    The solver gives positions only. Each point lies on the border of the triangles around the one before.
     """
     star = VertexStar(triangles)
     walked: list[Place] = [{start: 1.0}]
     for target in drawn[1:-1]:
-        place, distance, size = _nearest_on_rim(positions, star, walked[-1], target)
+        place, distance, size = _nearest_on_edges(positions, star, walked[-1], target)
         if distance > 1e-6 * size:
-            raise InputError(f"no straight path found near {describe_place(walked[-1])}: mend the triangles there")
+            raise InputError(f"no straight path found near {describe_place(walked[-1])}: repair the triangles there")
         walked.append(place)
     if not star.sharing([*walked[-1], stop]):
-        raise InputError(f"the path ends at {describe_place(walked[-1])}, short of its goal: mend the triangles there")
+        raise InputError(
+            f"the path ends at {describe_place(walked[-1])}, short of its goal: repair the triangles there"
+        )
     return [*walked, {stop: 1.0}]
 
 
-def _nearest_on_rim(
+def _nearest_on_edges(
     positions: FloatArray, star: VertexStar, here: Place, target: FloatArray
 ) -> tuple[Place, float, float]:
-    """The nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
+    """Return the nearest place on the edges of the triangles at `here`, its distance [m], and their longest edge [m]."""
     around = star.triangles[star.sharing(list(here))]
     edges = np.concatenate([around[:, [0, 1]], around[:, [1, 2]], around[:, [2, 0]]])
     starts, ends = positions[edges[:, 0]], positions[edges[:, 1]]
@@ -329,6 +329,6 @@ def _nearest_on_rim(
 
 
 def describe_place(place: Place) -> str:
-    """A place in words for messages."""
+    """Describe a place in words for messages."""
     named = ", ".join(str(v) for v in sorted(place))
     return f"vertex {named}" if len(place) == 1 else f"a point between vertices {named}"

@@ -1,4 +1,4 @@
-"""From polygons as files have them to faces of three or four distinct, convex corners."""
+"""Polygons as files have them, made into faces of three or four distinct, convex corners."""
 
 from __future__ import annotations
 
@@ -27,14 +27,14 @@ _MOST_CORNERS = 2**27
 
 
 def list_some(indices: ArrayLike, most: int = 8) -> str:
-    """`3, 4, 9 and 12 more`: enough of a list to go and look, short enough for one line."""
+    """Return the beginning of a list of indices and the number of the others, such as `3, 4, 9 and 12 more`."""
     values = np.asarray(indices).ravel()
     shown = ", ".join(str(int(i)) for i in values[:most])
     return shown if len(values) <= most else f"{shown} and {len(values) - most:,} more"
 
 
 def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
-    """#F by the largest corner count, vertex indices, filled up with -1 on the right.
+    """Return #F by the largest corner count, vertex indices, filled up with -1 on the right.
 
     Raises:
         InputError: if there are no polygons or one has fewer than three corners.
@@ -71,7 +71,7 @@ def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[
 
 
 def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
-    """#F by the largest corner count, at least 4: corners one face after the other, filled up with -1 on the right.
+    """Return #F by the largest corner count, at least 4: corners one face after the other, filled up with -1 on the right.
 
     Raises:
         InputError: if one face has so many corners that the table of all faces would not fit into memory.
@@ -88,10 +88,10 @@ def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.i
 
 
 def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], BoolArray, BoolArray]:
-    """Polygons without corners that repeat the one before.
+    """Return polygons without corners that repeat the one before.
 
-    A quad with two equal neighbouring corners is a triangle; what keeps fewer than three corners, or the same vertex
-    twice apart from each other, is no face.
+    A quad with two equal neighbouring corners is a triangle; a polygon with fewer than three corners left, or with
+    one vertex at two places, is no face.
 
     Returns:
         #F by k polygons; #F, which of them are faces; #F, which of those lost a corner.
@@ -111,7 +111,7 @@ def distinct_corners(polygons: NDArray[np.int64]) -> tuple[NDArray[np.int64], Bo
 
 
 def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[IntArray, IntArray]:
-    """#F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
+    """Return #F by 4 faces with -1 in the last column of a triangle, and #F, the polygon of each.
 
     Polygons of more than four corners are cut into triangles in their mean plane, as fat ones as their corners allow.
 
@@ -138,12 +138,12 @@ def split_polygons(vertices: FloatArray, polygons: NDArray[np.int64]) -> tuple[I
 
 
 def _newell(points: FloatArray) -> FloatArray:
-    """Twice the vector area of a closed polygon."""
+    """Return twice the vector area of a closed polygon."""
     return np.cross(points, np.roll(points, -1, axis=0)).sum(axis=0)
 
 
 def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
-    """Triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
+    """Return triangles (#T by 3 local corner numbers), wound as the polygon is, of one simple polygon."""
     import shapely
 
     centred = points - points.mean(axis=0)
@@ -163,7 +163,7 @@ def _triangulated(points: FloatArray, row: int) -> NDArray[np.int64]:
 
 
 def _plane_axes(normal: FloatArray) -> FloatArray:
-    """2 by 3, two unit vectors at right angles to each other and to `normal`, so that all three make a right-handed frame."""
+    """Return 2 by 3, two unit vectors that make a right-handed orthogonal frame with `normal`."""
     axis = np.eye(3)[int(np.argmin(np.abs(normal)))]
     first = np.cross(axis, normal)
     second = np.cross(normal, first)
@@ -173,9 +173,9 @@ def _plane_axes(normal: FloatArray) -> FloatArray:
 def split_non_convex_quads(
     vertices: FloatArray, faces: IntArray, origin: IntArray, tolerance: float
 ) -> tuple[IntArray, IntArray, IntArray]:
-    """Quads with a straight or inward corner, cut into two triangles from that corner.
+    """Return quads with a straight or inward corner, cut into two triangles from that corner.
 
-    The corner triangle there would have no area, or less: no measure by corners could tell it from a flipped one.
+    The corner triangle there would have no area, or a negative one, and could not be distinguished from a flipped one.
 
     Args:
         vertices: #V by 3, positions [m].
@@ -211,14 +211,14 @@ def split_non_convex_quads(
 
 
 def crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
-    """Which faces (#F by 4) are quads whose sides cross, or that are folded by more than 90 degrees."""
+    """Return the faces (of #F by 4) that are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
     doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]
     return doubtful[_quad_corners(vertices[faces[doubtful]], tolerance)[3]]
 
 
 def _may_cross(vertices: FloatArray, quads: IntArray, tolerance: float) -> BoolArray:
-    """#Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
+    """Return #Q, which quads have a corner that turns the other way, or next to no area: all that cross are among these."""
     p = points_at(vertices, quads.T)
     side, diagonal = np.roll(p, -1, axis=1) - p, p[:, 2:] - p[:, :2]
     normal = cross(diagonal[:, 0], diagonal[:, 1])
@@ -228,8 +228,16 @@ def _may_cross(vertices: FloatArray, quads: IntArray, tolerance: float) -> BoolA
 
 
 def _quad_corners(p: FloatArray, tolerance: float) -> tuple[NDArray[Any], ...]:
-    """Of quads, #Q by 4 by 3: #Q by 4, the height of each corner over the diagonal before it, and whether it is straight or inward; #Q,
-    which are slivers; #Q, whose sides cross."""
+    """Measure the corners of quads.
+
+    Args:
+        p: #Q by 4 by 3, their corners [m].
+        tolerance: see :func:`split_non_convex_quads`.
+
+    Returns:
+        #Q by 4, the height of each corner over the diagonal before it [m]; #Q by 4, true where it is straight or inward; #Q, true for
+        slivers; #Q, true for quads whose sides cross.
+    """
     normal = np.cross(p[:, 2] - p[:, 0], p[:, 3] - p[:, 1])
     unit = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), np.finfo(float).tiny)
     before, after = np.roll(p, 1, axis=1), np.roll(p, -1, axis=1)

@@ -241,7 +241,12 @@ class _Patch:
         return bool(length[short] <= _LAST_RESORT * around) and self.collapse(*ends, anywhere=False)
 
     def collapse(self, a: int, b: int, *, anywhere: bool) -> bool:
-        """Merge one end of the edge a-b into the other. `anywhere`: also along the border and feature lines."""
+        """Merge one end of the edge a-b into the other, and return whether that was possible.
+
+        Args:
+            a, b: vertices.
+            anywhere: true to merge also along the border and feature lines.
+        """
         on_line = [any(v in line for line in self.lines.values()) for v in (a, b)]
         border = [self.on_border(v) for v in (a, b)]
         tries = sorted([(on_line[0], border[0], -a, a, b), (on_line[1], border[1], -b, b, a)])
@@ -274,7 +279,7 @@ class _Patch:
         return True
 
     def _may_collapse(self, gone: int, kept: int) -> bool:
-        """Whether the surface stays manifold, with the same border, when the edge between two vertices is collapsed."""
+        """Return whether the surface stays manifold, with the same border, when the edge between two vertices is collapsed."""
         apexes = set()
         for face in self.around(gone) & self.around(kept):
             ring = self.corners(face)
@@ -289,7 +294,7 @@ class _Patch:
         return self.on_border(kept) or not self.on_border(gone)
 
     def _faces_after_collapse(self, gone: int, kept: int) -> dict[int, tuple[int, ...] | None] | None:
-        """The new corners of the faces at `gone` (None: the face vanishes); None if one of them would be degenerate or turn over."""
+        """Return the new corners of the faces at `gone` (None: the face vanishes); None if one of them would be degenerate or turn over."""
         both = self.around(gone) & self.around(kept)
         new: dict[int, tuple[int, ...] | None] = {}
         for face in self.around(gone):

@@ -1,9 +1,8 @@
-"""The door: whatever comes in leaves as a checked :class:`Surface`, or not at all.
+"""Validation and repair: any polygons become a checked :class:`Surface`, or are refused.
 
-The steps are in the order in which they can be told apart: numbers and indices, corners, split corners, double faces,
-the component, edges with too many faces, winding, points where the surface only touches itself, the border, slivers.
-What can be mended without a guess is mended and noted; the rest is refused with what to do about it. Vertices that stay
-keep their order and their exact position.
+The steps are: numbers and indices, corners, split corners, double faces, the component, edges with too many faces, winding,
+points in which the surface only touches itself, the border, slivers. Faults with one plain remedy are repaired and noted; the others
+are refused with advice. Vertices that stay keep their order and their exact position.
 """
 
 from __future__ import annotations
@@ -40,7 +39,15 @@ _SMALLEST, _LARGEST = 1e-20, 1e20
 
 @dataclass
 class _Mesh:
-    """What is being mended: faces over the rows as they were read, until vertices are renumbered at the end."""
+    """A mesh under repair.
+
+    Attributes:
+        vertices: #V by 3 [m].
+        faces: #F by 4.
+        origin: #F, the input face of each.
+        index: #V, the input row of each vertex.
+        notes: repairs made, one sentence each.
+    """
 
     vertices: FloatArray
     faces: IntArray
@@ -64,28 +71,28 @@ def make_surface(
     sliver_tolerance: float = 1e-3,
     source: str | None = None,
 ) -> Surface:
-    """A surface that can be flattened, from any polygons.
+    """Return a surface that can be flattened, from any polygons.
 
     Args:
         vertices: #I by 3, positions [m].
         polygons: #F by k vertex indices (counted from 0) filled up with -1 on the right, or a list of lists.
-        name: what the piece is called in files and messages; something that can name a file on any system.
+        name: of the piece in files and messages; it must be able to name a file on any system.
         lines: feature lines by name: vertex indices (of `vertices`) along edges.
-        component: which connected part to take if there are several: "largest", or its number, largest first from 0.
-        weld: whether vertices at the same place are one. By default they are if `split_corners` says that the format
-            splits them (unless that would close a piece that is one sheet as it stands), if faces hang together in no
+        component: the connected part to take if there are several: "largest", or its number, largest first from 0.
+        weld: true to join vertices at the same place. By default they are joined if `split_corners` says that the format
+            splits them (unless that would close a piece that is one sheet as it stands), if faces are connected in no
             other way, or if several parts become one sheet by it. A cut in one connected part thus stays open.
-        split_corners: the vertices come from a format that has one per corner of a face, or per texture coordinate.
+        split_corners: true if the format has one vertex per corner of a face, or per texture coordinate.
         sliver_tolerance: a face whose least width is below this share of the edge length around it is degenerate and
             merged into its neighbours (see :mod:`warpflat.surface.repair.slivers`).
-        source: what messages call the input, such as a file's name; by default `name`.
+        source: name of the input in messages, such as a file's; by default `name`.
 
     Raises:
         InputError: with one line, if the input is no surface or no such part of one, or the name cannot name a file.
     """
     checked_name(name)
     try:
-        return _make(
+        return _checked_surface(
             vertices,
             polygons,
             name=name,
@@ -99,7 +106,7 @@ def make_surface(
         raise InputError(f"{source or name}: {error}") from error
 
 
-def _make(
+def _checked_surface(
     vertices: ArrayLike,
     polygons: ArrayLike | Sequence[Sequence[int]],
     *,
@@ -120,7 +127,7 @@ def _make(
     mesh.faces, turned = orient(mesh.faces)
     if turned:
         mesh.notes.append(f"the winding of {counted(turned, 'face')} was turned to agree with the others")
-    _part_touching_fans(mesh)
+    _separate_touching_fans(mesh)
     _drop_unused(mesh)
     kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
     _check_border(mesh.faces)
@@ -128,7 +135,7 @@ def _make(
 
 
 def checked_positions(vertices: ArrayLike) -> FloatArray:
-    """Vertices as #V by 3 numbers.
+    """Return vertices as #V by 3 numbers.
 
     Raises:
         InputError: of another shape, not finite, or out of all bounds; names the vertex.
@@ -210,7 +217,7 @@ def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
 
 
 def _weld(mesh: _Mesh, weld: bool | None, split_corners: bool, chosen: bool) -> IntArray:
-    """Join vertices at the same place where that is asked for or plainly meant; the map that was applied."""
+    """Join vertices at the same place if the user or the mesh asks for it; return #V, the vertex that each one became."""
     place, note = welding(mesh.vertices, mesh.faces, weld=weld, split_corners=split_corners, part_chosen=chosen)
     if note:
         mesh.notes.append(note)
@@ -289,7 +296,7 @@ def _refuse_crowded_edges(mesh: _Mesh) -> None:
     )
 
 
-def _part_touching_fans(mesh: _Mesh) -> None:
+def _separate_touching_fans(mesh: _Mesh) -> None:
     """Give each fan of faces its own vertex where several touch in one point only."""
     he = half_edges(mesh.faces)
     fan = corner_fans(mesh.faces)
@@ -326,7 +333,7 @@ def _drop_unused(mesh: _Mesh) -> None:
 
 
 def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, list[int]]:
-    """Lines given in input rows, in the mesh's own vertices; one off the component is left out with a note."""
+    """Return lines given in input rows, in the mesh's own vertices; one off the component is left out with a note."""
     if not paths:
         return {}
     places: dict[int, list[int]] = {}

@@ -1,4 +1,4 @@
-"""Which vertices at one place are one vertex."""
+"""Welding: vertices at one place become one vertex."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.surface.connectivity import components, euler_characteristic
+from warpflat.surface.connectivity import components, euler_characteristic, join_labels
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.repair.polygons import distinct_corners
 
@@ -14,14 +14,12 @@ __all__ = ["is_sheet", "t_junction", "weld_map", "welding"]
 
 # Share of the bounding box's diagonal within which vertices count as one place: float32's resolution.
 _SAME_PLACE = 1e-7
-# A vertex lies on an edge within this share of its length, and so far from its ends at least.
+# A vertex lies on an edge if it is within the first share of the edge's length, and at least the second from the edge's ends.
 _ON_EDGE, _OFF_ENDS = 1e-3, 1e-2
 
 
 def weld_map(vertices: FloatArray) -> IntArray:
-    """#V, for each vertex the first vertex at the same place (to 1e-7 of the bounding box's diagonal)."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    """Return #V, for each vertex the first vertex at the same place (to 1e-7 of the bounding box's diagonal)."""
     from scipy.spatial import cKDTree
 
     size = len(vertices)
@@ -33,14 +31,13 @@ def weld_map(vertices: FloatArray) -> IntArray:
     close = _SAME_PLACE * float(np.linalg.norm(np.ptp(vertices, axis=0)))
     pairs = cKDTree(vertices[first]).query_pairs(close, output_type="ndarray")
     if len(pairs):
-        graph = coo_matrix((np.ones(len(pairs), dtype=np.int8), pairs.T), shape=(len(first), len(first)))
-        group = connected_components(graph, directed=False)[1][group]
+        group = join_labels(len(first), *pairs.T).astype(np.int64)[group]
         _, first = np.unique(group, return_index=True)
     return first[group].astype(np.int32)
 
 
 def is_sheet(faces: IntArray) -> bool:
-    """Whether faces form one part without handles and with one border: something that lies flat without a cut."""
+    """Return whether faces form one part without handles and with one border, which lies flat without a cut."""
     he = half_edges(faces)
     if len(faces) == 0 or (he.count > 2).any() or components(faces).max() > 0 or not (he.count == 1).any():
         return False
@@ -55,18 +52,18 @@ def welding(
     split_corners: bool,
     part_chosen: bool,
 ) -> tuple[IntArray | None, str]:
-    """Whether to weld, and how.
+    """Decide whether to weld a mesh, and how.
 
     Args:
         vertices: #V by 3, positions [m].
         faces: #F by 4.
-        weld: the user's word; None to judge by the mesh.
+        weld: the user's choice; None to decide by the mesh.
         split_corners: the format has a vertex per corner of a face or per texture coordinate: weld, unless the faces
             form one sheet as they stand and welding would close it.
         part_chosen: the user chose one of several parts: they are meant to stay apart.
 
     Returns:
-        #V, for each vertex the one to use, or None to leave all; and what to note ("" for nothing).
+        #V, the vertex to use for each, or None to leave all; and a note ("" for none).
     """
     if weld is False:
         return None, ""
@@ -94,7 +91,7 @@ def welding(
 
 
 def t_junction(vertices: FloatArray, faces: IntArray, part: NDArray[np.integer]) -> tuple[int, int, int] | None:
-    """A vertex at the border of one part that lies on a border edge of another, and this edge's ends; None where there is none.
+    """Return a vertex at the border of one part that lies on a border edge of another, and this edge's ends; None where there is none.
 
     Args:
         vertices: #V by 3, positions [m].

@@ -1,4 +1,4 @@
-"""From the pattern to the body and back: points, and polylines drawn on either."""
+"""The map between a piece on the body and its pattern, for points and for polylines."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.closest import Closest
 
-__all__ = ["Carrier"]
+__all__ = ["PatternMap"]
 
 
-class Carrier:
-    """Carries points between a piece on the body and its pattern; both have the same faces.
+class PatternMap:
+    """Maps points between a piece on the body and its pattern; both have the same faces.
 
-    Quads count as two triangles, split alike on both sides, so a point carried there and back returns to its place.
+    Quads count as two triangles, split alike on both sides, so a point mapped there and back returns to its place.
 
     Args:
         positions: #V by 3, the piece on the body [m]. Where a cut doubled a pattern vertex, its place is given twice.
@@ -31,10 +31,12 @@ class Carrier:
         positions, pattern, faces = np.asarray(positions, float), np.asarray(pattern, float), np.asarray(faces)
         if len(positions) != len(pattern) or positions.shape[1:] != (3,) or pattern.shape[1:] != (2,):
             raise InputError(
-                f"carry: body {positions.shape} and pattern {pattern.shape}; #V by 3 and #V by 2 are needed"
+                f"pattern map: body {positions.shape} and pattern {pattern.shape}; #V by 3 and #V by 2 are needed"
             )
         if len(faces) == 0 or faces.shape[1:] != (4,) or faces.max() >= len(positions):
-            raise InputError(f"carry: faces {faces.shape} do not fit {len(positions)} vertices; #F by 4 are needed")
+            raise InputError(
+                f"pattern map: faces {faces.shape} do not fit {len(positions)} vertices; #F by 4 are needed"
+            )
         quads = faces[:, 3] >= 0
         self._triangles = np.concatenate([faces[:, :3], faces[quads][:, [0, 2, 3]]]).astype(np.int64)
         self._positions, self._pattern = positions, pattern
@@ -44,7 +46,7 @@ class Carrier:
         self._step = 0.25 * float(np.linalg.norm(np.diff(positions[self._edges], axis=1), axis=2).mean())
 
     def to_body(self, points: FloatArray, *, tolerance: float = 0.001) -> FloatArray:
-        """Where points of the pattern lie on the body.
+        """Map points of the pattern to the body.
 
         Args:
             points: #P by 2 [m].
@@ -56,10 +58,10 @@ class Carrier:
         Raises:
             InputError: if a point lies further outside.
         """
-        return self._carried(self._on_pattern, self._positions, points, tolerance, "pattern")
+        return self._mapped(self._on_pattern, self._positions, points, tolerance, "pattern")
 
     def to_pattern(self, points: FloatArray, *, tolerance: float = 0.005) -> FloatArray:
-        """Where points on the body lie in the pattern.
+        """Map points on the body to the pattern.
 
         Args:
             points: #P by 3 [m].
@@ -71,10 +73,10 @@ class Carrier:
         Raises:
             InputError: if a point lies further off.
         """
-        return self._carried(self._on_body, self._pattern, points, tolerance, "body")
+        return self._mapped(self._on_body, self._pattern, points, tolerance, "body")
 
     def polyline_to_body(self, points: FloatArray, *, tolerance: float = 0.001) -> FloatArray:
-        """A polyline drawn on the pattern, on the body: bent wherever it crosses a mesh edge, so it lies on the piece.
+        """Map a polyline on the pattern to the body, bent wherever it crosses a mesh edge, so that it lies on the piece.
 
         Args:
             points: #P by 2 [m].
@@ -89,7 +91,7 @@ class Carrier:
         return self.to_body(self._crossings(_checked(points, 2)), tolerance=tolerance)
 
     def polyline_to_pattern(self, points: FloatArray, *, tolerance: float = 0.005) -> FloatArray:
-        """A polyline drawn on the body, in the pattern, followed in steps of a quarter of an edge.
+        """Map a polyline on the body to the pattern, in steps of a quarter of an edge.
 
         Args:
             points: #P by 3 [m].
@@ -111,7 +113,7 @@ class Carrier:
             parts.append((1 - t) * a + t * b)
         return self.to_pattern(np.concatenate([*parts, points[-1:]]), tolerance=np.inf)
 
-    def _carried(
+    def _mapped(
         self, source: Closest, target: FloatArray, points: FloatArray, tolerance: float, where: str
     ) -> FloatArray:
         points = _checked(points, source.corners.shape[2])
@@ -120,13 +122,13 @@ class Carrier:
         if len(far):
             at = ", ".join(f"{v:.3f}" for v in points[far[0]])
             raise InputError(
-                f"carry: point {int(far[0])} ({at}) lies {distance[far[0]] * 1000:.1f} mm off the {where}; "
+                f"pattern map: point {int(far[0])} ({at}) lies {distance[far[0]] * 1000:.1f} mm off the {where}; "
                 f"at most {tolerance * 1000:g} mm is allowed"
             )
         return np.asarray(np.einsum("nk,nkd->nd", weights, target[self._triangles[triangle]]))
 
     def _crossings(self, points: FloatArray) -> FloatArray:
-        """A polyline in the pattern with a point added wherever it crosses an edge."""
+        """Return a polyline in the pattern with a point added wherever it crosses an edge."""
         a, b = self._pattern[self._edges[:, 0]], self._pattern[self._edges[:, 1]]
         along = b - a
         parts: list[FloatArray] = []
@@ -146,5 +148,5 @@ class Carrier:
 def _checked(points: FloatArray, width: int) -> FloatArray:
     points = np.asarray(points, float)
     if points.ndim != 2 or points.shape[1] != width or len(points) == 0 or not np.isfinite(points).all():
-        raise InputError(f"carry: points {points.shape}; #P by {width} finite numbers are needed")
+        raise InputError(f"pattern map: points {points.shape}; #P by {width} finite numbers are needed")
     return points

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.carry import Carrier
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.pattern_map import PatternMap
 
 
 @pytest.fixture(scope="module")
@@ -22,35 +22,35 @@ def piece() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_vertices_go_there_and_back(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
-    assert np.abs(carrier.to_body(flat) - body).max() < 1e-12
-    assert np.abs(carrier.to_pattern(body) - flat).max() < 1e-12
+    mapping = PatternMap(body, flat, faces)
+    assert np.abs(mapping.to_body(flat) - body).max() < 1e-12
+    assert np.abs(mapping.to_pattern(body) - flat).max() < 1e-12
 
 
 def test_any_point_goes_there_and_back(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
+    mapping = PatternMap(body, flat, faces)
     rng = np.random.default_rng(3)
     pick = rng.integers(len(faces), size=400)
     weights = rng.dirichlet(np.ones(3), 400)
     points = np.einsum("nk,nkd->nd", weights, flat[faces[pick][:, :3]])
-    there = carrier.to_body(points)
+    there = mapping.to_body(points)
     assert np.abs(there - np.einsum("nk,nkd->nd", weights, body[faces[pick][:, :3]])).max() < 1e-9
-    assert np.abs(carrier.to_pattern(there) - points).max() < 1e-9
+    assert np.abs(mapping.to_pattern(there) - points).max() < 1e-9
 
 
 def test_polyline_lies_on_the_surface(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
     body, flat, faces = piece
-    carrier = Carrier(body, flat, faces)
+    mapping = PatternMap(body, flat, faces)
     middle = flat.mean(axis=0)
     drawn = middle + np.array([[-0.12, 0.10], [0.02, -0.2], [0.10, 0.15]])
-    on_body = carrier.polyline_to_body(drawn)
+    on_body = mapping.polyline_to_body(drawn)
     assert len(on_body) > 20
     triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]]).astype(np.int64)
     # Halfway between two carried points the line is still on the surface: it bends only where the mesh does.
     halfway = 0.5 * (on_body[1:] + on_body[:-1])
     assert Closest(body, triangles)(halfway)[2].max() < 1e-9
-    back = carrier.polyline_to_pattern(on_body)
+    back = mapping.polyline_to_pattern(on_body)
     assert np.abs(back[0] - drawn[0]).max() < 1e-9
     assert np.abs(back[-1] - drawn[-1]).max() < 1e-9
     # Every point that comes back lies on the drawn line.
@@ -64,15 +64,15 @@ def _distance(points: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def test_points_off_the_piece_are_refused(piece: tuple[np.ndarray, np.ndarray, np.ndarray]) -> None:
-    carrier = Carrier(*piece)
+    mapping = PatternMap(*piece)
     with pytest.raises(InputError, match=r"point 1 .* off the pattern"):
-        carrier.to_body(np.array([piece[1][0], [5.0, 5.0]]))
+        mapping.to_body(np.array([piece[1][0], [5.0, 5.0]]))
     with pytest.raises(InputError, match=r"point 0 .* off the body"):
-        carrier.to_pattern(np.array([[3.0, 0.0, 0.0]]))
+        mapping.to_pattern(np.array([[3.0, 0.0, 0.0]]))
     with pytest.raises(InputError, match="#P by 2"):
-        carrier.to_body(np.zeros((2, 3)))
+        mapping.to_body(np.zeros((2, 3)))
     with pytest.raises(InputError, match="do not fit"):
-        Carrier(piece[0], piece[1], np.array([[0, 1, 2, 99999]]))
+        PatternMap(piece[0], piece[1], np.array([[0, 1, 2, 99999]]))
 
 
 def test_closest_is_exact_against_brute_force() -> None:

@@ -9,7 +9,7 @@ from surface_meshes import numbered_grid as grid
 
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
-from warpflat.surface.row_by_row import row_by_row
+from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.unfold import corners_around
 
 TURNS = [(turn, mirrored) for turn in range(4) for mirrored in (False, True)]
@@ -31,7 +31,7 @@ def test_what_follows_from_the_numbers_is_what_is_sorted_out_of_the_faces(
     rows: int, columns: int, turn: int, mirrored: bool
 ) -> None:
     surface = grid(rows, columns, turn, mirrored=mirrored)
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     assert numbered is not None
     assert (numbered.rows, numbered.columns) == (rows, columns)
     edge, edges, count = numbered.edges()
@@ -57,7 +57,7 @@ def test_springs_of_a_grid_are_measured_as_those_of_any_other_mesh(
     rows: int, columns: int, turn: int, mirrored: bool
 ) -> None:
     surface = grid(rows, columns, turn, mirrored=mirrored)
-    numbered, he = row_by_row(surface), half_edges(surface.faces)
+    numbered, he = row_major_grid(surface), half_edges(surface.faces)
     assert numbered is not None
     random = np.random.default_rng(1)
     vertices, diagonals = random.normal(size=(rows * columns, 3)), random.normal(size=(len(surface.faces), 2))
@@ -72,7 +72,7 @@ def test_springs_of_a_grid_are_measured_as_those_of_any_other_mesh(
 
 def test_neighbors_on_a_grid_are_those_an_edge_joins() -> None:
     surface = grid(5, 4)
-    numbered = row_by_row(surface)
+    numbered = row_major_grid(surface)
     assert numbered is not None
     a, b = np.divmod(np.arange(400), 20)
     joined = {(int(i), int(j)) for edge in half_edges(surface.faces).edges for i, j in (edge, edge[::-1])}
@@ -99,4 +99,4 @@ def test_any_other_mesh_is_not_taken_for_one(change: str) -> None:
     if change == "a face turned":
         faces[7] = np.roll(faces[7], 1)
     other = Surface(vertices=vertices, faces=faces, input_vertices=vertices, input_index=np.arange(len(vertices)))
-    assert row_by_row(other) is None
+    assert row_major_grid(other) is None
