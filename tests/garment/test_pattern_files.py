@@ -245,7 +245,7 @@ def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
 def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
     piece, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
-    (of_piece,) = re.findall(r"`(warpflat\.pattern_files\.surface_files\(.*?\))`", text)
+    (of_piece,) = re.findall(r"`(warpflat\.garment\.pattern_files\.surface_files\(.*?\))`", text)
     monkeypatch.chdir(tmp_path)
     exec(f"{piece}\nimport warpflat.garment.pattern_files\n{of_piece}", {})
     exec(garment, {})
