@@ -1,9 +1,9 @@
 """`frames.usdc`: every piece in space and in the plane, over the time of the relaxation.
 
 The writer streams: frames go to a hidden file that is saved every few frames, so that memory does not grow with their
-number. Two things can only be known at the end and are authored then, in a second pass over that file: the places of
-the patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale
-comes from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
+number. Two things are known only at the end, and are authored in a second pass over that file: the places of the patterns
+beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale comes from the
+last frame. Then the file is exported once, which compacts it, and renamed to its final name.
 """
 
 from __future__ import annotations
@@ -48,7 +48,7 @@ _COLOUR_STEPS = 1024
 
 @dataclass(kw_only=True)
 class _Piece:
-    """What the writer remembers of a piece: a few arrays of its size, whatever the number of frames."""
+    """State of a piece: a few arrays of its size, whatever the number of frames."""
 
     surface: Surface
     path: str
@@ -105,7 +105,7 @@ class FrameWriter:
         self._save_every = int(save_every)
         self._scale = scale
         self._pieces: dict[str, _Piece] = {}
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
         self._unsaved = 0
         self._stage: Any = None
         self._hidden = ExitStack()
@@ -133,7 +133,7 @@ class FrameWriter:
         return self
 
     def _begin(self, stage: Any) -> None:
-        """Author what holds for the whole file."""
+        """Author the settings of the whole file."""
         from pxr import Kind, UsdGeom
 
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
@@ -148,7 +148,7 @@ class FrameWriter:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Colour, place and export when the block ended well; the working file goes in any case."""
+        """Colour, place and export if the block ended well; the working file is removed in any case."""
         with self._hidden:
             if kind is None:
                 with usd_errors(self._final):
@@ -173,7 +173,7 @@ class FrameWriter:
 
         if name in self._pieces:
             raise ValueError(f"piece {name!r} is already in the file")
-        path = f"/World/{valid_name(name, self._taken)}"
+        path = f"/World/{valid_name(name, self._used_names)}"
         define_group(self._stage, path, label=name, kind=Kind.Tokens.component)
         points = np.asarray(surface.vertices, dtype=np.float32)
         size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0))) if len(points) else 0.0
@@ -227,31 +227,55 @@ class FrameWriter:
                 their order, in the pattern's numbering.
             lines: feature lines in the pattern's numbering, where they change; each a vertex-index array or a list of
                 them. At first those of the surface.
-            cuts: cut lines, likewise (say, both sides of a crack). At first none.
+            cuts: cut lines in the same form (say, both sides of a crack). At first none.
             measures: numbers of this frame, kept in double precision as ``/World/NAME.warpflat:KEY``.
 
         Raises:
             ValueError: the arrays do not fit together, or hold NaN.
             InputError: the disk is full or the folder is gone.
         """
-        from pxr import Usd, Vt
+        from pxr import Usd
 
         piece = self._pieces[name]
         flat = np.asarray(positions, dtype=np.float64)
         density = np.asarray(face_energy_density, dtype=np.float32)
         number = _FIRST_FRAME + piece.frames
-        new_faces = self._new_topology(piece, faces, flat, density, number)
-        new_lines = piece.frames == 0 or new_faces is not None or lines is not None or cuts is not None
-        piece.lines = piece.lines if lines is None else polylines_of(lines)
-        piece.cuts = piece.cuts if cuts is None else polylines_of(cuts)
-        for line, parts in (*piece.lines.items(), *piece.cuts.items()):
-            if any(part.max() >= len(flat) or part.min() < 0 for part in parts):
-                raise ValueError(f"line {line!r} of piece {name!r} refers to vertices beyond the {len(flat)} positions")
+        what = f"frame {number} of piece {piece.surface.name!r}"
+        _check_frame(what, flat, density, len(piece.surface.faces))
+        new_faces = _change_faces(piece, faces, len(flat), what) or piece.frames == 0
+        if len(flat) != len(piece.to_surface):
+            raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
+        new_lines = new_faces or lines is not None or cuts is not None
+        _change_lines(piece, name, lines, cuts, len(flat))
 
         time = Usd.TimeCode(number)
+        self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
+        self._measure(piece, measures or {}, time)
+
+        piece.frames += 1
+        piece.last_density = density
+        low, high = extent_of(flat)
+        piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
+        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
+        self._save_every_few_frames()
+        return number
+
+    def _sample(
+        self,
+        piece: _Piece,
+        flat: FloatArray,
+        density: NDArray[np.float32],
+        time: Any,
+        *,
+        new_faces: bool,
+        new_lines: bool,
+    ) -> None:
+        """Author a frame's points, energies and lines."""
+        from pxr import Vt
+
         points = np.zeros((len(flat), 3), dtype=np.float32)
         points[:, :2] = flat
-        piece.on_pattern.write(time, points, new_faces)
+        piece.on_pattern.write(time, points, piece.faces if new_faces else None)
         energy = Vt.FloatArray.FromNumpy(density)
         for samples in (piece.on_surface, piece.on_pattern):
             _density(samples).Set(energy, time)
@@ -261,49 +285,9 @@ class FrameWriter:
             in_space = {key: _on_surface(parts, piece.to_surface) for key, parts in piece.cuts.items()}
             space = np.asarray(piece.surface.vertices, dtype=np.float32)
             piece.surface_cuts.write(time, in_space, space, changed=True)
-        self._measure(piece, measures or {}, time)
-
-        piece.frames += 1
-        piece.last_density = density
-        low, high = extent_of(flat)
-        piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
-        self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
-        self._saved_now_and_then()
-        return number
-
-    def _new_topology(
-        self,
-        piece: _Piece,
-        faces: ArrayLike | None,
-        flat: FloatArray,
-        density: NDArray[np.float32],
-        number: int,
-    ) -> IntArray | None:
-        """The faces to write with this frame, or None where they stay; checks that all arrays fit together."""
-        what = f"frame {number} of piece {piece.surface.name!r}"
-        own = piece.surface.faces
-        if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
-            raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
-        if density.shape != (len(own),):
-            raise ValueError(f"{what}: {density.shape} energy densities for {len(own)} faces")
-        if not (np.isfinite(flat).all() and np.isfinite(density).all()):
-            raise ValueError(f"{what}: positions or energy densities are not finite")
-        new = piece.faces if faces is None else np.ascontiguousarray(faces, dtype=np.int32)
-        changed = new is not piece.faces and not np.array_equal(new, piece.faces)
-        if changed:
-            used = own >= 0
-            if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= len(flat):
-                raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
-            to_surface = np.zeros(len(flat), dtype=np.int32)
-            to_surface[new[used]] = own[used]
-            if not np.array_equal(to_surface[new[used]], own[used]):
-                raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
-            piece.faces, piece.to_surface = new, to_surface
-        if len(flat) != len(piece.to_surface):
-            raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
-        return piece.faces if changed or piece.frames == 0 else None
 
     def _measure(self, piece: _Piece, measures: Mapping[str, float], time: Any) -> None:
+        """Author a frame's measures."""
         from pxr import Sdf
 
         prim = self._stage.GetPrimAtPath(piece.path)
@@ -311,18 +295,20 @@ class FrameWriter:
             attribute = prim.CreateAttribute(f"warpflat:{key}", Sdf.ValueTypeNames.Double, custom=True)
             attribute.Set(float(value), time)
 
-    def _saved_now_and_then(self) -> None:
+    def _save_every_few_frames(self) -> None:
+        """Count a frame, and save the working file if it is time."""
         self._unsaved += 1
         if self._unsaved >= self._save_every:
             with usd_errors(self._final):
                 self._save()
 
     def _save(self) -> None:
+        """Save the working file."""
         self._stage.Save()
         self._unsaved = 0
 
     def _place(self) -> None:
-        """Set the patterns in a row to the right of all surfaces, by the room each took over the whole time."""
+        """Place the patterns in a row to the right of all surfaces, by the room that each took over the whole time."""
         from pxr import Gf, UsdGeom
 
         shown = [piece for piece in self._pieces.values() if piece.frames]
@@ -344,7 +330,7 @@ class FrameWriter:
             right += float(piece.high[0] - piece.low[0]) + gap
 
     def _colour(self) -> None:
-        """Turn the energies of all frames into colours on one scale."""
+        """Author the colours of all frames, from their energies, on one scale."""
         shown = [piece for piece in self._pieces.values() if piece.last_density is not None]
         if not shown:
             return
@@ -359,22 +345,73 @@ class FrameWriter:
                 attribute.SetCustomData(
                     {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
                 )
-        brushes = [_Brush(piece) for piece in shown]
+        painters = [_FrameColours(piece) for piece in shown]
         for number in range(_FIRST_FRAME, _FIRST_FRAME + max(piece.frames for piece in shown)):
-            for brush in brushes:
-                brush.colour(number, scale, table)
-            self._saved_now_and_then()
+            for painter in painters:
+                painter.colour(number, scale, table)
+            self._save_every_few_frames()
 
     def _author_defaults(self) -> None:
-        """Give every sampled attribute its last value as default."""
+        """Author the last value of every sampled attribute as its default."""
         for prim in self._stage.Traverse():
             for attribute in prim.GetAuthoredAttributes():
                 if attribute.GetNumTimeSamples():
                     attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
 
 
-class _Brush:
-    """Colours a piece frame by frame; reads its topology only where that changes."""
+def _check_frame(what: str, flat: FloatArray, density: NDArray[np.float32], face_count: int) -> None:
+    """Check the shapes and values of a frame.
+
+    Raises:
+        ValueError: positions or energies are of a wrong shape, or not finite.
+    """
+    if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
+        raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
+    if density.shape != (face_count,):
+        raise ValueError(f"{what}: {density.shape} energy densities for {face_count} faces")
+    if not (np.isfinite(flat).all() and np.isfinite(density).all()):
+        raise ValueError(f"{what}: positions or energy densities are not finite")
+
+
+def _change_faces(piece: _Piece, faces: ArrayLike | None, count: int, what: str) -> bool:
+    """Take over new faces of a pattern with `count` vertices, and return whether they differ from those before.
+
+    Raises:
+        ValueError: they are not the faces of the surface in the pattern's numbering.
+    """
+    if faces is None:
+        return False
+    new, own = np.ascontiguousarray(faces, dtype=np.int32), piece.surface.faces
+    if np.array_equal(new, piece.faces):
+        return False
+    used = own >= 0
+    if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= count:
+        raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
+    to_surface = np.zeros(count, dtype=np.int32)
+    to_surface[new[used]] = own[used]
+    if not np.array_equal(to_surface[new[used]], own[used]):
+        raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
+    piece.faces, piece.to_surface = new, to_surface
+    return True
+
+
+def _change_lines(
+    piece: _Piece, name: str, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int
+) -> None:
+    """Take over new lines and cuts of a pattern with `count` vertices.
+
+    Raises:
+        ValueError: a line refers to other vertices.
+    """
+    piece.lines = piece.lines if lines is None else polylines_of(lines)
+    piece.cuts = piece.cuts if cuts is None else polylines_of(cuts)
+    for line, parts in (*piece.lines.items(), *piece.cuts.items()):
+        if any(part.max() >= count or part.min() < 0 for part in parts):
+            raise ValueError(f"line {line!r} of piece {name!r} refers to vertices beyond the {count} positions")
+
+
+class _FrameColours:
+    """Colours of a piece, frame by frame; its topology is read only where it changes."""
 
     def __init__(self, piece: _Piece) -> None:
         self._piece = piece
@@ -391,7 +428,7 @@ class _Brush:
         )
 
     def colour(self, number: int, scale: float, table: NDArray[np.float32]) -> None:
-        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as the rows of `table`."""
+        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as rows of `table`."""
         if number >= _FIRST_FRAME + self._piece.frames:
             return
         if number in self._changes:
@@ -400,13 +437,13 @@ class _Brush:
             same = size == self._surface[1] and np.array_equal(vertex, self._surface[0])
             self._pattern = self._surface if same else (vertex, size)
         density = np.asarray(self._density.Get(number), dtype=np.float64)
-        colours = self._mixed(density, *self._surface, scale, table)
+        colours = self._vertex_colours(density, *self._surface, scale, table)
         self._on_surface.Set(colours, number)
         if self._pattern is not self._surface:
-            colours = self._mixed(density, *self._pattern, scale, table)
+            colours = self._vertex_colours(density, *self._pattern, scale, table)
         self._on_pattern.Set(colours, number)
 
-    def _mixed(
+    def _vertex_colours(
         self,
         density: FloatArray,
         vertex: IntArray,
@@ -414,7 +451,15 @@ class _Brush:
         scale: float,
         table: NDArray[np.float32],
     ) -> Any:
-        """The colours of the vertices, of which there are `size`; `vertex` is that of each corner."""
+        """Return the colours of `size` vertices.
+
+        Args:
+            density: #F [J/m2].
+            vertex: #C, the vertex of each corner.
+            size: number of vertices.
+            scale: energy of the last colour [J/m2].
+            table: colours, linear RGB.
+        """
         from pxr import Vt
 
         share = corner_average(density, self._piece.areas, self._face, vertex, size) / scale
@@ -423,13 +468,14 @@ class _Brush:
 
 
 def _density(samples: MeshSamples) -> Any:
+    """Return the attribute of energy densities."""
     from pxr import UsdGeom
 
     return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
 
 
 def _on_surface(parts: Polylines, to_surface: IntArray) -> Polylines:
-    """The lines in the surface's numbering, where both sides of a crack are the same line."""
+    """Return lines in the surface's numbering, where both sides of a crack are one line."""
     return [
         np.array(line, dtype=np.int32) for line in dict.fromkeys(tuple(to_surface[part].tolist()) for part in parts)
     ]

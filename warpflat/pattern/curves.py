@@ -67,7 +67,7 @@ class Curve:
         return np.concatenate([self.bezier[:, 0], self.bezier[-1:, 3]])
 
     def transformed(self, matrix: FloatArray) -> Curve:
-        """The curve under a 2 by 3 affine matrix."""
+        """Return the curve under a 2 by 3 affine matrix."""
         return Curve(bezier=self.bezier @ matrix[:, :2].T + matrix[:, 2], straight=self.straight)
 
     def reversed(self) -> Curve:
