@@ -122,7 +122,8 @@ def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
 
 
 def _ascii(text: str) -> str:
-    """Return a text in 7 bits, as the standards demand: accents are dropped, other letters and control characters become "?"."""
+    """Return a text in 7 bits, as the standards demand: accents are dropped, other letters become "?"."""
+    # Control characters too: a line of the file is a value.
     plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
     return "".join("?" if control_in(letter) else letter for letter in plain)
 

@@ -24,7 +24,7 @@ Polylines = list[IntArray]
 
 
 def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
-    """Return lines by name as lists of vertex-index arrays; an array stands for one polyline, single points are dropped."""
+    """Return lines by name as lists of vertex-index arrays, one per polyline; single points are dropped."""
     result: dict[str, Polylines] = {}
     for name, line in (lines or {}).items():
         single = len(line) > 0 and np.ndim(line[0]) == 0
@@ -34,7 +34,7 @@ def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
 
 
 def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
-    """Return the area [m2] of each face (#F by 4) over `positions` (#V by 2 or 3); a quad is split along corners 0-2."""
+    """Return the area [m2] of each face (#F by 4) over positions (#V by 2 or 3); quads are split along corners 0-2."""
     triangles, face = triangulate(faces)
     areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
@@ -90,10 +90,10 @@ def corner_average(
 
 
 def outline_edges(faces: IntArray) -> IntArray:
-    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: outer border, holes and sides of cracks.
+    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks.
 
-    These are the edges of ``warpflat.surface.topology.border_edges`` without their direction, which costs a sort of one array
-    instead of an indexed one: it matters at a million faces.
+    These are the edges of ``warpflat.surface.topology.border_edges`` without their direction, which costs a sort of one
+    array instead of an indexed one: it matters at a million faces.
     """
     keys = []
     is_quad = faces[:, 3] >= 0

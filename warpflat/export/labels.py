@@ -76,9 +76,10 @@ class LabelRoom:
         *,
         may_cross: bool = True,
     ) -> Spot | None:
-        """Take the first spot at which a text lies free within `page`, its leader over no other text; None if there is none.
+        """Take the first spot at which a text and its leader lie free within `page`; None if there is none.
 
-        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if they may be.
+        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if
+        they may be.
 
         Args:
             spots: in order of preference.
@@ -142,7 +143,8 @@ def _placed_points(spots: Sequence[Spot], x: FloatArray, y: FloatArray) -> tuple
 def space_out(wanted: Sequence[float], distance: float, low: float, high: float) -> list[float]:
     """Return falling places as near as possible to those wanted, each at least `distance` below the one before.
 
-    They stay between the bounds if there is room. Places that come too near to each other move together, as far up as down.
+    They stay between the bounds if there is room. Places that come too near to each other move together, as far up as
+    down.
     """
     groups: list[tuple[float, int]] = []  # the middle of each, and how many
     for place in wanted:
@@ -224,7 +226,7 @@ def spots_beyond_ends(line: FloatArray, width: float, height: float) -> Iterator
         yield Spot(x=float(end[0]), y=float(end[1] + up * (0.5 * height + 0.08)), angle=0.0)
 
 
-# How outwards_by out and how much higher a text may stand than the point that it names [in], the nearest first; rather out than up or down.
+# Offsets [in] of a text from the point that it names, outwards and upwards, nearest first; outwards is preferred.
 _AROUND = sorted(
     (
         (0.08 + 0.06 * step, rise)

@@ -34,7 +34,7 @@ def is_drawn(text: str) -> bool:
 
 
 def titles(names: Sequence[str], is_written: Callable[[str], bool]) -> dict[str, str]:
-    """Return by name the title that is written for it: itself, or "piece", "piece 2" and so on if it cannot be written."""
+    """Return what is written for each name: itself, or "piece", "piece 2" and so on if it cannot be written."""
     unused = (title for title in ("piece", *(f"piece {n}" for n in range(2, 2 * len(names) + 2))) if title not in names)
     return {name: name if is_written(name) else next(unused) for name in names}
 

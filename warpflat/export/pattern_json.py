@@ -23,10 +23,10 @@ SCHEMA = 1
 def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
     """Return the whole pattern as plain lists and numbers: lengths in metres, angles in radians, y along the grain.
 
-    A stitch sews two sides. Each side lists its edges in the order in which the seam meets them, and whether the seam runs
-    against the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is cut turned
-    over. An edge's `point_lengths` are the lengths along its line at the points of its mesh's border, and `fit_error` is the
-    largest distance of the curve from them. Numbers are not rounded.
+    A stitch sews two sides. Each side lists its edges in the order in which the seam meets them, and whether the seam
+    runs against the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is
+    cut turned over. An edge's `point_lengths` are the lengths along its line at the points of its mesh's border, and
+    `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
     """
     sample = next(iter(garment.pieces.values()))
     stitches: list[dict[str, Any]] = [

@@ -133,7 +133,8 @@ class LabelEntry(Entry):
 class PieceEntry(Entry):
     """A piece in one size (see `warpflat.pattern.drafted.DraftedPiece`).
 
-    In files without `cutout_sew_lines` and `cutout_allowances` holes have no allowance: they are cut on the sewing line.
+    In files without `cutout_sew_lines` and `cutout_allowances` holes have no allowance: they are cut on the sewing
+    line.
     """
 
     fabric: Text

@@ -1,4 +1,4 @@
-"""The first page of a printed pattern: test squares, instructions, the meaning of the lines, and the place of each sheet."""
+"""The first page of a printed pattern: test squares, instructions, meaning of the lines, overview of the sheets."""
 
 from __future__ import annotations
 

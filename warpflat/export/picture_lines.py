@@ -1,7 +1,8 @@
 """Feature lines of a view, and their names where there is room for them.
 
-A name goes along its line where it lies all on the cloth, or beside its border, and crosses nothing. Names of other lines
-that cross the piece stand beside it, one below the other, each level with the end of its line as far as there is room.
+A name goes along its line where it lies all on the cloth, or beside its border, and crosses nothing. Names of other
+lines that cross the piece stand beside it, one below the other, each level with the end of its line as far as there is
+room.
 """
 
 from __future__ import annotations

@@ -147,7 +147,10 @@ def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) 
 
 
 def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: IntArray, grain_angle: float, *, inside: bool) -> bool:
-    """Draw a grain arrow, turned by `grain_angle` degrees from the datum line, on the pattern or right of it; False if no room."""
+    """Draw a grain arrow, turned by `grain_angle` degrees from the datum line; return False if there is no room.
+
+    It lies on the pattern if `inside`, else right of it.
+    """
     line = drawn.to_page(drawn.view.points[datum])
     along = line[-1] - line[0]
     length = float(np.linalg.norm(along))
@@ -184,7 +187,7 @@ def _grain_inside(
     length: float,
     text_height: float,
 ) -> tuple[FloatArray, float] | None:
-    """Return the middle of the arrow and half its length [in], where it and its word lie on the cloth; None if nowhere."""
+    """Return the middle of the arrow and half its length [in], where it lies on the cloth; None if nowhere."""
     left, bottom, right, top = drawn.box
     width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
     for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
@@ -313,7 +316,7 @@ def draw_colour_bar(
 
 
 def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
-    """Return round values from 0 to `scale` for a bar of this length [in], their words, and the power of ten that these leave out."""
+    """Return round values from 0 to `scale` for a bar of this length [in], their words, and their power of ten."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     most = int(np.clip(length / (2.0 * _TICK_SIZE * POINT), 1, 9))

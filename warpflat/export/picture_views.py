@@ -244,7 +244,10 @@ class DrawnView:
         self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
 
     def _visible_parts(self, edges: IntArray) -> FloatArray:
-        """Return the visible parts of edges (#S by 2 by 2 [in]); hidden parts of a surface's edges are found in short pieces."""
+        """Return the visible parts of edges (#S by 2 by 2 [in]).
+
+        Hidden parts of a surface's edges are found in short pieces.
+        """
         a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
         if self.view.vectors is None:
             return np.stack([self.to_page(a), self.to_page(b)], axis=1)
@@ -260,7 +263,7 @@ class DrawnView:
         return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
     def _is_visible(self, spots: FloatArray) -> BoolArray:
-        """Return whether points on the mesh (#N by 3, in samples) are in front, with tolerance for the mesh's own slope."""
+        """Return whether points on the mesh (#N by 3, in samples) are in front, within the mesh's own slope."""
         if self.view.vectors is None:
             return np.ones(len(spots), dtype=bool)
         rows, columns = self._samples.triangle.shape

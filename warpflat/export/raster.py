@@ -1,8 +1,8 @@
 """Triangles to pixels with hidden surfaces removed: a scan converter and a shader, as kernels on the CPU.
 
-Drawing libraries draw polygons one by one, which takes tens of seconds for a million faces. Here one kernel runs over the
-triangles and keeps the nearest at each sample. Another runs over the pixels and looks up colours and light, once for
-each, or for each sample where several triangles meet.
+Drawing libraries draw polygons one by one, which takes tens of seconds for a million faces. Here one kernel runs over
+the triangles and keeps the nearest at each sample. Another runs over the pixels and looks up colours and light, once
+for each, or for each sample where several triangles meet.
 """
 
 from __future__ import annotations

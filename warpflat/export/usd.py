@@ -1,9 +1,9 @@
 """`frames.usdc`: every piece in space and in the plane, over the time of the relaxation.
 
 The writer streams: frames go to a hidden file that is saved every few frames, so that memory does not grow with their
-number. Two things are known only at the end, and are authored in a second pass over that file: the places of the patterns
-beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale comes from the
-last frame. Then the file is exported once, which compacts it, and renamed to its final name.
+number. Two things are known only at the end, and are authored in a second pass over that file: the places of the
+patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale comes
+from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,11 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import hidden_file, require_writable
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
-from warpflat.export.geometry import Polylines, area_vectors, corner_average, face_areas, polylines_of, vertex_normals
+from warpflat.export.geometry import area_vectors, face_areas, polylines_of, vertex_normals
+from warpflat.export.usd_colours import FrameColours
+from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame, density_attribute
 from warpflat.export.usd_prims import (
     MeshSamples,
     SampledLines,
@@ -40,32 +41,9 @@ from warpflat.surface.topology import triangulate
 
 __all__ = ["FrameWriter"]
 
-_FIRST_FRAME = 1
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
 _COLOUR_STEPS = 1024
-
-
-@dataclass(kw_only=True)
-class _Piece:
-    """State of a piece: a few arrays of its size, whatever the number of frames."""
-
-    surface: Surface
-    path: str
-    areas: FloatArray
-    on_surface: MeshSamples
-    on_pattern: MeshSamples
-    surface_cuts: SampledLines
-    pattern_lines: SampledLines
-    pattern_cuts: SampledLines
-    faces: IntArray
-    to_surface: IntArray
-    lines: dict[str, Polylines]
-    cuts: dict[str, Polylines] = field(default_factory=dict)
-    frames: int = 0
-    last_density: NDArray[np.float32] | None = None
-    low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
-    high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
 
 
 class FrameWriter:
@@ -104,7 +82,7 @@ class FrameWriter:
         self._rate = float(frames_per_second)
         self._save_every = int(save_every)
         self._scale = scale
-        self._pieces: dict[str, _Piece] = {}
+        self._pieces: dict[str, FramePiece] = {}
         self._used_names: set[str] = set()
         self._unsaved = 0
         self._stage: Any = None
@@ -140,8 +118,8 @@ class FrameWriter:
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         stage.SetTimeCodesPerSecond(self._rate)
         stage.SetFramesPerSecond(self._rate)
-        stage.SetStartTimeCode(_FIRST_FRAME)
-        stage.SetEndTimeCode(_FIRST_FRAME)
+        stage.SetStartTimeCode(FIRST_FRAME)
+        stage.SetEndTimeCode(FIRST_FRAME)
         stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
 
@@ -180,7 +158,7 @@ class FrameWriter:
         width = float(np.clip(0.004 * size, 1e-5, 2e-3))
 
         def group(below: str, colour: tuple[float, float, float]) -> SampledLines:
-            return SampledLines(self._stage, f"{path}/{below}", start=_FIRST_FRAME, width=width, colour=colour)
+            return SampledLines(self._stage, f"{path}/{below}", start=FIRST_FRAME, width=width, colour=colour)
 
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
@@ -192,7 +170,8 @@ class FrameWriter:
         on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True))
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
-        self._pieces[name] = _Piece(
+        self._pieces[name] = FramePiece(
+            name=name,
             surface=surface,
             path=path,
             areas=face_areas(surface.vertices, surface.faces),
@@ -239,14 +218,14 @@ class FrameWriter:
         piece = self._pieces[name]
         flat = np.asarray(positions, dtype=np.float64)
         density = np.asarray(face_energy_density, dtype=np.float32)
-        number = _FIRST_FRAME + piece.frames
+        number = FIRST_FRAME + piece.frames
         what = f"frame {number} of piece {piece.surface.name!r}"
-        _check_frame(what, flat, density, len(piece.surface.faces))
-        new_faces = _change_faces(piece, faces, len(flat), what) or piece.frames == 0
+        check_frame(what, flat, density, len(piece.surface.faces))
+        new_faces = piece.change_faces(faces, len(flat), what) or piece.frames == 0
         if len(flat) != len(piece.to_surface):
             raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
         new_lines = new_faces or lines is not None or cuts is not None
-        _change_lines(piece, name, lines, cuts, len(flat))
+        piece.change_lines(lines, cuts, len(flat))
 
         time = Usd.TimeCode(number)
         self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
@@ -262,7 +241,7 @@ class FrameWriter:
 
     def _sample(
         self,
-        piece: _Piece,
+        piece: FramePiece,
         flat: FloatArray,
         density: NDArray[np.float32],
         time: Any,
@@ -278,15 +257,14 @@ class FrameWriter:
         piece.on_pattern.write(time, points, piece.faces if new_faces else None)
         energy = Vt.FloatArray.FromNumpy(density)
         for samples in (piece.on_surface, piece.on_pattern):
-            _density(samples).Set(energy, time)
+            density_attribute(samples).Set(energy, time)
         piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
         piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
         if new_lines:
-            in_space = {key: _on_surface(parts, piece.to_surface) for key, parts in piece.cuts.items()}
             space = np.asarray(piece.surface.vertices, dtype=np.float32)
-            piece.surface_cuts.write(time, in_space, space, changed=True)
+            piece.surface_cuts.write(time, piece.cuts_on_surface(), space, changed=True)
 
-    def _measure(self, piece: _Piece, measures: Mapping[str, float], time: Any) -> None:
+    def _measure(self, piece: FramePiece, measures: Mapping[str, float], time: Any) -> None:
         """Author a frame's measures."""
         from pxr import Sdf
 
@@ -345,8 +323,8 @@ class FrameWriter:
                 attribute.SetCustomData(
                     {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
                 )
-        painters = [_FrameColours(piece) for piece in shown]
-        for number in range(_FIRST_FRAME, _FIRST_FRAME + max(piece.frames for piece in shown)):
+        painters = [FrameColours(piece) for piece in shown]
+        for number in range(FIRST_FRAME, FIRST_FRAME + max(piece.frames for piece in shown)):
             for painter in painters:
                 painter.colour(number, scale, table)
             self._save_every_few_frames()
@@ -357,125 +335,3 @@ class FrameWriter:
             for attribute in prim.GetAuthoredAttributes():
                 if attribute.GetNumTimeSamples():
                     attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
-
-
-def _check_frame(what: str, flat: FloatArray, density: NDArray[np.float32], face_count: int) -> None:
-    """Check the shapes and values of a frame.
-
-    Raises:
-        ValueError: positions or energies are of a wrong shape, or not finite.
-    """
-    if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
-        raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
-    if density.shape != (face_count,):
-        raise ValueError(f"{what}: {density.shape} energy densities for {face_count} faces")
-    if not (np.isfinite(flat).all() and np.isfinite(density).all()):
-        raise ValueError(f"{what}: positions or energy densities are not finite")
-
-
-def _change_faces(piece: _Piece, faces: ArrayLike | None, count: int, what: str) -> bool:
-    """Take over new faces of a pattern with `count` vertices, and return whether they differ from those before.
-
-    Raises:
-        ValueError: they are not the faces of the surface in the pattern's numbering.
-    """
-    if faces is None:
-        return False
-    new, own = np.ascontiguousarray(faces, dtype=np.int32), piece.surface.faces
-    if np.array_equal(new, piece.faces):
-        return False
-    used = own >= 0
-    if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= count:
-        raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
-    to_surface = np.zeros(count, dtype=np.int32)
-    to_surface[new[used]] = own[used]
-    if not np.array_equal(to_surface[new[used]], own[used]):
-        raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
-    piece.faces, piece.to_surface = new, to_surface
-    return True
-
-
-def _change_lines(
-    piece: _Piece, name: str, lines: Mapping[str, Any] | None, cuts: Mapping[str, Any] | None, count: int
-) -> None:
-    """Take over new lines and cuts of a pattern with `count` vertices.
-
-    Raises:
-        ValueError: a line refers to other vertices.
-    """
-    piece.lines = piece.lines if lines is None else polylines_of(lines)
-    piece.cuts = piece.cuts if cuts is None else polylines_of(cuts)
-    for line, parts in (*piece.lines.items(), *piece.cuts.items()):
-        if any(part.max() >= count or part.min() < 0 for part in parts):
-            raise ValueError(f"line {line!r} of piece {name!r} refers to vertices beyond the {count} positions")
-
-
-class _FrameColours:
-    """Colours of a piece, frame by frame; its topology is read only where it changes."""
-
-    def __init__(self, piece: _Piece) -> None:
-        self._piece = piece
-        own = piece.surface.faces
-        self._face = np.nonzero(own >= 0)[0].astype(np.int32)
-        self._surface = (own[own >= 0], len(piece.surface.vertices))
-        self._pattern = self._surface
-        pattern = piece.on_pattern.mesh
-        self._indices, self._points = pattern.GetFaceVertexIndicesAttr(), pattern.GetPointsAttr()
-        self._changes = set(self._indices.GetTimeSamples())
-        self._density = _density(piece.on_pattern)
-        self._on_surface, self._on_pattern = (
-            samples.mesh.GetDisplayColorPrimvar().GetAttr() for samples in (piece.on_surface, piece.on_pattern)
-        )
-
-    def colour(self, number: int, scale: float, table: NDArray[np.float32]) -> None:
-        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as rows of `table`."""
-        if number >= _FIRST_FRAME + self._piece.frames:
-            return
-        if number in self._changes:
-            # Copies: what USD hands out may lie in the file, which grows.
-            vertex, size = np.array(self._indices.Get(number)), len(self._points.Get(number))
-            same = size == self._surface[1] and np.array_equal(vertex, self._surface[0])
-            self._pattern = self._surface if same else (vertex, size)
-        density = np.asarray(self._density.Get(number), dtype=np.float64)
-        colours = self._vertex_colours(density, *self._surface, scale, table)
-        self._on_surface.Set(colours, number)
-        if self._pattern is not self._surface:
-            colours = self._vertex_colours(density, *self._pattern, scale, table)
-        self._on_pattern.Set(colours, number)
-
-    def _vertex_colours(
-        self,
-        density: FloatArray,
-        vertex: IntArray,
-        size: int,
-        scale: float,
-        table: NDArray[np.float32],
-    ) -> Any:
-        """Return the colours of `size` vertices.
-
-        Args:
-            density: #F [J/m2].
-            vertex: #C, the vertex of each corner.
-            size: number of vertices.
-            scale: energy of the last colour [J/m2].
-            table: colours, linear RGB.
-        """
-        from pxr import Vt
-
-        share = corner_average(density, self._piece.areas, self._face, vertex, size) / scale
-        step = np.clip(share * (len(table) - 1) + 0.5, 0, len(table) - 1).astype(np.int32)
-        return Vt.Vec3fArray.FromNumpy(table[step])
-
-
-def _density(samples: MeshSamples) -> Any:
-    """Return the attribute of energy densities."""
-    from pxr import UsdGeom
-
-    return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
-
-
-def _on_surface(parts: Polylines, to_surface: IntArray) -> Polylines:
-    """Return lines in the surface's numbering, where both sides of a crack are one line."""
-    return [
-        np.array(line, dtype=np.int32) for line in dict.fromkeys(tuple(to_surface[part].tolist()) for part in parts)
-    ]

@@ -1,9 +1,9 @@
 """Meshes and lines in a USD stage, sampled over time so that fractional frames are right across a change of topology.
 
 USD interpolates two samples of a point array linearly where they are equally long, and holds the earlier one where they
-are not; indices are always held. After a change of topology of equal length, the old faces would be drawn through points
-half-way to the new ones. Therefore the first sample of a new topology always has another length than the one before: where
-the lengths would agree, the last point is stored twice. No face uses the second copy.
+are not; indices are always held. After a change of topology of equal length, the old faces would be drawn through
+points half-way to the new ones. Therefore the first sample of a new topology always has another length than the one
+before: where the lengths would agree, the last point is stored twice. No face uses the second copy.
 """
 
 from __future__ import annotations
@@ -37,7 +37,9 @@ _CONSTANT = "constant"
 
 @contextmanager
 def usd_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Turn USD's exceptions, which name places in its own source, into one line that says that a file cannot be written.
+    """Turn USD's exceptions into one line that says that a file cannot be written.
+
+    Their own text names places in USD's source.
 
     Raises:
         InputError: instead of USD's exception.

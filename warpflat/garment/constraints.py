@@ -54,8 +54,8 @@ class FixedLength:
 
     Attributes:
         piece, line: names.
-        length: of the whole line [m], shared by its mesh edges in proportion; None keeps the lengths on the body. On a half
-            piece a line that ends on the fold counts with its mirror image: the half gets half of the length.
+        length: of the whole line [m], shared by its mesh edges in proportion; None keeps the lengths on the body. On a
+            half piece a line that ends on the fold counts with its mirror image: the half gets half of the length.
     """
 
     piece: str

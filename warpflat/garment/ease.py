@@ -55,11 +55,12 @@ class SeamRatios:
 def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     """Look up wishes in a form: the ratio of lengths of each of its seams, and the edges with fullness.
 
-    A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same ratio.
+    A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same
+    ratio.
 
     Raises:
-        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not one
-            of its sides.
+        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not
+            one of its sides.
     """
     plan = plan_form(form)
     by_name = {seam.name: seam for seam in plan.seams}
@@ -116,7 +117,7 @@ def _longer_side(seam: Seam, longer: str | None) -> int:
 
 
 def _in_plan(plan: FormPlan, form: FormResult, seam: FormSeam) -> tuple[Seam, int]:
-    """Return the pattern's seam that a form's seam belongs to, and which of its sides (0 or 1) is the form's first side."""
+    """Return the pattern's seam of a form's seam, and which of its sides (0 or 1) is the form's first side."""
     parts = [_edge(plan, form, *side) for side in zip(seam.pieces, seam.edges, seam.vertices, strict=True)]
     for found in plan.seams:
         sides = [{str(side) for side in sides} for sides in found.sides]

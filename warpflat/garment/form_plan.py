@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.garment.edge_rules import HEMMED, EdgeRules, unused
+from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules, unused_name
 from warpflat.pattern.pieces import Seam, SeamSide
 
 if TYPE_CHECKING:
@@ -85,11 +85,11 @@ class _Run:
 def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
     """Work out what every edge of a form becomes in the pattern.
 
-    An edge in a seam is a seam, a half piece's centre the fold. The lowest free edge of a piece is hemmed if it lies below
-    the waist or on the arm; other free edges (necks, armholes, waists of skirts) get a seam's allowance, for a facing or a
-    band. An edge that is free along a part of its length is split there, and so is one that is sewn to parts of edges. An
-    edge that is sewn to several whole edges (a sleeve's cap to a front's and a back's armhole) stays whole, and its seams
-    become one.
+    An edge in a seam is a seam, a half piece's centre the fold. The lowest free edge of a piece is hemmed if it lies
+    below the waist or on the arm; other free edges (necks, armholes, waists of skirts) get a seam's allowance, for a
+    facing or a band. An edge that is free along a part of its length is split there, and so is one that is sewn to
+    parts of edges. An edge that is sewn to several whole edges (a sleeve's cap to a front's and a back's armhole) stays
+    whole, and its seams become one.
 
     Args:
         form: what `Mannequin.form` gives.
@@ -118,7 +118,7 @@ def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRule
         # The edge's own name stays with what is sewn.
         keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
         for number, (first, last, sewn) in enumerate(parts):
-            part = edge if number == keeper else unused(edge, taken)
+            part = edge if number == keeper else unused_name(edge, taken)
             taken.add(part)
             kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if edge == lowest else "seam"
             plans.append(EdgePlan(name=part, source=edge, first=first, last=last, kind=rules.kind(name, part, kind)))
@@ -128,8 +128,8 @@ def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRule
 def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
     """Check that pieces on the fold have their grain along or across it.
 
-    A half is flattened as if its other half were the mirror image, grain included. On cloth that lies on the fold, the grain
-    runs straight on once it is unfolded: at any other angle the other half is another piece.
+    A half is flattened as if its other half were the mirror image, grain included. On cloth that lies on the fold, the
+    grain runs straight on once it is unfolded: at any other angle the other half is another piece.
 
     Args:
         folds: by piece, its edge on the fold, to which the datum is parallel.
@@ -261,6 +261,6 @@ def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:
     heights = {
         edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
         for edge, ids in piece.edges.items()
-        if edge.split(" ")[0] in HEMMED and not sewing.covers((name, edge))
+        if edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
     }
     return min(heights, key=lambda edge: heights[edge]) if heights else None

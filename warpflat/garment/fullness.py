@@ -1,10 +1,10 @@
 """Fullness: more cloth than the body needs along an edge, to be eased or gathered into a shorter one.
 
-The longer side of such a seam must not be stretched to its length, nor the shorter one compressed: the piece is meant to be
-wider there. Its springs and cells are at rest at the body's lengths times a fullness s. The fullness is stated along the
-edge and fades into the piece; log s is harmonic. For ease it fades near the edge. For gathers it fades down to the next edge
-that is sewn plainly across the fullness, or runs through the whole piece if there is none, as in a gathered skirt. Pattern
-makers get the same shape by slashing and spreading.
+The longer side of such a seam must not be stretched to its length, nor the shorter one compressed: the piece is meant
+to be wider there. Its springs and cells are at rest at the body's lengths times a fullness s. The fullness is stated
+along the edge and fades into the piece; log s is harmonic. For ease it fades near the edge. For gathers it fades down
+to the next edge that is sewn plainly across the fullness, or runs through the whole piece if there is none, as in a
+gathered skirt. Pattern makers get the same shape by slashing and spreading.
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from warpflat.surface.topology import border_loops, half_edges_of
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
 
 
-# The energy that a gathered piece's springs miss is worth a note if it exceeds what this strain along the softer thread stores
-# everywhere, and this many times what they missed before the gathers.
+# The energy that a gathered piece's springs miss is worth a note if it exceeds what this strain along the softer thread
+# stores everywhere, and this many times what they missed before the gathers.
 _NOTICEABLE_STRAIN, _NOTICEABLE_RATIO = 0.01, 2.0
 
 
@@ -99,7 +99,10 @@ def give_fullness(
 
 
 def _slant_note(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
-    """Return a note if springs no longer measure the cloth: gathers slant the edges, along which springs run, off the threads."""
+    """Return a note if springs no longer measure the cloth.
+
+    Gathers slant the mesh's edges, along which springs run, off the threads.
+    """
     # Cloth that is worn under tension stores energy that springs never measure.
     if network.model != "springs" or network.stretch is not None:
         return []
@@ -131,8 +134,8 @@ def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[In
             stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
             logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
             log_full[:, axis] += falloff_weights(faces, logs, stops, len(positions))
-    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap do, all of what is eased in, and the
-    # excess on slanting sides.
+    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap do, all of what is eased in,
+    # and the excess on slanting sides.
     wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
     lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
     log_full += falloff_weights(faces, lacks, border_loops(faces), len(positions))[:, None]

@@ -83,7 +83,7 @@ class Garment:
         return tuple(found)
 
     def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if they are no pair."""
+        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if no pair."""
         return _mirror_vertices(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
 
     @property

@@ -81,8 +81,8 @@ def garment_files(
 ) -> WrittenPattern:
     """Write the pattern of a garment in one or more sizes; several lie upon each other as a nest.
 
-    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other files are
-    good.
+    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
+    files are good.
 
     Args:
         garments: flattened, by size; "" where there is none.
@@ -151,8 +151,8 @@ def export_patterns(
         sizes: only these; None takes all. Not for "json", from which the others are made.
 
     Raises:
-        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be
-            written.
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
+            cannot be written.
     """
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.manifest import record_file
@@ -280,7 +280,7 @@ def _write(
 def _marker(
     drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
 ) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
-    """Write `NAME.marker.svg` and `NAME.marker.json` for one garment of each size; return their names, notes and metrics."""
+    """Write `NAME.marker.svg` and `NAME.marker.json`, one garment of each size; return names, notes and metrics."""
     from warpflat.core.atomic_files import file_in
     from warpflat.core.json_file import write_json
     from warpflat.export.svg import write_marker_svg

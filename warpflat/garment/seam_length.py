@@ -22,7 +22,8 @@ class SeamLengths:
         length_3d: length of the curve in space that both sides come from [m].
         lengths: of its two sides in the pattern [m].
         ease: by how much the second side is meant to be longer, as a share of the first; as in `pattern.json`.
-        cost: half the work of the seam's forces [J], the energy that matching its sides costs; None if they were not matched.
+        cost: half the work of the seam's forces [J], the energy that matching its sides costs; None if they were not
+            matched.
     """
 
     name: str

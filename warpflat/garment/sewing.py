@@ -1,13 +1,13 @@
 """Sewing: all pieces of a garment are relaxed together, so that both sides of every seam become equally long.
 
-Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished ratio
-(1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same kind. Each
-equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k, so that the steps stay cheap. After each round the
-offset o grows by the residual c (augmented Lagrangian), until all residuals are within their tolerances.
+Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished
+ratio (1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same
+kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k, so that the steps stay cheap. After each
+round the offset o grows by the residual c (augmented Lagrangian), until all residuals are within their tolerances.
 
-**Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the pieces lay
-on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add up to the
-energy that all constraints together have cost; `Sewn.cost` is that energy itself.
+**Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the
+pieces lay on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add
+up to the energy that all constraints together have cost; `Sewn.cost` is that energy itself.
 """
 
 from __future__ import annotations
@@ -44,9 +44,9 @@ __all__ = ["ConstraintResult", "SeamPair", "Sewn", "sew"]
 
 # Stiffness of an equation over the median spring of the cloth.
 _RELATIVE_STIFFNESS = 4.0
-# Steps of a round at most: the residuals of a whole seam take a dozen rounds, whether the cloth has come to rest before the
-# offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow cloth
-# that still swings keep it swinging.
+# Steps of a round at most: the residuals of a whole seam take a dozen rounds, whether the cloth has come to rest before
+# the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow
+# cloth that still swings keep it swinging.
 _STEPS_PER_ROUND = 40
 _ROUNDS_UNTIL_LONGER = 5
 # Equations contradict each other if their violation has come down by less than a tenth over this many rounds.
@@ -100,7 +100,8 @@ class Sewn:
     Attributes:
         pieces: by name.
         converged: whether all came to rest with the seams' sides equal and the constraints kept.
-        contradictory: whether it ended because seams and constraints came no nearer to agreeing: more steps do not help.
+        contradictory: whether it ended because seams and constraints came no nearer to agreeing: more steps do not
+            help.
         steps: approximate implicit steps over all pieces.
         energy_before, energy_after: of all pieces, springs and guard [J].
         results: every seam, fold and constraint with its cost, in the order in which they were given.
@@ -216,9 +217,10 @@ def _constraint_equations(
     constraints: Sequence[Constraint],
     folds: Mapping[str, IntArray],
 ) -> tuple[ConstraintEquations, list[tuple[str, str]], set[str]]:
-    """Return all equations in the numbering of the joined pieces, name and kind of each group, and the pieces they orient.
+    """Return the equations of seams and constraints in the numbering of the joined pieces.
 
-    An oriented piece needs no other constraint against turning on the cloth.
+    With them come name and kind of each group, and the names of the pieces that are oriented on the cloth, which need no
+    other constraint against turning.
     """
     equations, kinds, oriented = [], [], set()
     on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
@@ -328,8 +330,8 @@ def _fold_results(
 def _straighten_fold(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     """Lay some vertices of a piece on one line along the grain, without mirroring a face.
 
-    Each vertex moves sideways by as much as the line bends there. The move fades out across the piece, since it would press
-    the faces beside the line otherwise.
+    Each vertex moves sideways by as much as the line bends there. The move fades out across the piece, since it would
+    press the faces beside the line otherwise.
 
     Raises:
         InputError: neither its pattern nor its development can be laid so.

@@ -1,4 +1,4 @@
-"""From a flattened surface, whole or cut into pieces, to a pattern: its border as edges, its cuts as darts and seams."""
+"""From a flattened surface, whole or cut into pieces, to a pattern: border as edges, cuts as darts and seams."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.applied_cut import seam_kind
-from warpflat.garment.edge_rules import EdgeRules, unused
+from warpflat.garment.edge_rules import EdgeRules, unused_name
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
@@ -37,8 +37,8 @@ GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
     """Check that every name in the rules can be an edge's, before anything is flattened.
 
-    Lines along the border name the edges, holes are numbered. Where corners split them shows only in the plane. Therefore
-    "bottom_2" passes if there is a bottom, and "edge_7" if there is a stretch of border without a line.
+    Lines along the border name the edges, holes are numbered. Where corners split them shows only in the plane.
+    Therefore "bottom_2" passes if there is a bottom, and "edge_7" if there is a stretch of border without a line.
 
     Args:
         surfaces: with their lines, cut as they are going to be.
@@ -72,14 +72,14 @@ def pattern_of_surface(
 ) -> tuple[Garment, tuple[str, ...]]:
     """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 
-    A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back as the
-    cut asks for. A cut that parts the surface is a seam between the two pieces.
+    A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back
+    as the cut asks for. A cut that parts the surface is a seam between the two pieces.
 
     Args:
         results: pieces of different names.
         name: of the pattern.
-        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are called
-            "edge_1" and so on, counter-clockwise.
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are
+            called "edge_1" and so on, counter-clockwise.
         size: for the label.
         seams: of the border, by the lines that are sewn to each other.
 
@@ -87,8 +87,8 @@ def pattern_of_surface(
         The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
 
     Raises:
-        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip is moved back too far,
-            or a named seam's side is no edge.
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip is moved back too
+            far, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
@@ -249,7 +249,7 @@ def _seams(
             against = not np.array_equal(curve, other)
             if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
                 name = first.edge.removesuffix(".left").removesuffix(".right")
-                name = unused(name, {seam.name for seam in seams})
+                name = unused_name(name, {seam.name for seam in seams})
                 sides = ((first,), (replace(second, reversed=against),))
                 seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
     return tuple(seams)

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.garment.edge_rules import EdgeRules, unused
+from warpflat.garment.edge_rules import EdgeRules, unused_name
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
@@ -44,9 +44,9 @@ def pattern_of_garment(
 ) -> tuple[Garment, tuple[str, ...]]:
     """Make the pattern of a garment in one or more sizes.
 
-    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece whose
-    centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the centre. Notes
-    say so.
+    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece
+    whose centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the
+    centre. Notes say so.
 
     Args:
         garments: flattened, by size; "" where there is none.
@@ -58,8 +58,8 @@ def pattern_of_garment(
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline crosses
-            itself, or the sizes differ in their edges.
+        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline
+            crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
@@ -73,10 +73,7 @@ def pattern_of_garment(
         size: _pieces(garment, plans[size], rules, size=size, opened=set(opened), quantities=plan.quantities)
         for size, garment in garments.items()
     }
-    seams = plan.seams
-    for piece, edge in opened.items():
-        side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=unused(edge, {seam.name for seam in seams}), sides=(side, side)))
+    seams = _with_opened_folds(plan.seams, opened)
     pairs = find_mirror_pairs(garments, pieces, seams)
     drawn = {size: _without_mirror_images(row, pairs) for size, row in pieces.items()}
     notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
@@ -85,6 +82,14 @@ def pattern_of_garment(
         for piece, stray in bent.items()
     )
     return Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size), notes
+
+
+def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
+    """Add a seam in the centre of each piece that is cut twice instead of on the fold."""
+    for piece, edge in opened.items():
+        side = (SeamSide(piece=piece, edge=edge),)
+        seams = (*seams, Seam(name=unused_name(edge, {seam.name for seam in seams}), sides=(side, side)))
+    return seams
 
 
 def _pieces(
@@ -122,7 +127,9 @@ def _without_mirror_images(pieces: Sequence[Piece], pairs: Sequence[MirrorPair])
 
 
 def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
-    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight, else through the widest place.
+    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight.
+
+    Elsewhere it runs through the widest place.
 
     Args:
         outline: #P by 2 [m].
@@ -154,7 +161,7 @@ def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: Flo
     found: dict[str, FloatArray] = {}
     for name, line in lines.items():
         for stretch in inner_stretches(np.asarray(line), edges):
-            found[unused(name, found)] = flat[stretch]
+            found[unused_name(name, found)] = flat[stretch]
     return found
 
 

@@ -221,8 +221,8 @@ class SeamReport:
         length_mm: of both sides [mm].
         ease: by how much the second side is meant to be longer, as a share.
         difference_mm: by how much the second side is too long (or, negative, too short) for that ease [mm].
-        local_mm: the largest difference over 50 mm of the first side, without its sign, measured between the vertices of the
-            mesh that both sides share; None where they come from no mesh, or from different vertices.
+        local_mm: the largest difference over 50 mm of the first side, without its sign, measured between the vertices
+            of the mesh that both sides share; None where they come from no mesh, or from different vertices.
     """
 
     name: str

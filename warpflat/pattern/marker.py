@@ -20,8 +20,8 @@ __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
 #: Copies are nested as polygons that are larger by up to this [m] and have far fewer corners.
 SIMPLER = 1e-3
-#: Height of capitals [m] of a copy's name and of its other lines, the least share of these, and their distances [m] from
-#: lines, the second where there is little room.
+#: Height of capitals [m] of a copy's name and of its other lines, the least share of these, and their distances [m]
+#: from lines, the second where there is little room.
 NAME, MORE, LEAST, CLEARANCES = 0.012, 0.009, 0.1, (0.004, 0.001)
 #: Two placed copies may touch, but not share more than this area [m2].
 OVERLAP = 1e-8
@@ -33,8 +33,10 @@ class Cloth:
 
     Attributes:
         width: usable width between the selvedges [m].
-        one_way: all pieces point the same way along the warp (nap, pile, one-way prints); otherwise they may turn round.
-        reversible: both faces are equal, so that pairs may be cut either way up; otherwise one of each pair is mirrored.
+        one_way: all pieces point the same way along the warp (nap, pile, one-way prints); otherwise they may turn
+            round.
+        reversible: both faces are equal, so that pairs may be cut either way up; otherwise one of each pair is
+            mirrored.
         gap: between pieces, and to the selvedges and ends [m].
     """
 

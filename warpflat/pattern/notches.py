@@ -59,8 +59,8 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
     other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
 
-    Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved towards
-    the seam's start, on both sides.
+    Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved
+    towards the seam's start, on both sides.
     """
     notches: dict[str, list[Notch]] = {}
     for seam in seams:
@@ -81,7 +81,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
 
 
 def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list[tuple[str, Notch]]:
-    """Return the notches of both sides at a fraction of the seam's length, each with its piece; none if they cannot be cut."""
+    """Return the notches of both sides at a fraction of the seam's length, by piece; none if they cannot be cut."""
     for share in SHARES_FROM_START:
         places = [(line, share * fraction * line.length) for line in lines]
         names = [line.piece_name(length).lower() for line, length in places]
@@ -108,7 +108,7 @@ def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
 
 
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
-    """Return the darts that are cut away as the seams by which they are closed, both legs from the border to the tip."""
+    """Return the darts that are cut away as seams that close them, both legs from the border to the tip."""
     return [
         Seam(
             name=f"{name}.{dart.dart.name}",

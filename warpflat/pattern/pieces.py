@@ -1,4 +1,4 @@
-"""The parts of a pattern: edges, darts, pieces, seams, and a garment in its sizes. All are validated when they are made."""
+"""The parts of a pattern: edges, darts, pieces, seams, and a garment in its sizes; validated when they are made."""
 
 from __future__ import annotations
 
@@ -95,7 +95,8 @@ class Dart:
         right: the edge that runs from the tip back to the border.
         fold_to: the side to which the wedge is pressed, "left" or "right"; None lets the piece decide: downwards for
             a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
-        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for that.
+        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for
+            that.
     """
 
     name: str
@@ -220,7 +221,8 @@ class SeamSide:
     Attributes:
         piece, edge: names.
         reversed: the seam runs against the edge's own (counter-clockwise) direction.
-        mirrored: the edge belongs to the piece's second copy, which is cut turned over; both copies have the same notches.
+        mirrored: the edge belongs to the piece's second copy, which is cut turned over; both copies have the same
+            notches.
     """
 
     piece: str
