@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -95,8 +96,7 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     internal = _internal_lines(piece, frame, tolerance)
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
-    obstacles = [grain, *internal.values()]
-    obstacles += [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
+    leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     return DraftedPiece(
         piece=piece,
@@ -115,13 +115,13 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             garment,
             (sew_line, cut.points),
             list(holes.values()),
-            obstacles,
+            [grain, *internal.values(), *leg_lines],
             [edge.line for edge in edges if edge.kind == "fold"],
         ),
         notes=(
             *cut.notes,
             *_ragged_edges(edges, tolerance),
-            *(note for legs in darts.values() for note in dart_notes(legs)),
+            *chain.from_iterable(map(dart_notes, darts.values())),
             *_small_cutouts(piece, cutouts),
             *_uneven_fisheyes(fisheyes),
         ),
