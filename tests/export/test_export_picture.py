@@ -11,12 +11,21 @@ from export_meshes import cut_up_the_middle, dome, grid, mixed, surface
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.colours import SMALLEST_SCALE, energy_colours, energy_scale
 from warpflat.export.geometry import corner_average, face_areas, outline_edges
-from warpflat.export.labels import LabelRoom, Spot, along_line, beside, beyond_ends, leader_of, points_on, spread
+from warpflat.export.labels import (
+    LabelRoom,
+    Spot,
+    leader_of,
+    points_on,
+    space_out,
+    spots_along,
+    spots_beside,
+    spots_beyond_ends,
+)
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import save_png
-from warpflat.export.raster import Samples, rasterise, shade
+from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
 
@@ -241,8 +250,8 @@ def test_light_falls_by_the_blended_normal_and_the_reverse_is_greyed() -> None:
     face = np.arange(len(triangles), dtype=np.int32)
     colours = np.random.default_rng(3).random((len(triangles), 3))
     light, back = np.array([0.6, 0.0, 0.8]), (0.7, 0.8, 0.9)
-    look = {"face": face, "normals": normals, "light": tuple(2.0 * light), "back": back}
-    pixels = shade(samples, 1, points, triangles, colours, **look)
+    lighting = Lighting(normals=normals, direction=tuple(2.0 * light), back=back)
+    pixels = shade(samples, 1, points, triangles, colours, face=face, lighting=lighting)
     assert (pixels[..., 3] == 255).all()
     for row, column in np.random.default_rng(4).integers(0, 40, (200, 2)):
         triangle = samples.triangle[row, column]
@@ -263,8 +272,8 @@ def test_a_triangle_lit_by_its_own_normal_has_one_colour() -> None:
     samples = rasterise(points, triangles, (40, 40))
     own = np.tile([0.0, 0.0, 3.0], (len(triangles), 1))
     face = np.zeros(len(triangles), dtype=np.int32)
-    look = {"face": face, "normals": own, "blended": False}
-    pixels = shade(samples, 2, points, triangles, np.array([[0.2, 0.4, 0.6]]), **look)
+    lighting = Lighting(normals=own, at_vertices=False)
+    pixels = shade(samples, 2, points, triangles, np.array([[0.2, 0.4, 0.6]]), face=face, lighting=lighting)
     assert pixels.shape == (20, 20, 4)
     np.testing.assert_array_equal(pixels.reshape(-1, 4), np.tile([54, 107, 161, 255], (400, 1)))
 
@@ -326,7 +335,7 @@ def test_labels_do_not_overlap() -> None:
     line = np.array([[0.5, 1.0], [3.5, 1.0]])
     taken = []
     for _ in range(20):
-        spot = room.place([*along_line(line, 0.8, 0.1), *beyond_ends(line, 0.8, 0.1)], 0.8, 0.1, page)
+        spot = room.place([*spots_along(line, 0.8, 0.1), *spots_beyond_ends(line, 0.8, 0.1)], 0.8, 0.1, page)
         if spot is None:
             break
         taken.append(spot)
@@ -349,11 +358,11 @@ def test_labels_avoid_other_lines_where_they_can() -> None:
 
 def test_a_label_follows_its_line() -> None:
     steep = np.array([[0.0, 0.0], [0.0, 2.0]])
-    first = next(along_line(steep, 0.5, 0.1))
+    first = next(spots_along(steep, 0.5, 0.1))
     assert first.angle == pytest.approx(np.pi / 2)
     assert abs(first.x) == pytest.approx(0.1)
     assert first.y == pytest.approx(1.0)
-    assert list(along_line(steep[:, ::-1] * 0.2, 0.5, 0.1)) == []
+    assert list(spots_along(steep[:, ::-1] * 0.2, 0.5, 0.1)) == []
 
 
 def test_a_leader_runs_over_no_text_but_over_passable_lines() -> None:
@@ -373,13 +382,13 @@ def test_a_leader_runs_over_no_text_but_over_passable_lines() -> None:
 
 def test_spots_beside_a_point_are_led_to_it_unless_they_touch_it() -> None:
     for side in (1.0, -1.0):
-        spots = list(beside([(1.0, 2.0)], 0.6, [side], level=2.0))
+        spots = list(spots_beside([(1.0, 2.0)], 0.6, [side], level=2.0))
         assert spots[0].leader is None
         assert sum(spot.leader is None for spot in spots) == 1
         assert all(side * (spot.x - 1.0) > 0.379 for spot in spots)
-    assert next(beside([(1.0, 2.0)], 0.6, [1.0], level=2.3)).leader == (1.0, 2.0)
+    assert next(spots_beside([(1.0, 2.0)], 0.6, [1.0], level=2.3)).leader == (1.0, 2.0)
     points = [(1.0, 2.0), (3.0, 4.0)]
-    spots = list(beside(points, 0.6, [1.0, -1.0]))
+    spots = list(spots_beside(points, 0.6, [1.0, -1.0]))
     assert {spot.leader for spot in spots} == set(points)
     # Of all points in turn, the nearest first.
     lengths = [np.hypot(spot.x - spot.leader[0], spot.y - spot.leader[1]) for spot in spots if spot.leader is not None]
@@ -399,7 +408,7 @@ def test_spots_beside_a_point_are_led_to_it_unless_they_touch_it() -> None:
     ],
 )
 def test_names_one_below_the_other_stay_as_near_as_they_can(wanted: list[float], places: list[float]) -> None:
-    np.testing.assert_allclose(spread(wanted, 1.0, 0.0, 10.0), places)
+    np.testing.assert_allclose(space_out(wanted, 1.0, 0.0, 10.0), places)
 
 
 def test_names_across_a_narrow_piece_stand_beside_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -9,7 +9,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import turning_angles
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
-from warpflat.garment.ease import SeamWish, wished_seams
+from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.fullness import FullEdge, fullness_of, give_fullness
 from warpflat.garment.garment import Garment, flatten_form
@@ -49,7 +49,7 @@ def eased(mannequin: Mannequin, shirt: FormResult) -> Garment:
 
 
 def test_a_wish_finds_all_stretches_of_its_seam_and_the_longer_side(shirt: FormResult):
-    wished = wished_seams(shirt, WISHES)
+    wished = seam_ratios(shirt, WISHES)
     ratio = dict(zip([seam.name for seam in shirt.seams], wished.ratios, strict=True))
     # The cap lies at the front's armhole and at the back's: both are shorter than it.
     assert ratio["armhole left"] == ratio["armhole left 2"] == pytest.approx(1 / 1.04)
@@ -59,7 +59,7 @@ def test_a_wish_finds_all_stretches_of_its_seam_and_the_longer_side(shirt: FormR
     # As the pattern says it: how much longer the second side is.
     assert wished.ease == pytest.approx({"armhole left": 0.04, "shoulder right": 1 / 1.03 - 1, "side left": 0.02})
     assert {piece: len(edges) for piece, edges in wished.full.items()} == {"sleeve_left": 2, "front": 1, "back": 1}
-    assert wished_seams(shirt, [SeamWish(name="armhole left 2", factor=1.04)]).ease == {
+    assert seam_ratios(shirt, [SeamWish(name="armhole left 2", factor=1.04)]).ease == {
         "armhole left": pytest.approx(0.04)
     }
 
@@ -81,10 +81,10 @@ def test_a_wish_finds_all_stretches_of_its_seam_and_the_longer_side(shirt: FormR
 )
 def test_a_wrong_wish_is_told_in_one_line(shirt: FormResult, wish: SeamWish, message: str):
     with pytest.raises(InputError, match=message) as caught:
-        wished_seams(shirt, [wish])
+        seam_ratios(shirt, [wish])
     assert "\n" not in str(caught.value)
     with pytest.raises(InputError, match="is named twice"):
-        wished_seams(shirt, [WISHES[0], SeamWish(name="armhole left 2", factor=1.1)])
+        seam_ratios(shirt, [WISHES[0], SeamWish(name="armhole left 2", factor=1.1)])
 
 
 # --- what comes out
@@ -116,7 +116,7 @@ def test_seams_come_out_with_their_ease_and_the_shorter_side_keeps_its_length(
 
 
 def test_the_pattern_knows_the_ease_and_its_notches_meet(eased: Garment, shirt: FormResult):
-    rules = EdgeRules(ease=wished_seams(shirt, WISHES).ease)
+    rules = EdgeRules(ease=seam_ratios(shirt, WISHES).ease)
     pattern, _ = pattern_of_garment({"EU 38": eased}, name="shirt", rules=rules)
     drafted = draft_garment(pattern)
     reports = {report.name: report for report in drafted.seams}
@@ -133,7 +133,7 @@ def test_the_pattern_knows_the_ease_and_its_notches_meet(eased: Garment, shirt: 
 
 
 def test_no_ease_is_no_fullness(shirt: FormResult):
-    wished = wished_seams(shirt, [SeamWish(name="side left", factor=1.0), SeamWish(name="side right", factor=1.02)])
+    wished = seam_ratios(shirt, [SeamWish(name="side left", factor=1.0), SeamWish(name="side right", factor=1.02)])
     assert {name: len(edges) for name, edges in wished.full.items()} == {"back": 1}
     assert wished.ease == {"side left": 0.0, "side right": pytest.approx(0.02)}
 
@@ -177,7 +177,7 @@ def test_gathered_seams_are_smooth_in_soft_cloth_also_across_the_fold(fabric: st
         turns = turning_angles(unfolded)
         there_and_back = np.abs(turns).sum() - np.ptp(np.concatenate([[0.0], np.cumsum(turns)]))
         assert there_and_back < np.radians(40.0), piece.surface.name
-    rules = EdgeRules(ease=wished_seams(form, wishes).ease)
+    rules = EdgeRules(ease=seam_ratios(form, wishes).ease)
     drafted = draft_garment(pattern_of_garment({"EU 38": made}, name="dress", rules=rules)[0])
     assert max(abs(seam.difference_mm) for seam in drafted.seams) < 0.5
 

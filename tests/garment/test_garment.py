@@ -75,11 +75,11 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
         ]
         # 0.2 mm per 5 cm, edge by edge
         assert np.abs(sides[0] - sides[1]).max() < 2e-4 * 0.025 / 0.05, seam.name
-    assert 0.0 < block.sewn.price < 0.2 * block.sewn.energy_before
-    prices = {seam.name: seam.price for seam in block.seams}
-    assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.price, rel=0.05)
+    assert 0.0 < block.sewn.cost < 0.2 * block.sewn.energy_before
+    prices = {seam.name: seam.cost for seam in block.seams}
+    assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.cost, rel=0.05)
     assert prices["side left"] == pytest.approx(prices["side right"], rel=1e-3)
-    assert all(seam.price is None for seam in alone.seams)
+    assert all(seam.cost is None for seam in alone.seams)
     assert block.sewn.energy_before == pytest.approx(sum(p.stages[-1].model_energy_j for p in alone.pieces.values()))
 
 
@@ -105,8 +105,8 @@ def test_half_pieces_have_a_straight_fold(mannequin: Mannequin, block: Garment):
     assert block.sewn is not None
     # The folds have their price too, and all prices together are what all of it costs.
     assert [held.name for held in half.sewn.constraints] == [f"{name} fold" for name in half.form.pieces]
-    assert all(held.price > 0.0 for held in half.sewn.constraints)
-    assert sum(held.price for held in half.sewn.held) == pytest.approx(half.sewn.price, rel=0.05)
+    assert all(held.cost > 0.0 for held in half.sewn.constraints)
+    assert sum(held.cost for held in half.sewn.results) == pytest.approx(half.sewn.cost, rel=0.05)
     # two halves are the whole
     assert 2 * half.sewn.energy_after == pytest.approx(block.sewn.energy_after, rel=0.02)
 

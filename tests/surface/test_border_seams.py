@@ -73,8 +73,8 @@ def test_sides_of_other_vertices_are_sewn_by_arc_length(alone: Flattening):
     (seam,) = sewn.seams
     assert seam.sides == ("sleeve.front", "sleeve.back")
     assert abs(seam.difference) < 1e-4
-    assert seam.price is not None
-    assert seam.price > 0
+    assert seam.cost is not None
+    assert seam.cost > 0
     # Not only in all: from end to end both lie at the same shares of their length, or nearly so.
     result = sewn.result
     (found,) = surface_seams(result.network.surface, [UNDERARM])

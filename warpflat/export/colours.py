@@ -13,8 +13,8 @@ __all__ = ["SMALLEST_SCALE", "energy_colours", "energy_scale", "linear_rgb"]
 # Cloth of 1 kN/m stores this much per area at a strain of 4e-5. Below it a map would show rounding errors.
 SMALLEST_SCALE = 1e-6  # [J/m2]
 
-# Near-white where the cloth is at ease, dark where energy stays: reads on paper, in grey, and without red-green vision.
-# Lightness falls evenly, so that lines and labels stay legible on most of a pattern.
+# Near-white where there is little energy, dark where there is much: legible on paper, in grey, and without red-green
+# vision. Lightness falls evenly, so that lines and labels stay legible on most of a pattern.
 _ANCHORS = np.array(
     [
         [0.965, 0.957, 0.925],
@@ -31,7 +31,7 @@ _ANCHORS = np.array(
 
 
 def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
-    """sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N); what exceeds `scale` gets the last colour."""
+    """Return sRGB colours (#N by 3, 0 to 1) of energy densities [J/m2] (#N), the last colour above `scale`."""
     position = np.clip(np.asarray(density, dtype=np.float64) / scale, 0.0, 1.0) * (len(_ANCHORS) - 1)
     lower = np.minimum(position.astype(np.int64), len(_ANCHORS) - 2)
     fraction = (position - lower)[..., None]
@@ -39,16 +39,17 @@ def energy_colours(density: ArrayLike, scale: float) -> FloatArray:
 
 
 def linear_rgb(colours: ArrayLike) -> FloatArray:
-    """sRGB to linear Rec. 709, the space in which USD reads ``displayColor`` (IEC 61966-2-1)."""
+    """Convert sRGB to linear Rec. 709, the space in which USD reads ``displayColor`` (IEC 61966-2-1)."""
     srgb = np.asarray(colours, dtype=np.float64)
     return np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
 
 
 def energy_scale(density: ArrayLike, areas: ArrayLike) -> float:
-    """The upper end of the colour scale [J/m2]: the value that 98 % of the area stays below, rounded up.
+    """Return the upper end of the colour scale [J/m2]: the value below which 98 % of the area stays, rounded up.
 
-    A few sliver faces would otherwise make all the rest of the map pale. By area, since faces differ in size; rounded
-    up to 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 times a power of ten, so that the scale is easy to read and to compare.
+    A few sliver faces would otherwise make the rest of the map pale. The share is by area, since faces differ in size.
+    The value is rounded up to 1, 1.5, 2, 2.5, 3, 4, 5, 6 or 8 times a power of ten, so that the scale is easy to read
+    and to compare.
 
     Args:
         density: #F, energy per area [J/m2].

@@ -58,7 +58,7 @@ def write_dxf(
     Args:
         garment: drafted.
         path: of the file.
-        dialect: "aama" (which the most systems read) or "astm".
+        dialect: "aama" (which most systems read) or "astm".
         units: "metric" (millimetres) or "english" (inches).
         sizes: those to write; None writes all.
         created: date and time for the file's text; None takes the present.
@@ -80,10 +80,10 @@ def write_dxf(
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
-    called = titles([piece.name for piece in next(iter(garment.pieces.values()))], _is_written)
+    shown_names = titles([piece.name for piece in next(iter(garment.pieces.values()))], _is_written)
     for placed in lay_out(groups, width=1.5).placed:
         for piece in placed.pieces:
-            title = called[piece.name]
+            title = shown_names[piece.name]
             name = block_name(piece, taken, title)
             block = document.blocks.new(name, base_point=(0, 0))
             _write_piece(block, piece, title, scale, validation=dialect == "astm")
@@ -94,7 +94,7 @@ def write_dxf(
 
 
 def _new_document() -> Drawing:
-    """An empty R12 document, without ezdxf's warning that R12 says nothing of units: the style text does."""
+    """Create an empty R12 document, without ezdxf's warning that R12 has no units: the style text names them."""
     import ezdxf
 
     logger = logging.getLogger("ezdxf")
@@ -107,9 +107,9 @@ def _new_document() -> Drawing:
 
 
 def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
-    """A block name such as FRONT_BODICE_38 in the few characters that R12 allows, and not in `taken` (it is added).
+    """Return a block name such as FRONT_BODICE_38 that is not in `taken`, to which it is added.
 
-    `title` stands for the piece's name where that has none of these characters.
+    R12 allows few characters. `title` stands for the piece's name where that has none of these.
     """
     text = f"{title or piece.name}_{piece.size}" if piece.size else title or piece.name
     clean = re.sub(r"[^A-Z0-9_$-]+", "_", _ascii(text).upper()).strip("_") or "PIECE"
@@ -122,45 +122,29 @@ def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
 
 
 def _ascii(text: str) -> str:
-    """The standards allow 7 bits only: accents are dropped, what remains becomes "?", and control characters too: a line is a value."""
+    """Return a text in 7 bits, as the standards demand: accents are dropped, other letters become "?"."""
+    # Control characters too: a line of the file is a value.
     plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
     return "".join("?" if control_in(letter) else letter for letter in plain)
 
 
 def _is_written(name: str) -> bool:
-    """Whether 7 bits leave anything of a name."""
+    """Return whether 7 bits leave anything of a name."""
     return any(letter.isalnum() for letter in _ascii(name))
 
 
 def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: float, *, validation: bool) -> None:
+    """Write all layers of one piece in one size."""
     boundary = _from_a_corner(piece.cut_line)
     _polyline(block, boundary, scale, "1", closed=True)
-    corner = _is_corner(boundary)
-    for point, turns in zip(boundary, corner, strict=True):
+    for point, turns in zip(boundary, _is_corner(boundary), strict=True):
         _point(block, point, scale, "2" if turns else "3")
-    for notch in piece.notches:
-        angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
-        for base in notch.base:
-            location = (base[0] * scale, base[1] * scale, notch.depth * scale)
-            block.add_point(location, dxfattribs={"layer": "4", "angle": angle})
-    for edge in piece.edges:
-        if edge.kind == "fold":
-            _line(block, edge.line[[0, -1]], scale, "6")
-        else:
-            # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
-            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
-        middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
-        _text(block, f"EDGE: {edge.name}", middle, scale, "15", 0.003)
+    _write_notches(block, piece, scale)
+    _write_edges(block, piece, scale)
     _line(block, piece.grain, scale, "7")
     for line in piece.internal_lines.values():
         _polyline(block, line, scale, "8")
-    for dart in piece.darts:
-        if dart.fold is not None:
-            _polyline(block, dart.fold, scale, "8")
-        _text(block, f"DART: {dart.dart.name}", dart.tip, scale, "15", 0.003)
-    for name, line in piece.fisheyes.items():
-        _polyline(block, line, scale, "8", closed=True)
-        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
+    _write_darts(block, piece, scale)
     for cutout in piece.cutouts.values():
         _polyline(block, cutout.cut_line, scale, "11", closed=True)
         if cutout.width > 0:
@@ -172,10 +156,46 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: flo
         for edge in piece.edges:
             if edge.kind not in ("fold", "dart"):
                 _polyline(block, edge.curve.sample(5e-6), scale, "87")
+    _write_texts(block, piece, title, scale)
+
+
+def _write_notches(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
+    """Write slit notches as points with their depth for height."""
+    for notch in piece.notches:
+        angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
+        for base in notch.base:
+            location = (base[0] * scale, base[1] * scale, notch.depth * scale)
+            block.add_point(location, dxfattribs={"layer": "4", "angle": angle})
+
+
+def _write_edges(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
+    """Write the sewing line edge by edge, each with its name."""
+    for edge in piece.edges:
+        if edge.kind == "fold":
+            _line(block, edge.line[[0, -1]], scale, "6")
+        else:
+            # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
+            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+        middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
+        _text(block, f"EDGE: {edge.name}", middle, scale, "15", 0.003)
+
+
+def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
+    """Write the folds of darts, fish-eye darts and their names."""
+    for dart in piece.darts:
+        if dart.fold is not None:
+            _polyline(block, dart.fold, scale, "8")
+        _text(block, f"DART: {dart.dart.name}", dart.tip, scale, "15", 0.003)
+    for name, line in piece.fisheyes.items():
+        _polyline(block, line, scale, "8", closed=True)
+        _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
+
+
+def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: float) -> None:
+    """Write the system texts where the label has its room; notes may run on to the right."""
     texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
     texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
     texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
-    # They stand where the label has its room; notes may run on to the right.
     low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
     widest = max(text_width(text, 1.0) for text in texts)
     texts += [f"ANNOTATION: {note}" for note in piece.notes]
@@ -185,6 +205,7 @@ def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: flo
 
 
 def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime) -> None:
+    """Write the texts that describe the whole file."""
     texts = [
         f"STYLE NAME: {garment.name}",
         f"CREATION DATE: {created:%d-%m-%Y}",
@@ -218,11 +239,12 @@ def _text(block: BlockLayout | Modelspace, text: str, at: FloatArray, scale: flo
 
 
 def _is_corner(ring: FloatArray) -> BoolArray:
+    """Return which points of a closed line (#P) are turn points."""
     around = np.concatenate([ring[-1:], ring, ring[:1]])
     return np.asarray(np.abs(turning_angles(around)) > TURN)
 
 
 def _from_a_corner(ring: FloatArray) -> FloatArray:
-    """CAD systems expect a boundary to begin in a turn point."""
+    """Return a closed line that begins in a turn point, as CAD systems expect of a boundary."""
     corners = np.flatnonzero(_is_corner(ring))
     return np.roll(ring, -int(corners[0]), axis=0) if len(corners) else ring

@@ -1,4 +1,4 @@
-"""What exporters need of a mesh: areas, normals, outline edges, lines. Arrays in, new arrays out, no divide by zero."""
+"""Geometry that exporters need of a mesh: areas, normals, outline edges, lines. Every division is guarded."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Polylines = list[IntArray]
 
 
 def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
-    """Lines by name as lists of vertex-index arrays; one array stands for one polyline. Single points are dropped."""
+    """Return lines by name as lists of vertex-index arrays, one per polyline; single points are dropped."""
     result: dict[str, Polylines] = {}
     for name, line in (lines or {}).items():
         single = len(line) > 0 and np.ndim(line[0]) == 0
@@ -34,16 +34,16 @@ def polylines_of(lines: Mapping[str, Any] | None) -> dict[str, Polylines]:
 
 
 def face_areas(positions: FloatArray, faces: IntArray) -> FloatArray:
-    """#F, the area [m2] of each face (#F by 4) over `positions` (#V by 2 or 3); a quad is split along corners 0-2."""
+    """Return the area [m2] of each face (#F by 4) over positions (#V by 2 or 3); quads are split along corners 0-2."""
     triangles, face = triangulate(faces)
     areas = np.linalg.norm(area_vectors(positions, triangles), axis=1)
     return np.bincount(face, weights=areas, minlength=len(faces)).astype(np.float64)
 
 
 def area_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
-    """#T by 3, the normals of triangles (#T by 3) over `positions` (#V by 2 or 3), as long as their areas [m2]."""
+    """Return the normals of triangles (#T by 3) over `positions` (#V by 2 or 3), as long as their areas [m2]."""
     space = positions if positions.shape[1] == 3 else np.column_stack([positions, np.zeros(len(positions))])
-    # By columns: twice as fast as np.cross on the rows, which matters at a million faces.
+    # By columns, twice as fast as np.cross on the rows: it matters at a million faces.
     a = space[triangles[:, 0]]
     ux, uy, uz = (space[triangles[:, 1]] - a).T
     vx, vy, vz = (space[triangles[:, 2]] - a).T
@@ -51,7 +51,7 @@ def area_vectors(positions: FloatArray, triangles: IntArray) -> FloatArray:
 
 
 def vertex_normals(vectors: FloatArray, triangles: IntArray, count: int) -> FloatArray:
-    """#V (= `count`) by 3, unit normals, the mean of the triangles around each vertex by area; +Z where there is none.
+    """Return unit normals (#V by 3), the mean of the triangles around each vertex by area; +Z where there is none.
 
     Args:
         vectors: #T by 3, as :func:`area_vectors` gives them.
@@ -75,7 +75,7 @@ def corner_average(
     vertex: IntArray,
     count: int,
 ) -> FloatArray:
-    """#V (= `count`), the mean of the face values around each vertex by face weight; 0 where no face is.
+    """Return the mean of the face values around each vertex, weighted by face (#V); 0 where no face is.
 
     Args:
         values, weights: #F.
@@ -90,9 +90,9 @@ def corner_average(
 
 
 def outline_edges(faces: IntArray) -> IntArray:
-    """#B by 2, the edges with one face only, as (lower, higher) vertex: outer border, holes and the sides of cracks.
+    """Return the edges with one face only (#B by 2), as (lower, higher) vertex: border, holes, sides of cracks.
 
-    The same edges as ``warpflat.surface.half_edges.border_edges`` without their direction, which costs a sort of one
+    These are the edges of ``warpflat.surface.half_edges.border_edges`` without their direction, which costs a sort of one
     array instead of an indexed one: it matters at a million faces.
     """
     keys = []

@@ -1,4 +1,4 @@
-"""Where labels go on a drawing so that no two overlap."""
+"""Places for labels on a drawing, so that no two overlap."""
 
 from __future__ import annotations
 
@@ -15,15 +15,15 @@ from warpflat.core.polyline import points_at_lengths, polyline_length, resample
 __all__ = [
     "LabelRoom",
     "Spot",
-    "along_line",
-    "away_from",
-    "beside",
-    "beyond_ends",
     "in_batches",
     "leader_of",
     "points_on",
     "rectangles",
-    "spread",
+    "space_out",
+    "spots_along",
+    "spots_away_from",
+    "spots_beside",
+    "spots_beyond_ends",
 ]
 
 # From the end of a leader to its text [in].
@@ -41,7 +41,7 @@ class Spot:
 
 
 class LabelRoom:
-    """The room on one page [in]: boxes and labels that are taken, and whether another label still fits."""
+    """The free room on one page [in]: keeps what is occupied, and finds places for labels."""
 
     def __init__(self) -> None:
         self._discs = np.empty((0, 3))
@@ -55,7 +55,7 @@ class LabelRoom:
         self._add(_discs([middle], max(width, height), min(width, height))[0])
 
     def take_line(self, points: FloatArray, thickness: float, *, passable: bool = False) -> None:
-        """Keep labels off a polyline (#N by 2) [in], and leaders, unless it is passable."""
+        """Keep labels off a polyline (#N by 2) [in], and leaders too unless it is passable."""
         for a, b in pairwise(points):
             length = float(np.linalg.norm(b - a))
             spot = Spot(x=float(a[0] + b[0]) / 2, y=float(a[1] + b[1]) / 2, angle=float(np.arctan2(*(b - a)[::-1])))
@@ -75,42 +75,50 @@ class LabelRoom:
         *,
         may_cross: bool = True,
     ) -> Spot | None:
-        """Take the first of `spots` at which a text of this size [in] lies free within `page`, and its leader over no other, or None.
+        """Take the first spot at which a text and its leader lie free within `page`; None if there is none.
 
-        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if they may be.
+        The lines whose points (`points_on`) are in `avoid` are crossed only where every other spot is worse, and if
+        they may be.
+
+        Args:
+            spots: in order of preference.
+            width, height: of the text [in].
+            page: left, bottom, right, top [in].
+            avoid: #N by 2 [in], points of lines.
+            may_cross: whether those lines may be crossed.
         """
         lines = np.empty((0, 2)) if avoid is None else avoid
         left, bottom, right, top = page
         taken = np.concatenate([self._discs, self._passable])
         off_lines = np.concatenate([taken, np.column_stack([lines, np.zeros(len(lines))])])
-        # A few at a time where one look is enough: to make a spot may take longer than to look at it.
+        # In batches where one pass is enough: making a spot may take longer than testing it.
         spots = list(spots) if may_cross else spots
         for obstacles in (off_lines, taken)[: 1 + may_cross]:
-            for some in in_batches(spots):
-                discs = _discs(some, width, height)
+            for batch in in_batches(spots):
+                discs = _discs(batch, width, height)
                 low = (discs[..., :2] - discs[..., 2:]).min(axis=1)
                 high = (discs[..., :2] + discs[..., 2:]).max(axis=1)
                 fits = np.flatnonzero((low >= (left, bottom)).all(axis=1) & (high <= (right, top)).all(axis=1))
-                for k in fits[_apart(discs[fits], obstacles)].tolist():
-                    if self._lets_pass(some[k], width):
+                for k in fits[_are_clear(discs[fits], obstacles)].tolist():
+                    if self._leader_is_free(batch[k], width):
                         self._add(discs[k])
-                        return some[k]
+                        return batch[k]
         return None
 
-    def _lets_pass(self, spot: Spot, width: float) -> bool:
-        """Whether a spot's leader runs over nothing; where it begins a line may have its own."""
+    def _leader_is_free(self, spot: Spot, width: float) -> bool:
+        """Return whether a spot's leader runs over nothing; where it begins a line may have its own."""
         leader = leader_of(spot, width)
         if leader is None:
             return True
         ink = points_on(leader, 0.03)[3:]
-        return bool(_apart(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
+        return bool(_are_clear(np.column_stack([ink, np.full(len(ink), 0.01)])[None], self._discs).all())
 
     def _add(self, discs: FloatArray) -> None:
         self._discs = np.concatenate([self._discs, discs])
 
 
 def leader_of(spot: Spot, width: float) -> FloatArray | None:
-    """2 by 2, the leader from where it begins to a text so wide [in]; None of a spot without one."""
+    """Return the leader (2 by 2 [in]) from its point to a text of this width; None for a spot without one."""
     if spot.leader is None:
         return None
     side = np.copysign(1.0, spot.x - spot.leader[0])
@@ -118,68 +126,69 @@ def leader_of(spot: Spot, width: float) -> FloatArray | None:
 
 
 def rectangles(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
-    """#S by #N by 2, points all over a text of this size at each spot [in]."""
+    """Return points all over a text of this size at each spot (#S by #N by 2 [in])."""
     along = np.linspace(-0.5 * width, 0.5 * width, max(3, math.ceil(width / height)))
     x, y = (of.ravel() for of in np.meshgrid(along, (-0.5 * height, 0.0, 0.5 * height)))
-    return np.stack(_turned(spots, x, y), axis=-1)
+    return np.stack(_placed_points(spots, x, y), axis=-1)
 
 
-def _turned(spots: Sequence[Spot], x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """#S by #N each, where points along and across a text (#N) come to at each spot."""
+def _placed_points(spots: Sequence[Spot], x: FloatArray, y: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return where points along and across a text (#N) come to lie at each spot (#S by #N each)."""
     at = np.array([(spot.x, spot.y, math.cos(spot.angle), math.sin(spot.angle)) for spot in spots])
     left, low, c, s = at.T[:, :, None]
     return left + c * x - s * y, low + s * x + c * y
 
 
-def spread(wanted: Sequence[float], apart: float, low: float, high: float) -> list[float]:
-    """Places as near as may be to those wanted, which fall, each at least so far below the one before, between the bounds if there is room.
+def space_out(wanted: Sequence[float], distance: float, low: float, high: float) -> list[float]:
+    """Return falling places as near as possible to those wanted, each at least `distance` below the one before.
 
-    Those that come too near to each other move together, as far up as down.
+    They stay between the bounds if there is room. Places that come too near to each other move together, as far up as
+    down.
     """
     groups: list[tuple[float, int]] = []  # the middle of each, and how many
     for place in wanted:
         middle, count = place, 1
-        while groups and groups[-1][0] - middle < 0.5 * (groups[-1][1] + count) * apart:
+        while groups and groups[-1][0] - middle < 0.5 * (groups[-1][1] + count) * distance:
             above, more = groups.pop()
             middle, count = (above * more + middle * count) / (more + count), more + count
         groups.append((middle, count))
-    places = [middle + (0.5 * (count - 1) - k) * apart for middle, count in groups for k in range(count)]
-    for i, least in enumerate(low + apart * np.arange(len(places))[::-1]):
+    places = [middle + (0.5 * (count - 1) - k) * distance for middle, count in groups for k in range(count)]
+    for i, least in enumerate(low + distance * np.arange(len(places))[::-1]):
         places[i] = max(places[i], float(least))
-    return [min(place, high - apart * i) for i, place in enumerate(places)]
+    return [min(place, high - distance * i) for i, place in enumerate(places)]
 
 
 def in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
-    """A few at first, since one of these will often do, then more at a time."""
+    """Yield a few spots at first, since one of these will often do, then more at a time."""
     left, count = iter(spots), 4
-    while some := list(islice(left, count)):
-        yield some
+    while batch := list(islice(left, count)):
+        yield batch
         count = min(2 * count, 64)
 
 
-def _apart(discs: FloatArray, others: FloatArray) -> BoolArray:
-    """#S, of each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
+def _are_clear(discs: FloatArray, others: FloatArray) -> BoolArray:
+    """Return for each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
     away = discs[:, :, None, :2] - others[:, :2]
     reach = discs[:, :, None, 2] + others[:, 2]
     return np.asarray((np.einsum("snmk,snmk->snm", away, away) >= reach**2).all(axis=(1, 2)))
 
 
 def _discs(spots: Sequence[Spot], width: float, height: float) -> FloatArray:
-    """#S by #N by 3: middles and radius of discs that cover a turned rectangle along its length, at each spot."""
+    """Return discs (#S by #N by 3: middle, radius) that cover a turned rectangle along its length, at each spot."""
     count = max(1, math.ceil(width / height))
     places = ((np.arange(count) + 0.5) / count - 0.5) * width
     radius = 0.5 * math.hypot(height, width / count) * 0.95
-    x, y = _turned(spots, places, np.zeros(count))
+    x, y = _placed_points(spots, places, np.zeros(count))
     return np.stack([x, y, np.full_like(x, radius)], axis=-1)
 
 
 def points_on(line: FloatArray, step: float) -> FloatArray:
-    """#N by 2, points on a polyline (#M by 2) [in], no farther apart along it than a step, its ends among them."""
+    """Return points on a polyline (#M by 2) [in], no farther apart along it than a step, with both ends (#N by 2)."""
     return resample(line, np.linspace(0.0, 1.0, max(2, math.ceil(polyline_length(line) / max(step, 1e-3)) + 1)))
 
 
-def along_line(line: FloatArray, width: float, clearance: float) -> Iterator[Spot]:
-    """Spots beside a polyline (#N by 2) [in] and parallel to it, from its middle outwards, on either side."""
+def spots_along(line: FloatArray, width: float, clearance: float) -> Iterator[Spot]:
+    """Yield spots beside a polyline (#N by 2) [in] and parallel to it, from its middle outwards, on either side."""
     total = polyline_length(line)
     if total < 1.05 * width:
         return
@@ -198,8 +207,8 @@ def along_line(line: FloatArray, width: float, clearance: float) -> Iterator[Spo
             yield Spot(x=float(x), y=float(y), angle=math.atan2(direction[1], direction[0]))
 
 
-def beyond_ends(line: FloatArray, width: float, height: float) -> Iterator[Spot]:
-    """Level spots just beyond either end of a polyline (#N by 2) [in]."""
+def spots_beyond_ends(line: FloatArray, width: float, height: float) -> Iterator[Spot]:
+    """Yield level spots just beyond either end of a polyline (#N by 2) [in]."""
     for end, inner in ((line[-1], line[-2]), (line[0], line[1])):
         outwards = end - inner
         right = 1.0 if outwards[0] >= 0 else -1.0
@@ -208,7 +217,7 @@ def beyond_ends(line: FloatArray, width: float, height: float) -> Iterator[Spot]
         yield Spot(x=float(end[0]), y=float(end[1] + up * (0.5 * height + 0.08)), angle=0.0)
 
 
-# How far out and how much higher a text may stand than the point that it names [in], the nearest first; rather out than up or down.
+# Offsets [in] of a text from the point that it names, outwards and upwards, nearest first; outwards is preferred.
 _AROUND = sorted(
     (
         (0.08 + 0.06 * step, rise)
@@ -219,27 +228,27 @@ _AROUND = sorted(
 )
 
 
-def beside(
+def spots_beside(
     points: Sequence[tuple[float, float]], width: float, sides: Sequence[float], *, level: float | None = None
 ) -> Iterator[Spot]:
-    """Level spots to the sides (right 1, left -1) of points [in], the nearest first, each with a leader to its point.
+    """Yield level spots to the sides (right 1, left -1) of points [in], nearest first, each with a leader to its point.
 
-    At a `level`, if one is given; there a text that stands right beside its point has no leader.
+    If a `level` is given, they stand at it; there a text right beside its point has no leader.
     """
-    for far, rise in _AROUND:
+    for outwards_by, rise in _AROUND:
         for point in points:
             y = (point[1] if level is None else level) + rise
-            touches = level is not None and far == _AROUND[0][0] and abs(y - point[1]) < 0.05
+            touches = level is not None and outwards_by == _AROUND[0][0] and abs(y - point[1]) < 0.05
             for side in sides:
-                x = point[0] + side * (far + 0.5 * width)
+                x = point[0] + side * (outwards_by + 0.5 * width)
                 yield Spot(x=x, y=y, angle=0.0, leader=None if touches else point)
 
 
-def away_from(line: FloatArray, width: float) -> Iterator[Spot]:
-    """Level spots away from the middle of a polyline (#N by 2) [in], each with a leader to it."""
+def spots_away_from(line: FloatArray, width: float) -> Iterator[Spot]:
+    """Yield level spots away from the middle of a polyline (#N by 2) [in], each with a leader to it."""
     middle = line[len(line) // 2]
     for side in (1.0, -1.0):
-        for far in (0.25, 0.5, 0.8, 1.2):
+        for outwards_by in (0.25, 0.5, 0.8, 1.2):
             for lift in (0.0, 0.25, -0.25, 0.5, -0.5):
-                x, y = float(middle[0]) + side * (0.5 * width + far), float(middle[1]) + lift
+                x, y = float(middle[0]) + side * (0.5 * width + outwards_by), float(middle[1]) + lift
                 yield Spot(x=x, y=y, angle=0.0, leader=(float(middle[0]), float(middle[1])))

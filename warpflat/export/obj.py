@@ -59,6 +59,7 @@ def write_obj(
 
 
 def _check(surface: Surface, flat: FloatArray, corners: NDArray[np.int64], origin: NDArray[np.int64]) -> None:
+    """Check that the arrays fit together."""
     if flat.ndim != 2 or flat.shape[1] != 2:
         raise ValueError(f"positions must be #P by 2, not {flat.shape}")
     if corners.ndim != 2 or corners.shape[1] != 4:
@@ -72,17 +73,20 @@ def _check(surface: Surface, flat: FloatArray, corners: NDArray[np.int64], origi
 
 
 def _chunks(count: int) -> Iterator[slice]:
+    """Return slices over rows, a chunk at a time."""
     return (slice(start, start + _ROWS_AT_ONCE) for start in range(0, count, _ROWS_AT_ONCE))
 
 
 def _write_rows(file: TextIO, row: str, values: FloatArray) -> None:
     # One formatting call per chunk: ten times faster than one per row, and Python's %r is the shortest exact form.
+    """Write one row of numbers per line."""
     for part in _chunks(len(values)):
         block = values[part]
         file.write((row * len(block)) % tuple(block.ravel().tolist()))
 
 
 def _write_faces(file: TextIO, corners: NDArray[np.int64], in_input: NDArray[np.int64]) -> None:
+    """Write faces as pairs of vertex and texture coordinate."""
     for part in _chunks(len(corners)):
         block = corners[part]
         used = block >= 0

@@ -16,17 +16,17 @@ from warpflat.pattern.pieces import SeamSide
 
 __all__ = ["SCHEMA", "pattern_json", "write_pattern_json"]
 
-#: Raised when a reader of the old form would misread the new one.
+#: Increased when a reader of the old form would misread the new one.
 SCHEMA = 1
 
 
 def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
-    """The whole pattern as plain lists and numbers. Lengths are metres, angles radians, y along the grain.
+    """Return the whole pattern as plain lists and numbers: lengths in metres, angles in radians, y along the grain.
 
-    A stitch sews two sides: each lists its edges in the order in which the seam meets them, and whether it runs against
-    the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is cut turned over.
-    An edge's `point_lengths` say where along its line the points of its mesh's border came to lie, and `fit_error` how far
-    the curve keeps from them. Numbers are not rounded.
+    A stitch sews two sides. Each side lists its edges in the order in which the seam meets them, and whether the seam
+    runs against the edge's own direction (counter-clockwise round its piece); "mirrored" is an edge of the copy that is
+    cut turned over. An edge's `point_lengths` are the lengths along its line at the points of its mesh's border, and
+    `fit_error` is the largest distance of the curve from them. Numbers are not rounded.
     """
     sample = next(iter(garment.pieces.values()))
     stitches: list[dict[str, Any]] = [

@@ -1,4 +1,4 @@
-"""What `pattern.json` holds, as pydantic models: everything that the other formats are made from, with its types, bounds and lengths.
+"""The content of `pattern.json` as pydantic models, with types, bounds and lengths.
 
 Lengths are metres, angles radians. Keys that follow from others, such as `on_fold`, are not read.
 """
@@ -34,7 +34,7 @@ def _ring(points: list[list[float]]) -> list[list[float]]:
     return points
 
 
-# A larger coordinate is an error of units, and its square soon no number any more.
+# A larger coordinate is an error of units, and its powers may overflow.
 Coordinate = Annotated[float, Field(ge=-10_000, le=10_000)]
 Length = Annotated[float, Field(ge=0, le=10_000)]
 Name = Annotated[str, AfterValidator(lambda name: checked_label(name, "name"))]
@@ -48,7 +48,7 @@ Row = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 
 
 class Entry(Table):
-    """A part of the file; keys that are not known here are left alone."""
+    """A part of the file; unknown keys are ignored."""
 
     model_config = ConfigDict(extra="ignore")
 
@@ -113,7 +113,7 @@ class HoleEntry(Entry):
 
 
 class LabelEntry(Entry):
-    """What is written on a piece: each text with the height of its capitals."""
+    """The label of a piece: each text with the height of its capitals."""
 
     at: Point
     lines: Annotated[list[Text], Field(min_length=1)]
@@ -133,7 +133,8 @@ class LabelEntry(Entry):
 class PieceEntry(Entry):
     """A piece in one size (see `warpflat.pattern.drafted.DraftedPiece`).
 
-    Files without `cutout_sew_lines` and `cutout_allowances` are from when holes had no allowance: cut on the sewing line.
+    In files without `cutout_sew_lines` and `cutout_allowances` holes have no allowance: they are cut on the sewing
+    line.
     """
 
     fabric: Text
@@ -174,7 +175,7 @@ class StitchEntry(Entry):
 
 
 class SeamEntry(Entry):
-    """How the two sides of a seam agree in one size (see `warpflat.pattern.drafted.SeamReport`)."""
+    """The lengths of the two sides of a seam in one size (see `warpflat.pattern.drafted.SeamReport`)."""
 
     name: Name
     size: Text
@@ -186,7 +187,7 @@ class SeamEntry(Entry):
 
 
 class PatternEntry(Entry):
-    """The whole file: pieces by size and name, what is sewn, and how well it fits."""
+    """The whole file: pieces by size and name, stitches, and the lengths of seams."""
 
     name: Name
     sample_size: Text

@@ -1,7 +1,7 @@
 """Patterns as PDF in true size: tiled on A4 or US Letter for home printers, whole on A0 for copy shops.
 
 Every tile repeats a strip of its neighbours. Thin lines with half diamonds show where the next sheet goes; rows are
-letters from the top, columns numbers from the left. The first page has test squares, an overview, and what to do. The
+letters from the top, columns numbers from the left. The first page has test squares, an overview and instructions. The
 file asks the printer not to scale.
 """
 
@@ -92,7 +92,7 @@ def write_pdf(
 
 
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
-    """The layout that needs the fewest pages, over sheets of one to eight tiles' width."""
+    """Return the layout that needs the fewest pages, over sheets of one to eight tiles' width."""
     step = paper.step
     widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
     best: tuple[Sheet, Tiling] | None = None
@@ -113,12 +113,12 @@ def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[She
 
 
 def _cost(tiling: Tiling) -> float:
-    """Pages, and a little for a long strip of them, which is hard to glue and to lay out."""
+    """Return the number of pages, and a little for a long strip of them, which is hard to glue and to lay out."""
     return len(tiling.tiles) + 0.2 * (tiling.rows + tiling.columns)
 
 
 def _register_fonts() -> None:
-    """They are embedded."""
+    """Register the fonts, which are embedded."""
     from reportlab.pdfbase import pdfmetrics
     from reportlab.pdfbase.ttfonts import TTFont
 
@@ -127,7 +127,7 @@ def _register_fonts() -> None:
 
 
 def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Sequence[str], paper: Paper) -> None:
-    """The whole sheet, drawn once; every page shows its part of it."""
+    """Draw the whole sheet once, as a form; every page shows its part of it."""
     border = 0.05
     low, high = np.array([-border, -3.0]), sheet.size + 3.0
     canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
@@ -146,6 +146,7 @@ def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Se
 
 
 def _stroke(canvas: Any, stroke: Stroke, offset: FloatArray, size_index: int | None) -> None:
+    """Draw one line."""
     colour, width, dashes = STYLE[stroke.role]
     if size_index is not None:
         colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in OF_SIZE else colour
@@ -171,6 +172,7 @@ def _stroke(canvas: Any, stroke: Stroke, offset: FloatArray, size_index: int | N
 
 
 def _words(canvas: Any, words: Words, offset: FloatArray, colour: str) -> None:
+    """Draw one line of text."""
     font, size = (BOLD if words.bold else FONT), words.height / CAPITALS * POINT
     canvas.saveState()
     canvas.translate(*((words.at + offset) * POINT))
@@ -186,6 +188,7 @@ def _words(canvas: Any, words: Words, offset: FloatArray, colour: str) -> None:
 
 
 def _tile(canvas: Any, tiling: Tiling, row: int, column: int, title: str) -> None:
+    """Draw one page."""
     paper = tiling.paper
     inner = np.array([paper.width, paper.height]) - 2 * paper.margin
     corner = tiling.corner(row, column)
@@ -206,7 +209,7 @@ def _tile(canvas: Any, tiling: Tiling, row: int, column: int, title: str) -> Non
 
 
 def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
-    """Thin lines where sheets meet, a half diamond with its number in the middle of each, a cross at each corner.
+    """Draw thin lines where sheets meet, a half diamond with its number in the middle of each, a cross at each corner.
 
     The right and lower strips lie under the neighbours: a sheet is cut along its left and upper line and laid upon the
     lines of the sheets that are already there.
@@ -246,6 +249,7 @@ def _joining_marks(canvas: Any, tiling: Tiling, row: int, column: int) -> None:
 
 
 def _diamond(canvas: Any, at: FloatArray, tiling: Tiling, here: tuple[int, int], there: tuple[int, int]) -> None:
+    """Draw the diamond in which two sheets meet, with their names."""
     first, second = sorted((here, there))
     size = 0.004
     path = canvas.beginPath()

@@ -1,4 +1,4 @@
-"""The first page of a printed pattern: test squares, what to do, what the lines mean, and which sheet goes where."""
+"""The first page of a printed pattern: test squares, instructions, meaning of the lines, overview of the sheets."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ _KEY = (
 
 
 def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Sequence[str], paper: str) -> None:
-    """Title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
+    """Draw title, both test squares, the request not to scale, and the key, in a block whose lower left is `at` [m]."""
     from warpflat.export.pdf_tiling import SIZE_COLOURS, SIZE_DASHES
 
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
@@ -80,11 +80,11 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
 
 
 def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
-    """The first page of a tiled pattern; ends the page."""
+    """Draw the first page of a tiled pattern, and end the page."""
     paper = tiling.paper
     low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
     draw_legend(canvas, low, garment, sizes, paper.name)
-    # The room for the sizes' lines and the notes is not left empty.
+    # Unused room for the sizes' lines and the notes is not left empty.
     noted = any(piece.notes for pieces in garment.pieces.values() for piece in pieces)
     y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 and not noted else 0.0)
     lines = [
@@ -105,7 +105,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
 
 
 def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, width: float, height: float) -> None:
-    """All sheets and pieces, small, in a box whose lower left is (x, y) [m]."""
+    """Draw all sheets and pieces, small, in a box whose lower left is (x, y) [m]."""
     step, overlap = tiling.paper.step, tiling.paper.overlap
     total = np.array([tiling.columns * step[0] + overlap, tiling.rows * step[1] + overlap])
     scale = float(min(width / total[0], height / total[1]))
@@ -137,7 +137,7 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
 
 
 def _name(canvas: Any, placed: Placed, number: int, origin: FloatArray, scale: float) -> None:
-    """The piece's name in what is drawn of it, or its number in the list above where there is no room."""
+    """Write a piece's name in its drawing, or its number in the list above where there is no room."""
     import shapely
 
     piece = placed.pieces[len(placed.pieces) // 2]
@@ -161,6 +161,7 @@ def _name(canvas: Any, placed: Placed, number: int, origin: FloatArray, scale: f
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
+    """Draw a test square."""
     canvas.setDash([])
     canvas.setLineWidth(0.4)
     canvas.setStrokeColor("#000000")
@@ -171,6 +172,7 @@ def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:
 
 
 def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: Sequence[float]) -> None:
+    """Draw a short line in the style of its kind."""
     canvas.setStrokeColor(colour)
     canvas.setLineWidth(width / 1000 * POINT)
     canvas.setDash([d / 1000 * POINT for d in dashes])
@@ -179,7 +181,7 @@ def _sample(canvas: Any, x: float, y: float, colour: str, width: float, dashes: 
 
 
 def _text(canvas: Any, x: float, y: float, text: str, size: float, *, bold: bool = False) -> None:
-    """Smaller where it would be wider than the legend."""
+    """Write a text, smaller where it would be wider than the legend."""
     wide = text_width(text, size * CAPITALS / POINT, bold=bold)
     canvas.setFillColor("#000000")
     canvas.setFont(BOLD if bold else FONT, size * min(1.0, LEGEND_SIZE[0] / max(wide, 1e-9)))

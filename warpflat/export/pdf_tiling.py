@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -12,13 +13,9 @@ from warpflat.pattern.draft import nest_label
 from warpflat.pattern.layout import Sheet
 
 if TYPE_CHECKING:
-    pass
-from typing import TYPE_CHECKING
+    from shapely import Polygon
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["LEGEND_SIZE", "SIZE_COLOURS", "SIZE_DASHES", "Paper", "Tiling"]
+__all__ = ["LEGEND_SIZE", "SIZE_COLOURS", "SIZE_DASHES", "Paper", "Tiling", "make_tiling"]
 
 #: Dashes [mm] by which sizes are told apart on paper, also without colour.
 SIZE_DASHES: tuple[tuple[float, ...], ...] = (
@@ -37,7 +34,14 @@ SIZE_COLOURS = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00"
 
 @dataclass(frozen=True, kw_only=True)
 class Paper:
-    """A sheet of paper: `width`, `height`, the `margin` that printers leave white, the `overlap` of tiles, all [m]."""
+    """A kind of paper.
+
+    Attributes:
+        name: for the reader.
+        width, height: [m].
+        margin: what printers leave white [m].
+        overlap: of neighbouring tiles [m].
+    """
 
     name: str
     width: float
@@ -47,20 +51,25 @@ class Paper:
 
     @property
     def step(self) -> FloatArray:
-        """How far one tile lies from the next [m], across and up."""
+        """Distance from one tile to the next [m], across and up."""
         return np.array([self.width, self.height]) - 2 * self.margin - self.overlap
 
     @property
     def tiled(self) -> bool:
-        """True for papers so small that a piece spreads over several."""
+        """Whether the paper is so small that a piece spreads over several sheets."""
         return self.width < 0.5
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Tiling:
-    """Which tiles of a sheet are printed: rows from the top, columns from the left, and their pages in order.
+    """The tiles of a sheet that are printed.
 
-    `joined` is false where no piece spreads over two tiles.
+    Attributes:
+        paper: of one tile.
+        rows, columns: rows count from the top, columns from the left.
+        tiles: (row, column) of each page, in their order.
+        sheet: what is printed.
+        joined: whether a piece spreads over two tiles.
     """
 
     paper: Paper
@@ -71,12 +80,12 @@ class Tiling:
     joined: bool = True
 
     def corner(self, row: int, column: int) -> FloatArray:
-        """Lower left of a tile on the sheet [m]."""
+        """Return the lower left of a tile on the sheet [m]."""
         step = self.paper.step
         return np.array([column * step[0], float(self.sheet.size[1]) - (row + 1) * step[1] - self.paper.overlap])
 
     def name(self, row: int, column: int) -> str:
-        """As "B3": second row, third column."""
+        """Return the name of a tile, such as "B3" for the second row and the third column."""
         letters = ""
         row += 1
         while row:
@@ -85,34 +94,54 @@ class Tiling:
         return f"{letters}{column + 1}"
 
 
-def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
-    import shapely
+#: Width and height [m] of the legend's block.
+LEGEND_SIZE = (0.180, 0.128)
 
+
+def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
+    """Choose the tiles of a sheet on which something is drawn."""
     step = paper.step
     columns = max(1, int(np.ceil((sheet.size[0] - paper.overlap) / step[0] - 1e-9)))
     rows = max(1, int(np.ceil((sheet.size[1] - paper.overlap) / step[1] - 1e-9)))
     tiling = Tiling(paper=paper, rows=rows, columns=columns, tiles=(), sheet=sheet)
+    shapes = _drawn_shapes(sheet)
+    tiles = _drawn_tiles(tiling, shapes)
+    return replace(tiling, tiles=tiles, joined=_is_joined(tiling, tiles, shapes))
+
+
+def _drawn_shapes(sheet: Sheet) -> list[Polygon]:
+    """Return the areas of a sheet that are drawn on: pieces, labels beside them, the reserved block."""
+    import shapely
+
     shapes = [shapely.Polygon(piece.cut_line + placed.offset) for placed in sheet.placed for piece in placed.pieces]
     labels = [(nest_label(placed.pieces), placed.offset) for placed in sheet.placed]
     shapes += [shapely.Polygon(label.box + offset) for label, offset in labels if label.leader is not None]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
-    tree = shapely.STRtree(shapes)
+    return shapes
+
+
+def _drawn_tiles(tiling: Tiling, shapes: Sequence[Polygon]) -> tuple[tuple[int, int], ...]:
+    """Return the tiles on which a part of a shape lies."""
+    import shapely
+
+    paper, tree = tiling.paper, shapely.STRtree(shapes)
     tiles = []
-    for row in range(rows):
-        for column in range(columns):
-            # The strips on the right and below belong to the neighbours, but for the last ones.
-            low, high = tiling.corner(row, column), tiling.corner(row, column) + step
-            high += np.array([paper.overlap if column == columns - 1 else 0.0, paper.overlap])
-            low += np.array([0.0, 0.0 if row == rows - 1 else paper.overlap])
+    for row in range(tiling.rows):
+        for column in range(tiling.columns):
+            # The strips on the right and below belong to the neighbours, except on the last tiles.
+            low, high = tiling.corner(row, column), tiling.corner(row, column) + paper.step
+            high += np.array([paper.overlap if column == tiling.columns - 1 else 0.0, paper.overlap])
+            low += np.array([0.0, 0.0 if row == tiling.rows - 1 else paper.overlap])
             if len(tree.query(shapely.box(*low, *high), predicate="intersects")):
                 tiles.append((row, column))
-    cells = [
-        shapely.box(*c, *(c + step)) for c in (tiling.corner(*tile) + np.array([0.0, paper.overlap]) for tile in tiles)
-    ]
-    joined = any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)
-    return replace(tiling, tiles=tuple(tiles), joined=joined)
+    return tuple(tiles)
 
 
-#: Width and height [m] of the block that :func:`draw_legend` draws.
-LEGEND_SIZE = (0.180, 0.128)
+def _is_joined(tiling: Tiling, tiles: Sequence[tuple[int, int]], shapes: Sequence[Polygon]) -> bool:
+    """Return whether a shape spreads over two tiles."""
+    import shapely
+
+    lower_left = [tiling.corner(*tile) + np.array([0.0, tiling.paper.overlap]) for tile in tiles]
+    cells = [shapely.box(*corner, *(corner + tiling.paper.step)) for corner in lower_left]
+    return any(sum(cell.intersects(shape) for cell in cells) > 1 for shape in shapes)

@@ -1,4 +1,4 @@
-"""`picture.png`: each piece on the body and in the plane, side by side, coloured by where strain energy stays."""
+"""`picture.png`: each piece on the body and in the plane, side by side, coloured by strain energy."""
 
 from __future__ import annotations
 
@@ -81,8 +81,8 @@ def write_picture(
         raise ValueError("a picture needs at least one piece")
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    called = titles([piece.name for piece in pieces], is_drawn)
-    rows = [_prepared(piece, called[piece.name]) for piece in pieces]
+    shown_names = titles([piece.name for piece in pieces], is_drawn)
+    rows = [_prepared(piece, shown_names[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
     areas = np.concatenate([row.areas for row in rows])
     scale = energy_scale(density, areas) if scale is None else scale
@@ -101,6 +101,7 @@ def write_picture(
 
 
 def _prepared(piece: PicturePiece, title: str) -> Row:
+    """Return the row of a piece, with its two views."""
     surface, positions = piece.surface, np.asarray(piece.positions, dtype=np.float64)
     faces = np.asarray(piece.faces, dtype=np.int32)
     in_space = surface.lines if piece.surface_lines is None else piece.surface_lines

@@ -32,7 +32,7 @@ _TICK_SIZE = 8.5  # [pt]
 
 @dataclass(kw_only=True, eq=False)
 class Row:
-    """One piece on the page."""
+    """One piece on the page: its name, captions, two views, and where they lie."""
 
     name: str
     captions: Mapping[str, str]
@@ -60,6 +60,7 @@ class Row:
 
     @property
     def height(self) -> float:
+        """Height of the whole row [in]."""
         return self.head + self.band + _BELOW
 
 
@@ -86,7 +87,7 @@ def lay_out(pen: Pen, rows: Sequence[Row]) -> float:
 
 
 def _wrapped(pen: Pen, row: Row) -> list[str]:
-    """The captions as lines that end before the colour bar."""
+    """Return the captions as lines that end before the colour bar."""
     width, height = row.pattern.size[:2]
     captions = {"pattern": f"{_length(width, unit=False)} × {_length(height)}"} | dict(row.captions)
     lines: list[str] = []
@@ -146,7 +147,10 @@ def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) 
 
 
 def _grain(pen: Pen, room: LabelRoom, drawn: DrawnView, datum: IntArray, grain_angle: float, *, inside: bool) -> bool:
-    """A grain arrow, turned from the datum line by so many degrees, on the pattern or right of it; False if no room."""
+    """Draw a grain arrow, turned by `grain_angle` degrees from the datum line; return False if there is no room.
+
+    It lies on the pattern if `inside`, else right of it.
+    """
     line = drawn.to_page(drawn.view.points[datum])
     along = line[-1] - line[0]
     length = float(np.linalg.norm(along))
@@ -183,7 +187,7 @@ def _grain_inside(
     length: float,
     text_height: float,
 ) -> tuple[FloatArray, float] | None:
-    """The middle of the arrow and half its length [in], where it and its word lie on the cloth."""
+    """Return the middle of the arrow and half its length [in], where it lies on the cloth; None if nowhere."""
     left, bottom, right, top = drawn.box
     width = abs(float(across[0])) * (right - left) + abs(float(across[1])) * (top - bottom)
     for half in (0.2 * length, 0.12 * length, _SHORTEST_GRAIN):
@@ -199,6 +203,7 @@ def _grain_inside(
 
 
 def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[FloatArray, float] | None:
+    """Return the middle of the arrow and half its length [in] beside the cloth; None if there is no room."""
     _, bottom, right, top = drawn.box
     spots = [
         Spot(x=right + far, y=bottom + share * (top - bottom), angle=angle)
@@ -210,7 +215,7 @@ def _grain_outside(room: LabelRoom, drawn: DrawnView, angle: float) -> tuple[Flo
 
 
 def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
-    """Width and height of the pattern, as a technical drawing gives them."""
+    """Draw width and height of the pattern, as in a technical drawing."""
     left, bottom, right, top = drawn.box
     width, height = drawn.view.size[:2]
     y, x = bottom - 0.22, left - 0.26
@@ -244,6 +249,7 @@ def _dimensions(pen: Pen, room: LabelRoom, drawn: DrawnView) -> None:
 
 
 def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: float) -> None:
+    """Draw a bar of a round length below the pattern."""
     from matplotlib.patches import Rectangle
 
     steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
@@ -269,7 +275,7 @@ def draw_colour_bar(
     areas: FloatArray,
     quantity: str,
 ) -> None:
-    """The colour bar beside the first row, and what lies above its end."""
+    """Draw the colour bar beside the first row, and the share of the area above its end."""
     from matplotlib.patches import Polygon
 
     from warpflat.export.picture_pixels import Pixels
@@ -288,7 +294,7 @@ def draw_colour_bar(
     outline = [(left, bottom), (right, bottom), (right, end), (left, end)]
     if above.any():
         tip = (0.5 * (left + right), top)
-        # From a pixel further down, so that no white shows between.
+        # It starts one pixel lower, so that no white shows between.
         corners = [(left, end - 1.0 / DPI), (right, end - 1.0 / DPI), (right, end), tip, (left, end)]
         pen.axes.add_patch(Polygon(corners, facecolor=energy_colours([1.0], 1.0)[0], linewidth=0, zorder=1))
         outline.insert(3, tip)
@@ -310,7 +316,7 @@ def draw_colour_bar(
 
 
 def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
-    """Round values from 0 to `scale` for a bar of this length [in], as words, and the power of ten that these leave out."""
+    """Return round values from 0 to `scale` for a bar of this length [in], their words, and their power of ten."""
     from matplotlib.ticker import MaxNLocator, ScalarFormatter
 
     most = int(np.clip(length / (2.0 * _TICK_SIZE * POINT), 1, 9))
@@ -325,11 +331,12 @@ def _ticks(scale: float, length: float) -> tuple[FloatArray, list[str], str]:
 
 
 def _percent(share: float) -> str:
+    """Return a share in percent."""
     return f"{100 * share:.1f} %" if share >= 0.001 else "under 0.1 %"
 
 
 def _length(metres: float, *, digits: int = 1, unit: bool = True) -> str:
-    """A length as pattern makers write it: centimetres, millimetres where it is below one."""
+    """Return a length as pattern makers write it: in centimetres, or in millimetres if it is below one."""
     value, word = (100 * metres, "cm") if metres >= 0.00999 else (1000 * metres, "mm")
     number = f"{value:.{digits}f}" if digits or value >= 1 else f"{value:.3g}"
     return f"{number} {word}" if unit else number

@@ -36,7 +36,7 @@ class Pen:
         self.axes.set_autoscale_on(False)
 
     def measure(self, text: str, size: float, weight: str = "normal") -> tuple[float, float]:
-        """Width and height of a line of text [in] at a size [pt]."""
+        """Return width and height of a line of text [in] at a size [pt]."""
         from matplotlib.font_manager import FontProperties
 
         key = (text, size, weight)
@@ -47,7 +47,7 @@ class Pen:
         return self._measured[key]
 
     def write(self, x: float, y: float, text: str, size: float, *, halo: bool = False, **options: Any) -> None:
-        """A text; with a halo it stays legible over colours and lines."""
+        """Write a text; with a halo it stays legible over colours and lines."""
         from matplotlib.patheffects import withStroke
 
         options = {"color": INK, "ha": "left", "va": "center", "zorder": 8, "parse_math": False} | options
@@ -58,7 +58,7 @@ class Pen:
     def line(
         self, points: FloatArray, *, width: float, colour: Any = INK, style: Any = "-", halo: bool = False
     ) -> None:
-        """A polyline (#N by 2); with a halo it stays visible on dark colours."""
+        """Draw a polyline (#N by 2); with a halo it stays visible on dark colours."""
         from matplotlib.lines import Line2D
 
         x, y = points.T
@@ -68,7 +68,7 @@ class Pen:
         self.axes.add_artist(Line2D(x, y, color=colour, linewidth=width, linestyle=style, zorder=5))
 
     def arrow(self, ends: FloatArray, *, width: float, colour: Any, head: float, halo: bool = False) -> None:
-        """A straight line (2 by 2) with a filled head at either end."""
+        """Draw a straight line (2 by 2) with a filled head at either end."""
         from matplotlib.patches import FancyArrowPatch
         from matplotlib.patheffects import withStroke
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
-from warpflat.export.raster import Samples, rasterise, shade
+from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -29,7 +29,7 @@ HALO_LAYER = 3.5  # below the outline
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Facets:
-    """How the faces of a mesh (#F by 4) are drawn.
+    """The faces of a mesh as triangles, with their outline.
 
     Attributes:
         faces: #F by 4.
@@ -46,7 +46,7 @@ class Facets:
 
 
 def facets_of(faces: IntArray) -> Facets:
-    """The facets of faces (#F by 4)."""
+    """Return the facets of faces (#F by 4)."""
     triangles, face = triangulate(faces)
     has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)
     has_face[triangles] = True
@@ -83,9 +83,9 @@ class View:
 
 
 def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """The surface from its front: along its mean normal, a little from the side and from above, Y upwards.
+    """Return a surface seen from its front: along its mean normal, a little from the side and from above, Y upwards.
 
-    A surface that faces all ways (a skirt) is seen from +Z, one that lies flat on the ground from above.
+    A surface that faces all directions (a skirt) is seen from +Z, one that lies flat on the ground from above.
     """
     vectors = area_vectors(surface.vertices, facets.triangles)
     directions = _view_directions(vectors)
@@ -94,13 +94,13 @@ def surface_view(surface: Surface, facets: Facets, lines: Mapping[str, list[IntA
 
 
 def pattern_view(positions: FloatArray, facets: Facets, lines: Mapping[str, list[IntArray]]) -> View:
-    """The pattern (#P by 2) as it lies."""
+    """Return the view of a pattern (#P by 2) in its plane."""
     points = np.column_stack([positions, np.zeros(len(positions))])
     return View(points=points, facets=facets, lines=lines, vectors=None)
 
 
 def _view_directions(vectors: FloatArray) -> FloatArray:
-    """3 by 3, rows: right, up and towards the viewer; from the area vectors (#T by 3)."""
+    """Return the directions right, up and towards the viewer (3 by 3, in rows), by the area vectors (#T by 3)."""
     total, mean = float(np.linalg.norm(vectors, axis=1).sum()), vectors.sum(axis=0)
     length = float(np.linalg.norm(mean))
     front = mean / length if length > 0.12 * total and length > 0.0 else np.array([0.0, 0.0, 1.0])
@@ -121,7 +121,7 @@ def _view_directions(vectors: FloatArray) -> FloatArray:
 
 
 class DrawnView:
-    """A view at a place on the page: knows where its points are, and what of it can be seen."""
+    """A view at a place on the page: where its points are, and which of them are visible."""
 
     def __init__(self, view: View, *, left: float, bottom: float, inches_per_metre: float, dpi: int) -> None:
         """Rasterise a view whose lower left corner comes to (`left`, `bottom`) [in]."""
@@ -140,7 +140,7 @@ class DrawnView:
         self._samples: Samples = rasterise(self._grid, view.facets.triangles, shape)
 
     def to_page(self, points: FloatArray) -> FloatArray:
-        """#N by 2 [in] of points in the view's directions (#N by 2 or 3) [m]."""
+        """Return the places on the page (#N by 2 [in]) of points in the view's directions (#N by 2 or 3) [m]."""
         return np.asarray((points[:, :2] - self._low[:2]) * self._scale + (self.left, self.bottom))
 
     @property
@@ -150,7 +150,7 @@ class DrawnView:
         return self.left, self.bottom, self.left + float(width), self.bottom + float(height)
 
     def covers(self, spots: FloatArray) -> BoolArray:
-        """#N, whether the mesh is at places on the page (#N by 2) [in]."""
+        """Return whether the mesh is at places on the page (#N, for #N by 2 [in])."""
         per_inch = self._dpi * self._per_pixel
         margin = _MARGIN * self._per_pixel
         column = np.floor((spots[:, 0] - self.left) * per_inch + margin).astype(int)
@@ -161,7 +161,7 @@ class DrawnView:
         return np.asarray(inside & hit)
 
     def draw(self, axes: Any, face_colours: FloatArray) -> None:
-        """The coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
+        """Draw the coloured faces (#F by 3, sRGB), the mesh where it is coarse, and the outline."""
         from warpflat.export.picture_pixels import Pixels
 
         left, bottom = (round(place * self._dpi) - _MARGIN for place in (self.left, self.bottom))
@@ -172,12 +172,12 @@ class DrawnView:
     def draw_segments(
         self, axes: Any, edges: IntArray, *, width: float, colour: Any = INK, halo: bool = False, zorder: float
     ) -> None:
-        """The visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
+        """Draw the visible parts of edges (#E by 2 vertex indices); with a halo they stay visible on dark colours."""
         from matplotlib.collections import PathCollection
         from matplotlib.path import Path
 
         if len(edges):
-            segments = self._visible(edges)
+            segments = self._visible_parts(edges)
             # Many to a path: a path each takes longer to set up than all of them to draw.
             parts = [segments[i : i + _SEGMENTS_TO_A_PATH] for i in range(0, len(segments), _SEGMENTS_TO_A_PATH)]
             paths = [Path(part.reshape(-1, 2), np.tile([Path.MOVETO, Path.LINETO], len(part))) for part in parts]
@@ -192,9 +192,9 @@ class DrawnView:
                 axes.add_collection(PathCollection(paths, facecolors="none", **look), autolim=False)
 
     def visible_line(self, line: IntArray) -> FloatArray:
-        """#N by 2 [in], the longest stretch of a polyline of vertices that can be seen."""
+        """Return the longest visible stretch of a polyline of vertices (#N by 2 [in])."""
         points = self.to_page(self.view.points[line])
-        seen = np.concatenate([[False], self._seen(self._grid[line]), [False]])
+        seen = np.concatenate([[False], self._is_visible(self._grid[line]), [False]])
         changes = np.flatnonzero(seen[1:] != seen[:-1])
         if len(changes) == 0:
             return points[:0]
@@ -203,6 +203,7 @@ class DrawnView:
         return points[begins[longest] : ends[longest]]
 
     def _to_samples(self, points: FloatArray) -> FloatArray:
+        """Return points [m] in samples."""
         per_metre = self._scale * self._dpi
         result = np.empty((len(points), 3))
         result[:, 0] = ((points[:, 0] - self._low[0]) * per_metre + _MARGIN) * self._per_pixel
@@ -211,7 +212,7 @@ class DrawnView:
         return result
 
     def _image(self, face_colours: FloatArray) -> NDArray[np.uint8]:
-        """#R by #C by 4, the pixels, RGBA."""
+        """Return the pixels, #R by #C by 4, RGBA."""
         facets = self.view.facets
         return shade(
             self._samples,
@@ -220,14 +221,11 @@ class DrawnView:
             facets.triangles,
             face_colours,
             face=facets.face_of_triangle,
-            normals=self._normals(),
-            blended=not self._fine,
-            light=_LIGHT,
-            back=_BACK,
+            lighting=Lighting(normals=self._normals(), at_vertices=not self._fine, direction=_LIGHT, back=_BACK),
         )
 
     def _normals(self) -> FloatArray | None:
-        """Of any length, at the vertices; of a fine mesh each triangle's own."""
+        """Return normals of any length at the vertices; of a fine mesh each triangle's own."""
         vectors, facets = self.view.vectors, self.view.facets
         if vectors is None or self._fine:
             return vectors
@@ -245,8 +243,11 @@ class DrawnView:
         edges = np.unique(np.sort(sides[sides[:, 0] != sides[:, 1]], axis=1), axis=0)
         self.draw_segments(axes, edges.astype(np.int32), width=0.35, colour=(*INK, 0.38), zorder=2)
 
-    def _visible(self, edges: IntArray) -> FloatArray:
-        """#S by 2 by 2 [in], the edges, on a surface without their hidden parts, which are found in short pieces."""
+    def _visible_parts(self, edges: IntArray) -> FloatArray:
+        """Return the visible parts of edges (#S by 2 by 2 [in]).
+
+        Hidden parts of a surface's edges are found in short pieces.
+        """
         a, b = self.view.points[edges[:, 0]], self.view.points[edges[:, 1]]
         if self.view.vectors is None:
             return np.stack([self.to_page(a), self.to_page(b)], axis=1)
@@ -256,13 +257,13 @@ class DrawnView:
         step = np.arange(len(edge)) - np.repeat(np.cumsum(count) - count, count)
         begin, end = ((step + shift) / count[edge] for shift in (0.0, 1.0))
         start, stop = (a[edge] + (b - a)[edge] * share[:, None] for share in (begin, end))
-        seen = self._seen(self._to_samples(0.5 * (start + stop)))
+        seen = self._is_visible(self._to_samples(0.5 * (start + stop)))
         goes_on = (edge[1:] == edge[:-1]) & seen[1:] & seen[:-1]
         first, last = seen & ~np.insert(goes_on, 0, False), seen & ~np.append(goes_on, False)
         return np.stack([self.to_page(start[first]), self.to_page(stop[last])], axis=1)
 
-    def _seen(self, spots: FloatArray) -> BoolArray:
-        """#N, whether points on the mesh (#N by 3, as samples) are in front, with room for the mesh's own slope."""
+    def _is_visible(self, spots: FloatArray) -> BoolArray:
+        """Return whether points on the mesh (#N by 3, in samples) are in front, within the mesh's own slope."""
         if self.view.vectors is None:
             return np.ones(len(spots), dtype=bool)
         rows, columns = self._samples.triangle.shape

@@ -1,8 +1,8 @@
-"""Triangles to pixels with hidden surfaces behind: a scan converter and a shader, as kernels on the CPU.
+"""Triangles to pixels with hidden surfaces removed: a scan converter and a shader, as kernels on the CPU.
 
-Drawing libraries draw polygons one by one, which takes tens of seconds for a million faces. Here a kernel runs over the
-triangles and keeps what is in front at each sample; another runs over the pixels, looks up colours and light once for
-each, or for each sample where several triangles meet.
+Drawing libraries draw polygons one by one, which takes tens of seconds for a million faces. Here one kernel runs over
+the triangles and keeps the nearest at each sample. Another runs over the pixels and looks up colours and light, once
+for each, or for each sample where several triangles meet.
 """
 
 from __future__ import annotations
@@ -18,18 +18,18 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.kernels.raster import put_nearest, shade_pixels
 
-__all__ = ["Samples", "rasterise", "shade"]
+__all__ = ["Lighting", "Samples", "rasterise", "shade"]
 
 _DEPTHS = 2**31 - 1  # steps of depth: what is left of 64 bits beside the sign and the triangle
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Samples:
-    """What is in front at each sample of an image, row 0 at the top.
+    """The nearest triangle at each sample of an image, row 0 at the top.
 
     Attributes:
         front: #R by #C, depth in steps (greater is nearer) times 2^32 plus the index of the triangle; -1 for none. The
-            greatest of those at a sample is the nearest, and of equally near ones the last.
+            greatest value at a sample is that of the nearest triangle, and of the last among equally near ones.
         back: the depth of step 0.
         step: the depth of a step.
     """
@@ -40,17 +40,17 @@ class Samples:
 
     @cached_property
     def triangle(self) -> IntArray:
-        """#R by #C, index of the triangle, -1 where there is none."""
+        """Index of the triangle (#R by #C), -1 where there is none."""
         return self.front.astype(np.int32)
 
     def depth_at(self, row: NDArray[Any], column: NDArray[Any]) -> FloatArray:
-        """The depth at samples (of any shape) to within a step, -inf where there is no triangle."""
+        """Return the depth at samples (of any shape) to within a step, -inf where there is no triangle."""
         front = self.front[row, column]
         return np.where(front >= 0, self.back + self.step * (front >> 32), -np.inf)
 
 
 def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -> Samples:
-    """The nearest triangle at the centre of each sample.
+    """Find the nearest triangle at the centre of each sample.
 
     Args:
         points: #V by 3: column, row (from the top; a sample's centre lies at a half) and depth, greater is nearer.
@@ -66,6 +66,24 @@ def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -
     return Samples(front=front, back=back, step=step)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Lighting:
+    """How faces are lit.
+
+    Attributes:
+        normals: of any length, towards the viewer where the face's front is seen; None for no light.
+        at_vertices: whether the normals are those of vertices (#V by 3), to be blended over triangles, or those of
+            triangles (#T by 3).
+        direction: where light comes from: right, up, towards the viewer; of any length.
+        back: colour of the faces' reverse, which shows little of the energy, since that belongs to the front.
+    """
+
+    normals: FloatArray | None = None
+    at_vertices: bool = True
+    direction: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    back: tuple[float, float, float] = (1.0, 1.0, 1.0)
+
+
 def shade(
     samples: Samples,
     per_pixel: int,
@@ -74,29 +92,25 @@ def shade(
     colours: FloatArray,
     *,
     face: IntArray,
-    normals: FloatArray | None = None,
-    blended: bool = True,
-    light: tuple[float, float, float] = (0.0, 0.0, 1.0),
-    back: tuple[float, float, float] = (1.0, 1.0, 1.0),
+    lighting: Lighting | None = None,
 ) -> NDArray[np.uint8]:
-    """RGBA pixels (#R by #C by 4) from `per_pixel` squared samples each: their mean colour, the covered share as opacity.
+    """Return RGBA pixels (#R by #C by 4): the mean colour of their samples, and the covered share as opacity.
 
     A pixel whose samples all show the same triangle is shaded once, in its middle; others sample by sample.
 
     Args:
         samples: rows and columns are multiples of `per_pixel`.
+        per_pixel: samples of a pixel along either side.
         points, triangles: as they were rasterised.
         colours: #F by 3, sRGB.
         face: #T, the face of each triangle.
-        normals: for light, of any length, towards the viewer where the face's front is seen; none for no light.
-        blended: whether they are at the vertices (#V by 3), to be blended over triangles, or those of triangles (#T by 3).
-        light: where it comes from: right, up, towards the viewer; of any length.
-        back: colour of the faces' reverse, which shows little of the energy: that belongs to the front.
+        lighting: None for no light.
     """
+    lighting = lighting or Lighting()
     rows, columns = (size // per_pixel for size in samples.front.shape)
     pixels = np.zeros((rows, columns, 4), dtype=np.uint8)
-    directions = np.zeros((1, 3)) if normals is None else normals
-    sun = np.asarray(light) / np.linalg.norm(light)
+    normals = np.zeros((1, 3)) if lighting.normals is None else lighting.normals
+    direction = np.asarray(lighting.direction) / np.linalg.norm(lighting.direction)
     inputs = [
         _shared(samples.triangle, wp.int32),
         per_pixel,
@@ -104,16 +118,16 @@ def shade(
         _shared(triangles, wp.vec3i),
         _shared(face, wp.int32),
         _shared(colours.astype(np.float32), wp.vec3f),
-        _shared(directions.astype(np.float32), wp.vec3f),
-        normals is not None,
-        blended,
-        wp.vec3f(*sun),
-        wp.vec3f(*back),
+        _shared(normals.astype(np.float32), wp.vec3f),
+        lighting.normals is not None,
+        lighting.at_vertices,
+        wp.vec3f(*direction),
+        wp.vec3f(*lighting.back),
     ]
     wp.launch(shade_pixels, dim=(rows, columns), inputs=inputs, outputs=[_shared(pixels, wp.vec4ub)], device="cpu")
     return pixels
 
 
 def _shared(array: NDArray[Any], dtype: Any) -> Any:
-    """A Warp array over NumPy's memory."""
+    """Return a Warp array over NumPy's memory."""
     return wp.array(np.ascontiguousarray(array), dtype=dtype, device="cpu", copy=False)

@@ -42,7 +42,7 @@ __all__ = ["pattern_from_json", "read_pattern_json"]
 
 
 def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
-    """The pattern of a file that :func:`warpflat.export.pattern_json.write_pattern_json` wrote.
+    """Read the pattern of a file that :func:`warpflat.export.pattern_json.write_pattern_json` wrote.
 
     Raises:
         InputError: the file is missing, no JSON, of another schema, or does not hold together.
@@ -65,7 +65,7 @@ def read_pattern_json(path: str | os.PathLike[str]) -> DraftedGarment:
 
 
 def pattern_from_json(data: Any) -> DraftedGarment:
-    """The pattern of what :func:`warpflat.export.pattern_json.pattern_json` gave.
+    """Return the pattern of the data that :func:`warpflat.export.pattern_json.pattern_json` gave.
 
     Raises:
         InputError: another schema, a missing key, a value of the wrong kind, or lines that are no pattern.
@@ -121,9 +121,10 @@ def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
     internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}
     grain = np.array(data.grain)
     holes = [
-        Hole(name=key, points=_back(cutout.sew_line, frame), allowance=cutout.width) for key, cutout in cutouts.items()
+        Hole(name=key, points=_to_mesh(cutout.sew_line, frame), allowance=cutout.width)
+        for key, cutout in cutouts.items()
     ]
-    holes += [Hole(name=key, points=_back(line, frame), kind="dart") for key, line in fisheyes.items()]
+    holes += [Hole(name=key, points=_to_mesh(line, frame), kind="dart") for key, line in fisheyes.items()]
     piece = Piece(
         name=name,
         size=size,
@@ -132,8 +133,8 @@ def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         paired=data.paired,
         edges=[_edge(edge, frame) for edge in data.edges],
         darts=darts,
-        internal_lines={key: _back(line, frame) for key, line in internal_lines.items()},
-        grain=_back(grain, frame),
+        internal_lines={key: _to_mesh(line, frame) for key, line in internal_lines.items()},
+        grain=_to_mesh(grain, frame),
         holes=holes,
     )
     return DraftedPiece(
@@ -174,7 +175,7 @@ def _cutout(data: PieceEntry, name: str) -> DraftedCutout:
 def _edge(data: EdgeEntry, frame: FloatArray) -> Edge:
     return Edge(
         name=data.name,
-        points=_back(np.array(data.line), frame),
+        points=_to_mesh(np.array(data.line), frame),
         kind=data.kind,
         allowance=None if data.kind == "fold" else data.allowance,
         vertices=None if data.mesh_vertices is None else np.array(data.mesh_vertices, dtype=np.int32),
@@ -210,7 +211,7 @@ def _notch(data: NotchEntry) -> Notch:
     )
 
 
-def _back(points: FloatArray, frame: FloatArray) -> FloatArray:
-    """From the drafted piece's coordinates to those of the flat mesh."""
+def _to_mesh(points: FloatArray, frame: FloatArray) -> FloatArray:
+    """Map points from the drafted piece's coordinates to those of the flat mesh."""
     turn = frame[:, :2]
     return (points - frame[:, 2]) @ turn

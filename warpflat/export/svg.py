@@ -38,7 +38,7 @@ STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
     "cutout": ("#000000", 0.5, ()),
     "leader": ("#7a7a7a", 0.2, ()),
 }
-#: What has the colour of its size in a nest.
+#: Roles whose strokes have the colour of their size in a nest.
 OF_SIZE = ("cut", "dart", "notch")
 
 
@@ -101,6 +101,7 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
 
 
 def _chosen(garment: DraftedGarment, sizes: Sequence[str] | None) -> tuple[str, ...]:
+    """Return the sizes to draw, in their order."""
     if sizes is None:
         return tuple(garment.pieces)
     for size in sizes:
@@ -115,7 +116,7 @@ class SvgPage:
     SIZES = ("#000000", "#0060a8", "#b8460b", "#5b2a86", "#00766c", "#8a6d00", "#9b1b5a", "#555555")
 
     def __init__(self, width: float, height: float, title: str) -> None:
-        """`width`, `height` in metres."""
+        """Open a page of `width` by `height` metres."""
         self.height = height * 1000
         w, h = _number(width * 1000), _number(self.height)
         self.root = ET.Element(
@@ -222,9 +223,11 @@ class SvgPage:
             ET.ElementTree(self.root).write(temporary, encoding="utf-8", xml_declaration=True)
 
     def _page(self, points: FloatArray) -> FloatArray:
+        """Return points [m] in the millimetres of the page, y downwards."""
         return np.column_stack([points[:, 0] * 1000, self.height - points[:, 1] * 1000])
 
     def _bezier(self, curve: Curve) -> str:
+        """Return a curve as path data."""
         control = self._page(curve.bezier.reshape(-1, 2)).reshape(-1, 4, 2)
         text = ["M" + _pair(control[0, 0])]
         for segment, straight in zip(control, curve.straight, strict=True):
@@ -235,7 +238,7 @@ class SvgPage:
         return " ".join(text)
 
     def _id(self, name: str) -> str:
-        """A valid id that no other element has."""
+        """Return a valid id that no other element has."""
         clean = re.sub(r"[^\w.\-]", "_", name)
         clean = clean if re.match(r"[^\W\d]", clean) else f"_{clean}"
         unique, count = clean, 1
@@ -247,14 +250,15 @@ class SvgPage:
 
 
 def _for_xml(text: str) -> str:
-    """The text with U+FFFD for the control characters that no XML can hold, not even escaped."""
+    """Replace the control characters that no XML can hold, not even escaped, by U+FFFD."""
     return "".join("\ufffd" if control_in(letter, "\t\n") else letter for letter in text)
 
 
 def _number(value: float) -> str:
-    """Millimetres to a tenth of a micrometre."""
+    """Return millimetres to a tenth of a micrometre."""
     return f"{value:.4f}".rstrip("0").rstrip(".") if abs(value) > 5e-5 else "0"
 
 
 def _pair(point: FloatArray) -> str:
+    """Return a point as path data."""
     return f"{_number(point[0])},{_number(point[1])}"

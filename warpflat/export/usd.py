@@ -1,9 +1,9 @@
 """`frames.usdc`: every piece in space and in the plane, over the time of the relaxation.
 
 The writer streams: frames go to a hidden file that is saved every few frames, so that memory does not grow with their
-number. Two things can only be known at the end and are authored then, in a second pass over that file: the places of
-the patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale
-comes from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
+number. Two things are known only at the end, and are authored in a second pass over that file: the places of the
+patterns beside the surfaces, which depend on how far each pattern ever reached, and the colours, whose one scale comes
+from the last frame. Then the file is exported once, which compacts it, and renamed to its final name.
 """
 
 from __future__ import annotations
@@ -11,7 +11,6 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping
 from contextlib import ExitStack
-from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
 from typing import Any
@@ -20,11 +19,13 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from warpflat._version import __version__
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import hidden_file, require_writable
 from warpflat.core.errors import InputError
 from warpflat.export.colours import energy_colours, energy_scale, linear_rgb
-from warpflat.export.geometry import Polylines, area_vectors, corner_average, face_areas, polylines_of, vertex_normals
+from warpflat.export.geometry import area_vectors, face_areas, polylines_of, vertex_normals
+from warpflat.export.usd_colours import FrameColours
+from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame, density_attribute
 from warpflat.export.usd_prims import (
     MeshSamples,
     SampledLines,
@@ -40,32 +41,9 @@ from warpflat.surface.triangles import triangulate
 
 __all__ = ["FrameWriter"]
 
-_FIRST_FRAME = 1
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
 _COLOUR_STEPS = 1024
-
-
-@dataclass(kw_only=True)
-class _Piece:
-    """What the writer remembers of a piece: a few arrays of its size, whatever the number of frames."""
-
-    surface: Surface
-    path: str
-    areas: FloatArray
-    on_surface: MeshSamples
-    on_pattern: MeshSamples
-    surface_cuts: SampledLines
-    pattern_lines: SampledLines
-    pattern_cuts: SampledLines
-    faces: IntArray
-    to_surface: IntArray
-    lines: dict[str, Polylines]
-    cuts: dict[str, Polylines] = field(default_factory=dict)
-    frames: int = 0
-    last_density: NDArray[np.float32] | None = None
-    low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
-    high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
 
 
 class FrameWriter:
@@ -104,8 +82,8 @@ class FrameWriter:
         self._rate = float(frames_per_second)
         self._save_every = int(save_every)
         self._scale = scale
-        self._pieces: dict[str, _Piece] = {}
-        self._taken: set[str] = set()
+        self._pieces: dict[str, FramePiece] = {}
+        self._used_names: set[str] = set()
         self._unsaved = 0
         self._stage: Any = None
         self._hidden = ExitStack()
@@ -133,22 +111,22 @@ class FrameWriter:
         return self
 
     def _begin(self, stage: Any) -> None:
-        """Author what holds for the whole file."""
+        """Author the settings of the whole file."""
         from pxr import Kind, UsdGeom
 
         UsdGeom.SetStageMetersPerUnit(stage, 1.0)
         UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
         stage.SetTimeCodesPerSecond(self._rate)
         stage.SetFramesPerSecond(self._rate)
-        stage.SetStartTimeCode(_FIRST_FRAME)
-        stage.SetEndTimeCode(_FIRST_FRAME)
+        stage.SetStartTimeCode(FIRST_FRAME)
+        stage.SetEndTimeCode(FIRST_FRAME)
         stage.GetRootLayer().documentation = f"Flat patterns while they relax, by warpflat {__version__}"
         stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        """Colour, place and export when the block ended well; the working file goes in any case."""
+        """Colour, place and export if the block ended well; the working file is removed in any case."""
         with self._hidden:
             if kind is None:
                 with usd_errors(self._final):
@@ -173,14 +151,14 @@ class FrameWriter:
 
         if name in self._pieces:
             raise ValueError(f"piece {name!r} is already in the file")
-        path = f"/World/{valid_name(name, self._taken)}"
+        path = f"/World/{valid_name(name, self._used_names)}"
         define_group(self._stage, path, label=name, kind=Kind.Tokens.component)
         points = np.asarray(surface.vertices, dtype=np.float32)
         size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0))) if len(points) else 0.0
         width = float(np.clip(0.004 * size, 1e-5, 2e-3))
 
         def group(below: str, colour: tuple[float, float, float]) -> SampledLines:
-            return SampledLines(self._stage, f"{path}/{below}", start=_FIRST_FRAME, width=width, colour=colour)
+            return SampledLines(self._stage, f"{path}/{below}", start=FIRST_FRAME, width=width, colour=colour)
 
         default = Usd.TimeCode.Default()
         triangles, _ = triangulate(surface.faces)
@@ -192,7 +170,8 @@ class FrameWriter:
         on_pattern = MeshSamples(define_mesh(self._stage, f"{path}/pattern", upright, per_face=True))
         lines = polylines_of(surface.lines)
         group("surface_lines", _LINE_COLOUR).write(default, lines, points, changed=True)
-        self._pieces[name] = _Piece(
+        self._pieces[name] = FramePiece(
+            name=name,
             surface=surface,
             path=path,
             areas=face_areas(surface.vertices, surface.faces),
@@ -227,40 +206,29 @@ class FrameWriter:
                 their order, in the pattern's numbering.
             lines: feature lines in the pattern's numbering, where they change; each a vertex-index array or a list of
                 them. At first those of the surface.
-            cuts: cut lines, likewise (say, both sides of a crack). At first none.
+            cuts: cut lines in the same form (say, both sides of a crack). At first none.
             measures: numbers of this frame, kept in double precision as ``/World/NAME.warpflat:KEY``.
 
         Raises:
             ValueError: the arrays do not fit together, or hold NaN.
             InputError: the disk is full or the folder is gone.
         """
-        from pxr import Usd, Vt
+        from pxr import Usd
 
         piece = self._pieces[name]
         flat = np.asarray(positions, dtype=np.float64)
         density = np.asarray(face_energy_density, dtype=np.float32)
-        number = _FIRST_FRAME + piece.frames
-        new_faces = self._new_topology(piece, faces, flat, density, number)
-        new_lines = piece.frames == 0 or new_faces is not None or lines is not None or cuts is not None
-        piece.lines = piece.lines if lines is None else polylines_of(lines)
-        piece.cuts = piece.cuts if cuts is None else polylines_of(cuts)
-        for line, parts in (*piece.lines.items(), *piece.cuts.items()):
-            if any(part.max() >= len(flat) or part.min() < 0 for part in parts):
-                raise ValueError(f"line {line!r} of piece {name!r} refers to vertices beyond the {len(flat)} positions")
+        number = FIRST_FRAME + piece.frames
+        what = f"frame {number} of piece {piece.surface.name!r}"
+        check_frame(what, flat, density, len(piece.surface.faces))
+        new_faces = piece.change_faces(faces, len(flat), what) or piece.frames == 0
+        if len(flat) != len(piece.to_surface):
+            raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
+        new_lines = new_faces or lines is not None or cuts is not None
+        piece.change_lines(lines, cuts, len(flat))
 
         time = Usd.TimeCode(number)
-        points = np.zeros((len(flat), 3), dtype=np.float32)
-        points[:, :2] = flat
-        piece.on_pattern.write(time, points, new_faces)
-        energy = Vt.FloatArray.FromNumpy(density)
-        for samples in (piece.on_surface, piece.on_pattern):
-            _density(samples).Set(energy, time)
-        piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
-        piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
-        if new_lines:
-            in_space = {key: _on_surface(parts, piece.to_surface) for key, parts in piece.cuts.items()}
-            space = np.asarray(piece.surface.vertices, dtype=np.float32)
-            piece.surface_cuts.write(time, in_space, space, changed=True)
+        self._sample(piece, flat, density, time, new_faces=new_faces, new_lines=new_lines)
         self._measure(piece, measures or {}, time)
 
         piece.frames += 1
@@ -268,42 +236,36 @@ class FrameWriter:
         low, high = extent_of(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
-        self._saved_now_and_then()
+        self._save_every_few_frames()
         return number
 
-    def _new_topology(
+    def _sample(
         self,
-        piece: _Piece,
-        faces: ArrayLike | None,
+        piece: FramePiece,
         flat: FloatArray,
         density: NDArray[np.float32],
-        number: int,
-    ) -> IntArray | None:
-        """The faces to write with this frame, or None where they stay; checks that all arrays fit together."""
-        what = f"frame {number} of piece {piece.surface.name!r}"
-        own = piece.surface.faces
-        if flat.ndim != 2 or flat.shape[1] != 2 or len(flat) == 0:
-            raise ValueError(f"{what}: positions must be #P by 2, not {flat.shape}")
-        if density.shape != (len(own),):
-            raise ValueError(f"{what}: {density.shape} energy densities for {len(own)} faces")
-        if not (np.isfinite(flat).all() and np.isfinite(density).all()):
-            raise ValueError(f"{what}: positions or energy densities are not finite")
-        new = piece.faces if faces is None else np.ascontiguousarray(faces, dtype=np.int32)
-        changed = new is not piece.faces and not np.array_equal(new, piece.faces)
-        if changed:
-            used = own >= 0
-            if new.shape != own.shape or not np.array_equal(new >= 0, used) or new.max() >= len(flat):
-                raise ValueError(f"{what}: the faces are not those of the surface in the pattern's numbering")
-            to_surface = np.zeros(len(flat), dtype=np.int32)
-            to_surface[new[used]] = own[used]
-            if not np.array_equal(to_surface[new[used]], own[used]):
-                raise ValueError(f"{what}: a pattern vertex stands for two vertices of the surface")
-            piece.faces, piece.to_surface = new, to_surface
-        if len(flat) != len(piece.to_surface):
-            raise ValueError(f"{what}: {len(flat)} positions for {len(piece.to_surface)} pattern vertices")
-        return piece.faces if changed or piece.frames == 0 else None
+        time: Any,
+        *,
+        new_faces: bool,
+        new_lines: bool,
+    ) -> None:
+        """Author a frame's points, energies and lines."""
+        from pxr import Vt
 
-    def _measure(self, piece: _Piece, measures: Mapping[str, float], time: Any) -> None:
+        points = np.zeros((len(flat), 3), dtype=np.float32)
+        points[:, :2] = flat
+        piece.on_pattern.write(time, points, piece.faces if new_faces else None)
+        energy = Vt.FloatArray.FromNumpy(density)
+        for samples in (piece.on_surface, piece.on_pattern):
+            density_attribute(samples).Set(energy, time)
+        piece.pattern_lines.write(time, piece.lines, points, changed=new_lines)
+        piece.pattern_cuts.write(time, piece.cuts, points, changed=new_lines)
+        if new_lines:
+            space = np.asarray(piece.surface.vertices, dtype=np.float32)
+            piece.surface_cuts.write(time, piece.cuts_on_surface(), space, changed=True)
+
+    def _measure(self, piece: FramePiece, measures: Mapping[str, float], time: Any) -> None:
+        """Author a frame's measures."""
         from pxr import Sdf
 
         prim = self._stage.GetPrimAtPath(piece.path)
@@ -311,18 +273,20 @@ class FrameWriter:
             attribute = prim.CreateAttribute(f"warpflat:{key}", Sdf.ValueTypeNames.Double, custom=True)
             attribute.Set(float(value), time)
 
-    def _saved_now_and_then(self) -> None:
+    def _save_every_few_frames(self) -> None:
+        """Count a frame, and save the working file if it is time."""
         self._unsaved += 1
         if self._unsaved >= self._save_every:
             with usd_errors(self._final):
                 self._save()
 
     def _save(self) -> None:
+        """Save the working file."""
         self._stage.Save()
         self._unsaved = 0
 
     def _place(self) -> None:
-        """Set the patterns in a row to the right of all surfaces, by the room each took over the whole time."""
+        """Place the patterns in a row to the right of all surfaces, by the room that each took over the whole time."""
         from pxr import Gf, UsdGeom
 
         shown = [piece for piece in self._pieces.values() if piece.frames]
@@ -344,7 +308,7 @@ class FrameWriter:
             right += float(piece.high[0] - piece.low[0]) + gap
 
     def _colour(self) -> None:
-        """Turn the energies of all frames into colours on one scale."""
+        """Author the colours of all frames, from their energies, on one scale."""
         shown = [piece for piece in self._pieces.values() if piece.last_density is not None]
         if not shown:
             return
@@ -359,77 +323,15 @@ class FrameWriter:
                 attribute.SetCustomData(
                     {"quantity": "strainEnergyDensity", "unit": "J/m2", "rangeMin": 0.0, "rangeMax": float(scale)}
                 )
-        brushes = [_Brush(piece) for piece in shown]
-        for number in range(_FIRST_FRAME, _FIRST_FRAME + max(piece.frames for piece in shown)):
-            for brush in brushes:
-                brush.colour(number, scale, table)
-            self._saved_now_and_then()
+        painters = [FrameColours(piece) for piece in shown]
+        for number in range(FIRST_FRAME, FIRST_FRAME + max(piece.frames for piece in shown)):
+            for painter in painters:
+                painter.colour(number, scale, table)
+            self._save_every_few_frames()
 
     def _author_defaults(self) -> None:
-        """Give every sampled attribute its last value as default."""
+        """Author the last value of every sampled attribute as its default."""
         for prim in self._stage.Traverse():
             for attribute in prim.GetAuthoredAttributes():
                 if attribute.GetNumTimeSamples():
                     attribute.Set(attribute.Get(self._stage.GetEndTimeCode()))
-
-
-class _Brush:
-    """Colours a piece frame by frame; reads its topology only where that changes."""
-
-    def __init__(self, piece: _Piece) -> None:
-        self._piece = piece
-        own = piece.surface.faces
-        self._face = np.nonzero(own >= 0)[0].astype(np.int32)
-        self._surface = (own[own >= 0], len(piece.surface.vertices))
-        self._pattern = self._surface
-        pattern = piece.on_pattern.mesh
-        self._indices, self._points = pattern.GetFaceVertexIndicesAttr(), pattern.GetPointsAttr()
-        self._changes = set(self._indices.GetTimeSamples())
-        self._density = _density(piece.on_pattern)
-        self._on_surface, self._on_pattern = (
-            samples.mesh.GetDisplayColorPrimvar().GetAttr() for samples in (piece.on_surface, piece.on_pattern)
-        )
-
-    def colour(self, number: int, scale: float, table: NDArray[np.float32]) -> None:
-        """Author the colours of a frame, if the piece has it: energies [J/m2] up to `scale` as the rows of `table`."""
-        if number >= _FIRST_FRAME + self._piece.frames:
-            return
-        if number in self._changes:
-            # Copies: what USD hands out may lie in the file, which grows.
-            vertex, size = np.array(self._indices.Get(number)), len(self._points.Get(number))
-            same = size == self._surface[1] and np.array_equal(vertex, self._surface[0])
-            self._pattern = self._surface if same else (vertex, size)
-        density = np.asarray(self._density.Get(number), dtype=np.float64)
-        colours = self._mixed(density, *self._surface, scale, table)
-        self._on_surface.Set(colours, number)
-        if self._pattern is not self._surface:
-            colours = self._mixed(density, *self._pattern, scale, table)
-        self._on_pattern.Set(colours, number)
-
-    def _mixed(
-        self,
-        density: FloatArray,
-        vertex: IntArray,
-        size: int,
-        scale: float,
-        table: NDArray[np.float32],
-    ) -> Any:
-        """The colours of the vertices, of which there are `size`; `vertex` is that of each corner."""
-        from pxr import Vt
-
-        share = corner_average(density, self._piece.areas, self._face, vertex, size) / scale
-        step = np.clip(share * (len(table) - 1) + 0.5, 0, len(table) - 1).astype(np.int32)
-        return Vt.Vec3fArray.FromNumpy(table[step])
-
-
-def _density(samples: MeshSamples) -> Any:
-    from pxr import UsdGeom
-
-    return UsdGeom.PrimvarsAPI(samples.mesh).GetPrimvar("strainEnergyDensity").GetAttr()
-
-
-def _on_surface(parts: Polylines, to_surface: IntArray) -> Polylines:
-    """The lines in the surface's numbering, where both sides of a crack are the same line."""
-    return [
-        np.array(line, dtype=np.int32) for line in dict.fromkeys(tuple(to_surface[part].tolist()) for part in parts)
-    ]

@@ -1,9 +1,9 @@
-"""Meshes and lines in a USD stage, sampled over time so that fractional frames are right across a topology change.
+"""Meshes and lines in a USD stage, sampled over time so that fractional frames are right across a change of topology.
 
 USD interpolates two samples of a point array linearly where they are equally long, and holds the earlier one where they
-are not; indices are always held. After a topology change of equal length, the old faces would be drawn through points
-half-way to the new ones. So the first sample of a new topology always has another length than the one before: where
-the lengths would agree, the last point is stored twice. No face uses the second copy.
+are not; indices are always held. After a change of topology of equal length, the old faces would be drawn through
+points half-way to the new ones. Therefore the first sample of a new topology always has another length than the one
+before: where the lengths would agree, the last point is stored twice. No face uses the second copy.
 """
 
 from __future__ import annotations
@@ -37,22 +37,26 @@ _CONSTANT = "constant"
 
 @contextmanager
 def usd_errors(path: str | os.PathLike[str]) -> Iterator[None]:
-    """Tell in one line, as that a file cannot be written, what USD raises in the body, which names places in its own source.
+    """Turn USD's exceptions into one line that says that a file cannot be written.
+
+    Their own text names places in USD's source.
 
     Raises:
-        InputError: instead of USD's.
+        InputError: instead of USD's exception.
     """
     from pxr import Tf
 
     try:
         yield
     except Tf.ErrorException as error:
-        told = next((" ".join(one.commentary.split())[:200] for one in error.args), "USD failed")
-        raise InputError(f"cannot write {path}: {told} (folder still there? disk full?)") from error
+        message = next((" ".join(one.commentary.split())[:200] for one in error.args), "USD failed")
+        raise InputError(f"cannot write {path}: {message} (folder still there? disk full?)") from error
 
 
 def export_stage(stage: Any, path: str | os.PathLike[str]) -> None:
-    """Write a stage's root layer, whole or not at all; what has been written is opened once, since USD may fail without a word.
+    """Write a stage's root layer, whole or not at all.
+
+    The written file is opened once, since USD may fail without an error.
 
     Raises:
         InputError: the file cannot be written.
@@ -66,7 +70,7 @@ def export_stage(stage: Any, path: str | os.PathLike[str]) -> None:
 
 
 def valid_name(name: str, taken: set[str]) -> str:
-    """`name` as a USD identifier that is not in `taken`, to which it is added."""
+    """Return `name` as a USD identifier that is not in `taken`, to which it is added."""
     from pxr import Tf
 
     base = Tf.MakeValidIdentifier(name)
@@ -78,7 +82,7 @@ def valid_name(name: str, taken: set[str]) -> str:
 
 
 def define_group(stage: Any, path: str, *, label: str | None = None, kind: str | None = None) -> Any:
-    """An Xform prim, with its label as display name where that is not its identifier."""
+    """Define an Xform prim, with its label as display name where that differs from its identifier."""
     from pxr import Usd, UsdGeom
 
     prim = UsdGeom.Xform.Define(stage, path).GetPrim()
@@ -89,11 +93,12 @@ def define_group(stage: Any, path: str, *, label: str | None = None, kind: str |
 
 
 def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -> Any:
-    """A polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
+    """Define a polygon mesh (no subdivision), seen from both sides, with energy density per face and colour per vertex.
 
     Args:
         stage, path: where.
         normals: for the whole time; #F by 3 if `per_face`, else #V by 3.
+        per_face: whose normals they are.
     """
     from pxr import Sdf, UsdGeom, Vt
 
@@ -112,14 +117,14 @@ def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -
 
 
 def extent_of(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
-    """2 by #D, the corners of the box around `points` (#P by #D) [m]."""
+    """Return the corners (2 by #D) of the box around `points` (#P by #D) [m]."""
     # By columns: NumPy takes ten times as long for all of them at once.
     corners = np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
     return np.asarray(corners + np.array([[-margin], [margin]], dtype=corners.dtype))
 
 
 class MeshSamples:
-    """The samples of one mesh: points every frame, topology only where it changes."""
+    """Samples of one mesh: points every frame, topology only where it changes."""
 
     def __init__(self, mesh: Any) -> None:
         self.mesh = mesh
@@ -154,7 +159,7 @@ class SampledLines:
         self._start = start
         self._width = width
         self._colour = colour
-        self._taken: set[str] = set()
+        self._used_names: set[str] = set()
         self._members: dict[str, _Line] = {}
 
     def write(self, time: Any, lines: Mapping[str, Polylines], points: NDArray[np.float32], *, changed: bool) -> None:
@@ -163,7 +168,7 @@ class SampledLines:
             self.prim = define_group(self.stage, self.path)
         for name, parts in lines.items():
             if name not in self._members:
-                path = f"{self.path}/{valid_name(name, self._taken)}"
+                path = f"{self.path}/{valid_name(name, self._used_names)}"
                 self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
             self._members[name].write(time, parts, points, changed=changed, start=self._start)
         if changed:
@@ -173,6 +178,8 @@ class SampledLines:
 
 
 class _Line:
+    """One named polyline."""
+
     def __init__(self, stage: Any, path: str, name: str, width: float, colour: Sequence[float]) -> None:
         from pxr import Gf, UsdGeom, Vt
 
@@ -190,10 +197,11 @@ class _Line:
         self._shown = False
 
     def write(self, time: Any, parts: Polylines, points: NDArray[np.float32], *, changed: bool, start: float) -> None:
+        """Write the line's points at a time, and show it."""
         from pxr import UsdGeom, Vt
 
         if not self._shown and not time.IsDefault() and time.GetValue() > start:
-            self._see(UsdGeom.Tokens.inherited, time, start)
+            self._set_visibility(UsdGeom.Tokens.inherited, time, start)
         length = sum(len(part) for part in parts)
         if changed or not self._shown:
             self._padding = 1 if length == self._stored else 0
@@ -207,13 +215,14 @@ class _Line:
         self._stored, self._shown = length + self._padding, True
 
     def hide(self, time: Any, *, start: float) -> None:
+        """Hide the line from a time on."""
         from pxr import UsdGeom
 
         if self._shown:
-            self._see(UsdGeom.Tokens.invisible, time, start)
+            self._set_visibility(UsdGeom.Tokens.invisible, time, start)
             self._shown = False
 
-    def _see(self, visibility: str, time: Any, start: float) -> None:
+    def _set_visibility(self, visibility: str, time: Any, start: float) -> None:
         from pxr import UsdGeom
 
         attribute = self._curves.CreateVisibilityAttr()
@@ -225,5 +234,6 @@ class _Line:
 
 
 def _label(prim: Any, label: str | None) -> None:
+    """Set the display name of a prim where it differs from its identifier."""
     if label and label != prim.GetName():
         prim.SetDisplayName(label)

@@ -1,4 +1,4 @@
-"""What a pattern maker may ask of a border or a line: straight, of a fixed length, the mirror image of the other side."""
+"""Constraints on a border or a line: straight, of a fixed length, the mirror image of the other side."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ class Straight:
 
     @property
     def name(self) -> str:
-        """For reports."""
+        """Name for reports."""
         return f"{self.piece}.{self.line} straight" + ("" if self.along == "free" else f" along {self.along}")
 
 
@@ -55,8 +55,8 @@ class FixedLength:
 
     Attributes:
         piece, line: names.
-        length: of the whole line [m], each edge having its share of it; None keeps the lengths on the body. A line of a half piece that
-            ends on the fold is whole with its mirror image: the half gets half of it.
+        length: of the whole line [m], shared by its mesh edges in proportion; None keeps the lengths on the body. On a
+            half piece a line that ends on the fold counts with its mirror image: the half gets half of the length.
     """
 
     piece: str
@@ -66,7 +66,7 @@ class FixedLength:
 
     @property
     def name(self) -> str:
-        """For reports."""
+        """Name for reports."""
         return f"{self.piece}.{self.line} length" + ("" if self.length is None else f" {1e3 * self.length:g} mm")
 
 
@@ -78,7 +78,7 @@ class Symmetric:
 
     Attributes:
         piece: name.
-        line: the axis, from border to border, faces that lie alike on both sides.
+        line: the axis, from border to border, with the same faces on both sides.
     """
 
     piece: str
@@ -87,7 +87,7 @@ class Symmetric:
 
     @property
     def name(self) -> str:
-        """For reports."""
+        """Name for reports."""
         return f"{self.piece} symmetric about {self.line}"
 
 
@@ -97,21 +97,21 @@ Constraint = Straight | FixedLength | Symmetric
 def equations_of_constraint(
     constraint: Constraint, piece: Flattening, fold: IntArray | None = None
 ) -> tuple[ConstraintEquations, bool]:
-    """The constraint's ties in the piece's own numbering, and whether they say how the piece lies on the cloth.
+    """Return a constraint's equations in the piece's own numbering, and whether they orient the piece on the cloth.
 
     Args:
-        constraint, piece: what is asked of which.
+        constraint, piece: what is constrained.
         fold: the piece's vertices on its upright fold, if it has one.
 
     Raises:
-        InputError: the piece has no such line, or the line cannot be what is asked for.
+        InputError: the piece has no such line, or the line cannot be constrained in this way.
     """
     surface = piece.network.surface
     line = _line(constraint, piece)
     if isinstance(constraint, FixedLength):
         lengths = segment_lengths(surface.vertices[line])
         if constraint.length is not None:
-            there = lengths.sum() * (2.0 if _goes_on_beyond(fold, line) else 1.0)
+            there = lengths.sum() * (2.0 if _crosses_fold(fold, line) else 1.0)
             lengths = lengths * (constraint.length / there)
         return one_group(length_equations(line, lengths), smooth_equations(line, piece.positions, fold)), False
     if line[0] == line[-1]:
@@ -127,21 +127,22 @@ def equations_of_constraint(
     except InputError as error:
         raise InputError(f"{constraint.name}: {error}") from None
     vertices = np.arange(len(partner), dtype=np.int32)
-    one_of_two = partner > vertices
+    is_first = partner > vertices
     chord = piece.positions[line[-1]] - piece.positions[line[0]]
     across = np.array([chord[1], -chord[0]]) / np.linalg.norm(chord)
     axis = vertices[partner == vertices]
-    pairs = np.column_stack([vertices, partner])[one_of_two]
+    pairs = np.column_stack([vertices, partner])[is_first]
     return mirror_equations(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
 
 
-def _goes_on_beyond(fold: IntArray | None, line: IntArray) -> bool:
-    """Whether a line ends on the fold, and does not run along it."""
+def _crosses_fold(fold: IntArray | None, line: IntArray) -> bool:
+    """Return whether a line ends on the fold, and does not run along it."""
     on_fold = np.isin(line, [] if fold is None else fold)
     return bool((on_fold[0] or on_fold[-1]) and not on_fold.all())
 
 
 def _line(constraint: Constraint, piece: Flattening) -> IntArray:
+    """Return the vertices of a constraint's line."""
     lines = piece.network.surface.lines
     if constraint.line not in lines:
         raise InputError(
@@ -154,7 +155,7 @@ def _line(constraint: Constraint, piece: Flattening) -> IntArray:
 
 
 def piece_of(constraint: Constraint, pieces: Mapping[str, Flattening]) -> Flattening:
-    """The piece that a constraint is about.
+    """Return the piece that a constraint is about.
 
     Raises:
         InputError: there is none of that name.

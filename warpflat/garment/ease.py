@@ -1,4 +1,4 @@
-"""What a maker wants of seams: ease, gathers. From names to the ratio of the two lengths of each of a form's seams."""
+"""Ease and gathers: from the names of seams to the ratio of the two lengths of each."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ if TYPE_CHECKING:
     from warpflat.mannequin.pieces import FormSeam
     from warpflat.pattern.pieces import Seam
 
-__all__ = ["SeamWish", "WishedSeams", "wished_seams"]
+__all__ = ["SeamRatios", "SeamWish", "seam_ratios"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class SeamWish:
-    """That one side of a seam is longer than the other.
+    """A wish for one side of a seam to be longer than the other.
 
     Attributes:
         name: the seam's, as in the pattern.
@@ -38,8 +38,8 @@ class SeamWish:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class WishedSeams:
-    """What wishes mean for a form.
+class SeamRatios:
+    """Wishes for the seams of a form, worked out.
 
     Attributes:
         ease: by seam of the pattern, how much longer its second side is, as a share of the first.
@@ -52,30 +52,25 @@ class WishedSeams:
     full: Mapping[str, tuple[FullEdge, ...]]
 
 
-def wished_seams(form: FormResult, wishes: Sequence[SeamWish]) -> WishedSeams:
-    """Look the wishes up in a form.
+def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
+    """Look up wishes in a form: the ratio of lengths of each of its seams, and the edges with fullness.
 
-    A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same ratio.
+    A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same
+    ratio.
 
     Raises:
-        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not one
-            of its sides.
+        InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not
+            one of its sides.
     """
     plan = plan_form(form)
     by_name = {seam.name: seam for seam in plan.seams}
     of_form = [_in_plan(plan, form, seam) for seam in form.seams]
+    also = {seam.name: of_form[i][0].name for i, seam in enumerate(form.seams)}
     ratios = [1.0] * len(form.seams)
     ease: dict[str, float] = {}
     full: dict[str, list[FullEdge]] = {}
     for wish in wishes:
-        also = {seam.name: of_form[i][0].name for i, seam in enumerate(form.seams)}
-        name = wish.name if wish.name in by_name else also.get(wish.name, "")
-        if not name:
-            raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
-        if name in ease:
-            raise InputError(f"seam {name!r} is named twice; give its ease or gather once")
-        if not 1.0 <= wish.factor <= 5.0:
-            raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
+        name = _seam_name(wish, by_name, also, ease)
         longer = _longer_side(by_name[name], wish.longer)
         ease[name] = wish.factor - 1.0 if longer == 1 else 1.0 / wish.factor - 1.0
         for number, (seam, first_side) in enumerate(of_form):
@@ -88,10 +83,25 @@ def wished_seams(form: FormResult, wishes: Sequence[SeamWish]) -> WishedSeams:
             here = form.seams[number]
             edge = FullEdge(vertices=here.vertices[side], factor=wish.factor, gathered=wish.gathered)
             full.setdefault(here.pieces[side], []).append(edge)
-    return WishedSeams(ease=ease, ratios=tuple(ratios), full={name: tuple(edges) for name, edges in full.items()})
+    return SeamRatios(ease=ease, ratios=tuple(ratios), full={name: tuple(edges) for name, edges in full.items()})
+
+
+def _seam_name(
+    wish: SeamWish, by_name: Mapping[str, Seam], form_names: Mapping[str, str], done: Mapping[str, float]
+) -> str:
+    """Return the pattern's name of the seam that a wish is about; the form's names are accepted too."""
+    name = wish.name if wish.name in by_name else form_names.get(wish.name, "")
+    if not name:
+        raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
+    if name in done:
+        raise InputError(f"seam {name!r} is named twice; give its ease or gather once")
+    if not 1.0 <= wish.factor <= 5.0:
+        raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
+    return name
 
 
 def _longer_side(seam: Seam, longer: str | None) -> int:
+    """Return which side of a seam (0 or 1) is longer; the second if nothing else is said."""
     if longer is None:
         return 1
     named = [{part for side in sides for part in (side.piece, str(side))} for sides in seam.sides]
@@ -107,7 +117,7 @@ def _longer_side(seam: Seam, longer: str | None) -> int:
 
 
 def _in_plan(plan: FormPlan, form: FormResult, seam: FormSeam) -> tuple[Seam, int]:
-    """The pattern's seam that a form's seam belongs to, and the side (0 or 1) there of its first side."""
+    """Return the pattern's seam of a form's seam, and which of its sides (0 or 1) is the form's first side."""
     parts = [_edge(plan, form, *side) for side in zip(seam.pieces, seam.edges, seam.vertices, strict=True)]
     for found in plan.seams:
         sides = [{str(side) for side in sides} for sides in found.sides]
@@ -118,6 +128,7 @@ def _in_plan(plan: FormPlan, form: FormResult, seam: FormSeam) -> tuple[Seam, in
 
 
 def _edge(plan: FormPlan, form: FormResult, piece: str, edge: str, vertices: np.ndarray) -> str:
+    """Return the "piece.edge" of the pattern in which the vertices of a form's edge lie."""
     ids = np.asarray(form.pieces[piece].edges[edge])
     for part in plan.edges[piece]:
         if part.source == edge and np.isin(vertices, ids[part.first : part.last + 1]).all():

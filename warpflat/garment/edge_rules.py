@@ -4,29 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS
 
-if TYPE_CHECKING:
-    pass
-
-__all__ = ["HEMMED", "EdgeRules", "unused"]
+__all__ = ["HEMMED_LEVELS", "EdgeRules", "unused_name"]
 
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
 #: skirt, a band or a facing.
-HEMMED = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "wrist")
+HEMMED_LEVELS = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "wrist")
 
 
 @dataclass(frozen=True, kw_only=True)
 class EdgeRules:
-    """What a maker wants of the edges.
+    """Exceptions for the edges of a pattern.
 
     Attributes:
         seam, hem: allowance [m] of all edges of these kinds.
         kinds: kind by edge, as "piece.edge", or "edge" for every piece that has one of that name.
-        allowances: allowance [m] by edge, named likewise.
+        allowances: allowance [m] by edge, named in the same way.
         ease: by seam: how much longer its second side is, as a share of the first.
     """
 
@@ -37,7 +34,7 @@ class EdgeRules:
     ease: Mapping[str, float] = field(default_factory=dict)
 
     def check(self, edges: Mapping[str, Sequence[str]]) -> None:
-        """See that every name is an edge, and every kind one.
+        """Check that every name is an edge, and that every kind exists.
 
         Args:
             edges: names of the edges by piece.
@@ -45,25 +42,25 @@ class EdgeRules:
         Raises:
             InputError: a name that no piece has (gives the nearest), or an unknown kind.
         """
-        for said in self._unknown(edges).values():
-            raise InputError(said)
+        for message in self._unknown(edges).values():
+            raise InputError(message)
         for name, kind in self.kinds.items():
             if kind not in EDGE_KINDS:
                 raise InputError(f"kinds.{name}: unknown kind {kind!r}; {nearest(kind, EDGE_KINDS)}")
 
     def known(self, edges: Mapping[str, Sequence[str]]) -> tuple[EdgeRules, tuple[str, ...]]:
-        """The rules without names that no piece has, and a sentence about each of these.
+        """Return the rules without names that no piece has, and a sentence about each of these.
 
         For names that show in the plane only; `edges` as for :meth:`check`.
         """
         unknown = self._unknown(edges)
         kinds = {name: kind for name, kind in self.kinds.items() if ("kinds", name) not in unknown}
         allowances = {name: width for name, width in self.allowances.items() if ("allowances_mm", name) not in unknown}
-        notes = tuple(f"left out of the pattern: {said}" for said in unknown.values())
+        notes = tuple(f"left out of the pattern: {message}" for message in unknown.values())
         return replace(self, kinds=kinds, allowances=allowances), notes
 
     def _unknown(self, edges: Mapping[str, Sequence[str]]) -> dict[tuple[str, str], str]:
-        """Names that no piece has, with the table that has each, and what to say of it."""
+        """Return the names that no piece has, with their table, and a message about each."""
         known = {f"{piece}.{edge}" for piece, names in edges.items() for edge in names}
         known |= {edge for names in edges.values() for edge in names}
         return {
@@ -74,19 +71,19 @@ class EdgeRules:
         }
 
     def kind(self, piece: str, edge: str, default: str) -> str:
-        """The kind of an edge."""
+        """Return the kind of an edge."""
         return self.kinds.get(f"{piece}.{edge}", self.kinds.get(edge, default))
 
     def allowance(self, piece: str, edge: str, kind: str) -> float | None:
-        """The allowance [m] of an edge; None leaves it to its kind."""
+        """Return the allowance [m] of an edge; None leaves it to its kind."""
         if kind == "fold":
             return None
         of_kind = {"seam": self.seam, "hem": self.hem}.get(kind)
         return self.allowances.get(f"{piece}.{edge}", self.allowances.get(edge, of_kind))
 
 
-def unused(name: str, taken: Mapping[str, Any] | set[str]) -> str:
-    """ "name 2" or the first number after that is free."""
+def unused_name(name: str, taken: Mapping[str, Any] | set[str]) -> str:
+    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
     number = 2
     while f"{name} {number}" in taken:
         number += 1

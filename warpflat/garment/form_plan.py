@@ -5,26 +5,35 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules, unused_name
 from warpflat.pattern.pieces import Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
-from warpflat.garment.edge_rules import HEMMED, EdgeRules, unused
 
 __all__ = ["EdgePlan", "FormPlan", "Sides", "check_fold_grain", "folds_of", "plan_form"]
 
 Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
+#: Names of a piece and of its edge.
+Place = tuple[str, str]
 
 
 @dataclass(frozen=True, kw_only=True)
 class EdgePlan:
-    """A stretch of a form's edge: `name` in the pattern, `source` the form's edge, and from which of its points to which."""
+    """A stretch of a form's edge as an edge of the pattern.
+
+    Attributes:
+        name: in the pattern.
+        source: the form's edge.
+        first, last: the points of that edge from and to which it runs.
+        kind: as in `Edge`.
+    """
 
     name: str
     source: str
@@ -35,7 +44,13 @@ class EdgePlan:
 
 @dataclass(frozen=True, kw_only=True)
 class FormPlan:
-    """Edges by piece, counter-clockwise, the seams between them, and how often each piece is cut."""
+    """What a form becomes as a pattern.
+
+    Attributes:
+        edges: by piece, counter-clockwise.
+        seams: between them.
+        quantities: by piece, how often it is cut.
+    """
 
     edges: Mapping[str, tuple[EdgePlan, ...]]
     seams: tuple[Seam, ...]
@@ -44,7 +59,14 @@ class FormPlan:
 
 @dataclass(frozen=True, kw_only=True)
 class _Run:
-    """One side of a form's seam: points `first` to `last` of an edge, and whether the seam runs against them."""
+    """One side of a form's seam, as a stretch of an edge.
+
+    Attributes:
+        seam, side: index of the seam, and 0 or 1.
+        piece, edge: names.
+        first, last: points of the edge.
+        against: the seam runs against them.
+    """
 
     seam: int
     side: int
@@ -55,18 +77,19 @@ class _Run:
     against: bool
 
     @property
-    def place(self) -> tuple[str, str]:
+    def place(self) -> Place:
+        """Names of the piece and the edge."""
         return self.piece, self.edge
 
 
 def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
-    """What every edge of a form becomes.
+    """Work out what every edge of a form becomes in the pattern.
 
-    An edge in a seam is a seam, a half piece's centre the fold. Of the free edges the lowest of a piece is hemmed
-    if it lies below the waist or on the arm; the others (necks, armholes, waists of skirts) get a seam's allowance, for a
+    An edge in a seam is a seam, a half piece's centre the fold. The lowest free edge of a piece is hemmed if it lies
+    below the waist or on the arm; other free edges (necks, armholes, waists of skirts) get a seam's allowance, for a
     facing or a band. An edge that is free along a part of its length is split there, and so is one that is sewn to
-    parts of edges; one that is sewn to several whole edges (a sleeve's cap to a front's and a back's armhole) stays
-    whole, and they are one seam.
+    parts of edges. An edge that is sewn to several whole edges (a sleeve's cap to a front's and a back's armhole) stays
+    whole, and its seams become one.
 
     Args:
         form: what `Mannequin.form` gives.
@@ -76,47 +99,37 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
         InputError: the rules name an edge or a kind that does not exist.
     """
     rules = rules or EdgeRules()
-    runs = _runs(form)
-    of_edge: dict[tuple[str, str], list[_Run]] = {}
-    for run in sorted((r for pair in runs for r in pair), key=lambda r: r.first):
-        of_edge.setdefault(run.place, []).append(run)
-    hubs = {place for place, here in of_edge.items() if _is_hub(form, place, here, runs, of_edge)}
-    edges: dict[str, tuple[EdgePlan, ...]] = {}
-    title: dict[tuple[str, str, int], str] = {}
-    for name, piece in form.pieces.items():
-        plans: list[EdgePlan] = []
-        taken: set[str] = set(piece.edges)
-        lowest = _lowest(form, name, of_edge)
-        for edge, ids in piece.edges.items():
-            here = of_edge.get((name, edge), [])
-            whole = not here or (name, edge) in hubs or (len(here) == 1 and _covers(here, len(ids)))
-            cuts = (
-                [0, len(ids) - 1] if whole else sorted({0, len(ids) - 1, *(i for r in here for i in (r.first, r.last))})
-            )
-            parts = [(a, b, any(r.first <= a and b <= r.last for r in here)) for a, b in pairwise(cuts)]
-            # The edge's own name stays with what is sewn.
-            keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
-            for number, (first, last, sewn) in enumerate(parts):
-                part = edge if number == keeper else unused(edge, taken)
-                taken.add(part)
-                title[name, edge, first] = part
-                kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if edge == lowest else "seam"
-                plans.append(
-                    EdgePlan(name=part, source=edge, first=first, last=last, kind=rules.kind(name, part, kind))
-                )
-        edges[name] = tuple(plans)
+    sewing = _FormSeams(form)
+    edges = {name: _plan_edges(form, name, sewing, rules) for name in form.pieces}
     rules.check({name: [plan.name for plan in plans] for name, plans in edges.items()})
-    seams = _seams(form, runs, hubs, of_edge, title, rules)
     half = any(piece.fold for piece in form.pieces.values())
     quantities = {name: 1 if piece.fold or not half else 2 for name, piece in form.pieces.items()}
-    return FormPlan(edges=edges, seams=seams, quantities=quantities)
+    return FormPlan(edges=edges, seams=_plan_seams(form, sewing, edges, rules), quantities=quantities)
+
+
+def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRules) -> tuple[EdgePlan, ...]:
+    """Split the edges of one piece where they begin or end to be sewn, and give each part its name and kind."""
+    piece = form.pieces[name]
+    plans: list[EdgePlan] = []
+    taken: set[str] = set(piece.edges)
+    lowest = _lowest_edge(form, name, sewing)
+    for edge, ids in piece.edges.items():
+        parts = sewing.parts((name, edge), len(ids))
+        # The edge's own name stays with what is sewn.
+        keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
+        for number, (first, last, sewn) in enumerate(parts):
+            part = edge if number == keeper else unused_name(edge, taken)
+            taken.add(part)
+            kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if edge == lowest else "seam"
+            plans.append(EdgePlan(name=part, source=edge, first=first, last=last, kind=rules.kind(name, part, kind)))
+    return tuple(plans)
 
 
 def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
-    """See that pieces on the fold have their grain along or across it.
+    """Check that pieces on the fold have their grain along or across it.
 
-    A half is flattened as if the other one were its mirror image, grain and all. Cloth on the fold, unfolded, has its grain running
-    on straight: at any other angle that is another piece.
+    A half is flattened as if its other half were the mirror image, grain included. On cloth that lies on the fold, the
+    grain runs straight on once it is unfolded: at any other angle the other half is another piece.
 
     Args:
         folds: by piece, its edge on the fold, to which the datum is parallel.
@@ -136,7 +149,7 @@ def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
 
 
 def folds_of(form: FormResult, plan: FormPlan) -> dict[str, str]:
-    """By half piece, its edge on the fold; without those for which the rules ask another kind of that edge."""
+    """Return by half piece its edge on the fold, without edges to which the rules give another kind."""
     return {
         name: piece.fold
         for name, piece in form.pieces.items()
@@ -144,72 +157,84 @@ def folds_of(form: FormResult, plan: FormPlan) -> dict[str, str]:
     }
 
 
-def _runs(form: FormResult) -> list[tuple[_Run, _Run]]:
-    """Both sides of every seam of the form."""
-    runs = []
-    for number, seam in enumerate(form.seams):
-        sides = []
-        for side in (0, 1):
-            piece, edge, vertices = seam.pieces[side], seam.edges[side], np.asarray(seam.vertices[side])
-            ids = np.asarray(form.pieces[piece].edges[edge])
-            against = not _found(ids, vertices)
-            first = _found(ids, vertices[::-1] if against else vertices)[0]
-            sides.append(
-                _Run(
-                    seam=number, side=side, piece=piece, edge=edge, first=first, last=first + len(vertices) - 1,
-                    against=against,
-                )
-            )  # fmt: skip
-        runs.append((sides[0], sides[1]))
-    return runs
+class _FormSeams:
+    """The seams of a form, edge by edge.
+
+    Attributes:
+        pairs: both sides of every seam.
+        by_edge: by piece and edge, the stretches that are sewn, in their order.
+        hubs: edges that are sewn to several whole edges of other pieces, one after the other.
+    """
+
+    def __init__(self, form: FormResult) -> None:
+        self._lengths = {(name, edge): len(ids) for name, p in form.pieces.items() for edge, ids in p.edges.items()}
+        self.pairs = [(_seam_run(form, n, 0), _seam_run(form, n, 1)) for n in range(len(form.seams))]
+        self.by_edge: dict[Place, list[_Run]] = {}
+        for run in sorted((r for pair in self.pairs for r in pair), key=lambda r: r.first):
+            self.by_edge.setdefault(run.place, []).append(run)
+        self.hubs = {place for place in self.by_edge if self._is_hub(place)}
+
+    def partner(self, run: _Run) -> _Run:
+        """Return the other side of a seam."""
+        return self.pairs[run.seam][1 - run.side]
+
+    def covers(self, place: Place, runs: Sequence[_Run] | None = None) -> bool:
+        """Return whether an edge is sewn all along; by all its stretches, or by some in their order."""
+        here = self.by_edge.get(place, []) if runs is None else runs
+        ends = [0, *(run.last for run in here)]
+        joined = all(run.first == end for run, end in zip(here, ends, strict=False))
+        return joined and ends[-1] == self._lengths[place] - 1
+
+    def parts(self, place: Place, count: int) -> list[tuple[int, int, bool]]:
+        """Split an edge of `count` points: first and last point of each part, and whether it is sewn."""
+        here = self.by_edge.get(place, [])
+        whole = not here or place in self.hubs or (len(here) == 1 and self.covers(place))
+        ends = [] if whole else [end for run in here for end in (run.first, run.last)]
+        cuts = sorted({0, count - 1, *ends})
+        return [(a, b, any(run.first <= a and b <= run.last for run in here)) for a, b in pairwise(cuts)]
+
+    def _is_hub(self, place: Place) -> bool:
+        here = self.by_edge[place]
+        if len(here) < 2 or not self.covers(place):
+            return False
+        partners = [self.partner(run) for run in here]
+        return all(len(self.by_edge[p.place]) == 1 and self.covers(p.place, [p]) and p.place != place for p in partners)
 
 
-def _found(ids: IntArray, vertices: IntArray) -> list[int]:
-    """Where in an edge a row of vertices lies."""
+def _seam_run(form: FormResult, number: int, side: int) -> _Run:
+    """Return one side of a form's seam as a stretch of an edge."""
+    seam = form.seams[number]
+    piece, edge, vertices = seam.pieces[side], seam.edges[side], np.asarray(seam.vertices[side])
+    ids = np.asarray(form.pieces[piece].edges[edge])
+    against = not _occurrences(ids, vertices)
+    first = _occurrences(ids, vertices[::-1] if against else vertices)[0]
+    last = first + len(vertices) - 1
+    return _Run(seam=number, side=side, piece=piece, edge=edge, first=first, last=last, against=against)
+
+
+def _occurrences(ids: IntArray, vertices: IntArray) -> list[int]:
+    """Return the places in an edge at which a row of vertices begins."""
     count = len(vertices)
     return [i for i in range(len(ids) - count + 1) if np.array_equal(ids[i : i + count], vertices)]
 
 
-def _covers(here: Sequence[_Run], count: int) -> bool:
-    """Whether runs, in order, leave nothing free of an edge with so many points."""
-    ends = [0, *(run.last for run in here)]
-    return all(run.first == end for run, end in zip(here, ends, strict=False)) and ends[-1] == count - 1
-
-
-def _is_hub(
-    form: FormResult,
-    place: tuple[str, str],
-    here: Sequence[_Run],
-    runs: Sequence[tuple[_Run, _Run]],
-    of_edge: Mapping[tuple[str, str], Sequence[_Run]],
-) -> bool:
-    """Whether an edge is sewn to several whole edges of other pieces, one after the other."""
-    piece, edge = place
-    if len(here) < 2 or not _covers(here, len(form.pieces[piece].edges[edge])):
-        return False
-    partners = [runs[run.seam][1 - run.side] for run in here]
-    return all(
-        len(of_edge[p.place]) == 1 and _covers([p], len(form.pieces[p.piece].edges[p.edge])) and p.place != place
-        for p in partners
-    )
-
-
-def _seams(
-    form: FormResult,
-    runs: Sequence[tuple[_Run, _Run]],
-    hubs: set[tuple[str, str]],
-    of_edge: Mapping[tuple[str, str], Sequence[_Run]],
-    title: Mapping[tuple[str, str, int], str],
-    rules: EdgeRules,
+def _plan_seams(
+    form: FormResult, sewing: _FormSeams, edges: Mapping[str, Sequence[EdgePlan]], rules: EdgeRules
 ) -> tuple[Seam, ...]:
+    """Return the seams of the pattern; those of a hub are one seam.
+
+    Raises:
+        InputError: the rules name a seam that does not exist.
+    """
+    names = {(piece, plan.source, plan.first): plan.name for piece, plans in edges.items() for plan in plans}
     seams: list[Seam] = []
-    done: set[tuple[str, str]] = set()
-    for first, second in runs:
+    done: set[Place] = set()
+    for first, second in sewing.pairs:
         name = form.seams[first.seam].name
-        hub = next((run.place for run in (first, second) if run.place in hubs), None)
+        hub = next((run.place for run in (first, second) if run.place in sewing.hubs), None)
         if hub is None:
             parts = [
-                SeamSide(piece=r.piece, edge=title[r.piece, r.edge, r.first], reversed=r.against)
+                SeamSide(piece=r.piece, edge=names[r.piece, r.edge, r.first], reversed=r.against)
                 for r in (first, second)
             ]
             sides: Sides = ((parts[0],), (parts[1],))
@@ -219,8 +244,8 @@ def _seams(
             done.add(hub)
             chain = tuple(
                 SeamSide(piece=p.piece, edge=p.edge, reversed=p.against != run.against)
-                for run in of_edge[hub]
-                for p in [runs[run.seam][1 - run.side]]
+                for run in sewing.by_edge[hub]
+                for p in [sewing.partner(run)]
             )
             sides = (chain, (SeamSide(piece=hub[0], edge=hub[1]),))
         seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
@@ -230,12 +255,12 @@ def _seams(
     return tuple(seams)
 
 
-def _lowest(form: FormResult, name: str, sewn: Mapping[tuple[str, str], Any]) -> str | None:
-    """The lowest of a piece's free edges at a level where garments are hemmed."""
+def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:
+    """Return the lowest of a piece's free edges at a level where garments are hemmed; None if there is none."""
     piece = form.pieces[name]
     heights = {
         edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
         for edge, ids in piece.edges.items()
-        if edge.split(" ")[0] in HEMMED and not _covers(sewn.get((name, edge), []), len(ids))
+        if edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
     }
     return min(heights, key=lambda edge: heights[edge]) if heights else None

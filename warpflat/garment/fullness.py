@@ -1,10 +1,10 @@
 """Fullness: more cloth than the body needs along an edge, to be eased or gathered into a shorter one.
 
-The longer side of such a seam must not be stretched to its length, nor the shorter one pressed: the piece is *meant* to be
-wider there. Its springs and cells are at rest at the body's lengths times a fullness s that is stated along the edge and
-fades into the piece (harmonically, log s being linear): near the edge only for ease; for gathers down to the next edge that
-is sewn plainly across the fullness, or through the whole piece if there is none, as in a gathered skirt. What a pattern
-maker does by slashing and spreading.
+The longer side of such a seam must not be stretched to its length, nor the shorter one compressed: the piece is meant
+to be wider there. Its springs and cells are at rest at the body's lengths times a fullness s. The fullness is stated
+along the edge and fades into the piece; log s is harmonic. For ease it fades near the edge. For gathers it fades down
+to the next edge that is sewn plainly across the fullness, or runs through the whole piece if there is none, as in a
+gathered skirt. Pattern makers get the same shape by slashing and spreading.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ from warpflat.surface.mesh import Surface
 __all__ = ["FullEdge", "fullness_of", "give_fullness"]
 
 
-# What the cloth stores beyond what the springs of a gathered piece tell of is worth a note from what so much strain everywhere along the
-# softer thread stores, if it is so many times as much as before it was gathered.
-_FELT, _MUCH_MORE = 0.01, 2.0
+# The energy that a gathered piece's springs miss is worth a note if it exceeds what this strain along the softer thread
+# stores everywhere, and this many times what they missed before the gathers.
+_NOTICEABLE_STRAIN, _NOTICEABLE_RATIO = 0.01, 2.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -48,7 +48,7 @@ class FullEdge:
         vertices: of the piece, along the edge.
         factor: length of the edge over its length on the body.
         gathered: the fullness runs on into the piece, along warp or weft, whichever is nearer to the edge's direction;
-            otherwise it is eased in near the edge, alike in all directions.
+            otherwise it is eased in near the edge, equally in all directions.
     """
 
     vertices: IntArray
@@ -59,7 +59,7 @@ class FullEdge:
 def give_fullness(
     piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray], *, options: RelaxOptions | None = None
 ) -> Flattening:
-    """The piece with fullness along some edges, relaxed again on its own.
+    """Give a piece fullness along some edges, and relax it again on its own.
 
     Args:
         piece: flattened, uncut.
@@ -69,12 +69,12 @@ def give_fullness(
     """
     options = given_options(options)
     full = fullness_of(piece, edges, plain)
-    network = _widened(piece.network, piece.positions, full)
+    network = _widened_network(piece.network, piece.positions, full)
     warp, weft = grain_axes(piece.grain_angle)
     mean = full.mean(axis=0)
-    spread = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
+    widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
-    state = Relaxation(network, options, start=piece.positions @ spread, alignments=[alignment])
+    state = Relaxation(network, options, start=piece.positions @ widening, alignments=[alignment])
     outcome = relax(state)
     positions = state.positions()
     stage = Stage(
@@ -90,7 +90,7 @@ def give_fullness(
     )
     most = max(edge.factor for edge in edges)
     note = f"{piece.surface.name} has up to {100 * (most - 1.0):.3g} % more length than the body, to be eased or gathered in"
-    notes = (*piece.notes, note, *_slanted(network, piece.stages[-1], stage))
+    notes = (*piece.notes, note, *_slant_note(network, piece.stages[-1], stage))
     return replace(
         piece,
         network=network,
@@ -101,15 +101,18 @@ def give_fullness(
     )
 
 
-def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
-    """What is to be said of springs that are not the cloth any more: gathers slant the edges, along which they run, off the threads."""
-    # As it is meant to be worn, cloth is under tension, of which springs know nothing.
+def _slant_note(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
+    """Return a note if springs no longer measure the cloth.
+
+    Gathers slant the mesh's edges, along which springs run, off the threads.
+    """
+    # Cloth that is worn under tension stores energy that springs never measure.
     if network.model != "springs" or network.stretch is not None:
         return []
-    missed, missed_before = _missed(stage), _missed(before)
+    missed, missed_before = _missed_energy(stage), _missed_energy(before)
     thread = min(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
-    felt = 0.5 * thread * _FELT**2 * float(network.cell_arrays.area.sum())
-    if missed < max(felt, _MUCH_MORE * missed_before):
+    noticeable = 0.5 * thread * _NOTICEABLE_STRAIN**2 * float(network.cell_arrays.area.sum())
+    if missed < max(noticeable, _NOTICEABLE_RATIO * missed_before):
         return []
     stored = 1e3 * stage.strain_energy_j
     return [
@@ -118,13 +121,13 @@ def _slanted(network: SpringNetwork, before: Stage, stage: Stage) -> list[str]:
     ]
 
 
-def _missed(stage: Stage) -> float:
-    """What the cloth stores and springs do not tell of [J]."""
+def _missed_energy(stage: Stage) -> float:
+    """Return the energy that the cloth stores and springs do not measure [J]."""
     return stage.strain_energy_j - stage.model_energy_j
 
 
 def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
-    """#V by 2, how much longer than on the body the cloth is meant to be along warp and weft."""
+    """Return by how much longer than on the body the cloth is meant to be along warp and weft (#V by 2)."""
     positions, faces = piece.positions, piece.faces
     axes = grain_axes(piece.grain_angle)
     log_full = np.zeros((len(positions), 2))
@@ -134,8 +137,8 @@ def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[In
             stops = [ids for ids in plain if _runs_along(positions, ids, axes) == axis]
             logs = [(edge.vertices, np.full(len(edge.vertices), np.log(edge.factor))) for edge in along]
             log_full[:, axis] += falloff_weights(faces, logs, stops, len(positions))
-    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap, and all of what is eased in; and
-    # what a slanting side has got too much.
+    # What an edge lacks where it runs across its gathers, as the flanks of a sleeve's cap do, all of what is eased in,
+    # and the excess on slanting sides.
     wanted = [(ids, 1.0) for ids in plain] + [(edge.vertices, edge.factor) for edge in edges]
     lacks = [(ids, _lack(ids, factor, positions, axes, np.exp(log_full))) for ids, factor in wanted]
     log_full += falloff_weights(faces, lacks, border_loops(faces), len(positions))[:, None]
@@ -143,7 +146,7 @@ def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[In
 
 
 def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, FloatArray]) -> int:
-    """0 where the line's chord is nearer to the warp, 1 where to the weft."""
+    """Return 0 where the line's chord is nearer to the warp, 1 where it is nearer to the weft."""
     chord = positions[line[-1]] - positions[line[0]]
     return int(abs(float(chord @ axes[1])) > abs(float(chord @ axes[0])))
 
@@ -151,7 +154,7 @@ def _runs_along(positions: FloatArray, line: IntArray, axes: tuple[FloatArray, F
 def _lack(
     edge: IntArray, factor: float, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> FloatArray:
-    """At each vertex of an edge, log of what is still wanting of its factor."""
+    """Return the log of what is still missing of an edge's factor at each of its vertices."""
     step = np.diff(positions[edge], axis=0)
     along = np.stack([step @ axes[0], step @ axes[1]], axis=1)
     here = 0.5 * (full[edge[1:]] + full[edge[:-1]])
@@ -160,7 +163,8 @@ def _lack(
     return np.asarray(0.5 * (np.append(lack, lack[-1]) + np.append(lack[0], lack)))
 
 
-def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
+def _widened_network(network: SpringNetwork, positions: FloatArray, full: FloatArray) -> SpringNetwork:
+    """Return the network at rest where the layout is wider by its fullness."""
     axes = grain_axes(network.grain_angle)
     springs = _wider_springs(network, positions, axes, full)
     cells = _wider_cells(network.cell_arrays, positions, axes, full)
@@ -175,12 +179,12 @@ def _widened(network: SpringNetwork, positions: FloatArray, full: FloatArray) ->
 def _wider_springs(
     network: SpringNetwork, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> SpringArrays:
-    """Longer springs, of the stiffness that cells of the new sides have: along a triangle's side a, K b/a."""
+    """Return longer springs, of the stiffness that cells of the new sides have: along a triangle's side a, K b/a."""
     springs, surface = network.spring_arrays, network.surface
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
-    longer = _times(before, here)
-    stiffness, lack, wave = springs.stiffness * _times(before[:, ::-1], here) / longer, None, None
+    longer = _stretch_factor(before, here)
+    stiffness, lack, wave = springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer, None, None
     if surface.is_quad.any():
         wider = _wider_quads(surface, positions, axes, full)
         made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
@@ -196,7 +200,7 @@ def _wider_springs(
 
 
 def _beside_quads(surface: Surface, springs: SpringArrays) -> BoolArray:
-    """#S, which springs are a quad's sides or diagonals."""
+    """Return which springs (#S) are a quad's sides or diagonals."""
     beside = np.arange(springs.count) >= springs.edge_count
     halves, first = half_edges_of(surface), first_of_faces(surface, 4, 3)[surface.is_quad]
     beside[halves.edge[first[:, None] + np.arange(4)]] = True
@@ -206,17 +210,17 @@ def _beside_quads(surface: Surface, springs: SpringArrays) -> BoolArray:
 def _wider_quads(
     surface: Surface, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> FloatArray:
-    """#F by 2, how many times as long a quad's first edges and its others become; 1 of triangles."""
+    """Return by what factors a quad's first edges and its others become longer (#F by 2); 1 for triangles."""
     wider = np.ones((len(surface.faces), 2))
     corners = surface.faces[surface.is_quad]
     here, q = full[corners].mean(axis=1), positions[corners] @ np.column_stack(axes)
     for k, sides in enumerate((q[:, 1] - q[:, 0] + q[:, 2] - q[:, 3], q[:, 2] - q[:, 1] + q[:, 3] - q[:, 0])):
-        wider[surface.is_quad, k] = _times(sides, here)
+        wider[surface.is_quad, k] = _stretch_factor(sides, here)
     return wider
 
 
-def _times(way: FloatArray, full: FloatArray) -> FloatArray:
-    """How many times as long a way (along warp and weft) is once each of both has been made so many times as long."""
+def _stretch_factor(way: FloatArray, full: FloatArray) -> FloatArray:
+    """Return by what factor a vector (along warp and weft) becomes longer once each component has its own factor."""
     length = np.maximum(np.linalg.norm(way, axis=1), np.finfo(np.float64).tiny)
     return np.asarray(np.linalg.norm(way * full, axis=1) / length)
 
@@ -224,13 +228,13 @@ def _times(way: FloatArray, full: FloatArray) -> FloatArray:
 def _wider_cells(
     cells: CellArrays, positions: FloatArray, axes: tuple[FloatArray, FloatArray], full: FloatArray
 ) -> CellArrays:
-    """Cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S."""
+    """Return cells whose shape on the body, E, becomes E D^-1 S D: at rest where the layout D has been widened by S."""
     here = full[cells.corner].mean(axis=1)
     widen = sum(here[:, k, None, None] * np.outer(axis, axis) for k, axis in enumerate(axes))
     p = positions[cells.corner]
     flat = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
     a, b = np.moveaxis(cells.edges @ np.linalg.solve(flat, widen @ flat), -1, 0)
-    # Laid with the first side along x again: F only matters up to a turn of the body.
+    # The first side lies along x again: F matters only up to a rotation.
     length = np.maximum(np.linalg.norm(a, axis=1), np.finfo(np.float64).tiny)
     across = (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]) / length
     return replace(cells, laid=np.column_stack([length, np.einsum("ij,ij->i", a, b) / length, across]))

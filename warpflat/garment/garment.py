@@ -18,7 +18,7 @@ from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
-from warpflat.garment.ease import SeamWish, wished_seams
+from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
@@ -29,7 +29,7 @@ from warpflat.solver.options import RelaxOptions
 
 __all__ = ["Garment", "flatten_form"]
 
-# By how much the mirror image of a piece may differ from its partner to be cut by the same pattern [m].
+# Largest distance [m] of a piece from the mirror image of its partner at which one pattern serves for both.
 _SAME_PIECE = 5e-4
 
 
@@ -42,7 +42,7 @@ class Garment:
         mannequin: whose form it is.
         form: the pieces in space, with their edges and seams.
         pieces: the flat pieces by name, in the form's order.
-        sewn: how they were relaxed together under their seams and constraints, and what these cost; None if they were not.
+        sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
         ratios: for each of the form's seams the wished length of its first side over its second.
     """
 
@@ -57,9 +57,10 @@ class Garment:
     def seams(self) -> tuple[SeamLengths, ...]:
         """Every seam with the lengths of its two sides."""
         ratios = self.ratios or (1.0,) * len(self.form.seams)
-        prices = {} if self.sewn is None else {held.name: held.price for held in self.sewn.held if held.kind == "seam"}
+        results = () if self.sewn is None else self.sewn.results
+        costs = {result.name: result.cost for result in results if result.kind == "seam"}
         return tuple(
-            self._measured(seam, ratio, prices.get(seam.name))
+            self._measured(seam, ratio, costs.get(seam.name))
             for seam, ratio in zip(self.form.seams, ratios, strict=True)
         )
 
@@ -82,16 +83,16 @@ class Garment:
         return tuple(found)
 
     def mirror_vertices(self, first: str, second: str) -> IntArray | None:
-        """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair."""
-        return _partners(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
+        """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if no pair."""
+        return _mirror_vertices(self.form.pieces[first], self.form.pieces[second], self.mannequin.layout.mirror)
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was completed, mended or chosen, one sentence each."""
+        """What was completed, repaired or chosen, one sentence each."""
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 
-    def _measured(self, seam: FormSeam, ratio: float, price: float | None) -> SeamLengths:
+    def _measured(self, seam: FormSeam, ratio: float, cost: float | None) -> SeamLengths:
         first, second = (self.pieces[piece] for piece in seam.pieces)
         return SeamLengths(
             name=seam.name,
@@ -102,7 +103,7 @@ class Garment:
                 polyline_length(second.positions[seam.vertices[1]]),
             ),
             ease=1.0 / ratio - 1.0,
-            price=price,
+            cost=cost,
         )
 
     def _measure(self, name: str) -> dict[str, Any]:
@@ -111,7 +112,7 @@ class Garment:
         return self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
 
     def metrics(self) -> dict[str, Any]:
-        """All of `metrics.json`."""
+        """Return the content of `metrics.json`."""
         first = next(iter(self.pieces.values()))
         pieces = {name: self._measure(name) for name in self.pieces}
         more = {
@@ -124,7 +125,7 @@ class Garment:
         return run_metrics(pieces, first.network.device, more)
 
     def summary(self) -> dict[str, Any]:
-        """What `metrics.json` says of it as another size: whether its pieces came to rest and lie without flips, and its seams."""
+        """Return the entry of another size in `metrics.json`: convergence, flips, stages and seams."""
         return {
             "pieces": {
                 name: {
@@ -141,12 +142,12 @@ class Garment:
     def _sewing(self) -> dict[str, Any]:
         assert self.sewn is not None
         return {
-            "constraints": [held.as_dict() for held in self.sewn.constraints],
+            "constraints": [result.as_dict() for result in self.sewn.constraints],
             "sewing": self.sewn.as_dict(),
         }
 
     def save(self, folder: str | Path, *, picture: bool = True) -> list[str]:
-        """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none; returns their names.
+        """Write `metrics.json`, an OBJ per piece and `picture.png`, all of them or none, and return their names.
 
         Raises:
             InputError: the folder cannot be written, or the body was read from a file there that would be replaced.
@@ -184,7 +185,7 @@ def flatten_form(
     constraints: Sequence[Constraint] = (),
     **options: Any,
 ) -> Garment:
-    """Flatten every piece of a form, each from its own datum line, then all together, so that their seams match.
+    """Flatten every piece of a form from its own datum line, then relax all together so that their seams match.
 
     Args:
         mannequin: whose form it is.
@@ -197,56 +198,64 @@ def flatten_form(
         constraints: on edges and lines of pieces.
 
     Raises:
-        InputError: a piece cannot be flattened, or a wish or constraint names what there is not; one line says which and why.
+        InputError: a piece cannot be flattened, or a wish or constraint names what does not exist; one line says which
+            and why.
     """
     expect(form, FormResult, "form", "what Mannequin.form gives")
     expect(mannequin, Mannequin, "mannequin", "a Mannequin")
     expect_callback(callback)
     expect_each(wishes, SeamWish, "wishes", "a SeamWish")
     expect_each(constraints, (FixedLength, Straight, Symmetric), "constraints", "a Straight, FixedLength or Symmetric")
-    wished = wished_seams(form, wishes)
+    ratios = seam_ratios(form, wishes)
     names = list(form.pieces)
-
-    def told(number: int, progress: Progress) -> None:
-        if callback is not None:
-            callback(names[number], progress)
-
+    by_name = None if callback is None else _callback_by_name(names, callback)
     flat = flatten_all(
         [piece.surface for piece in form.pieces.values()],
         fabric=fabric,
         datum=[piece.datum or None for piece in form.pieces.values()],
         grain_angle=grain_angle,
         relax=relax,
-        callback=told if callback is not None else None,
+        callback=by_name,
         device=device,
         **options,
     )
     pieces = dict(zip(names, flat, strict=True))
     if not sewn:
         return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
-    for name, edges in wished.full.items():
+    for name, edges in ratios.full.items():
         pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
     pairs = [
         SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices, ratio=ratio)
-        for seam, ratio in zip(form.seams, wished.ratios, strict=True)
+        for seam, ratio in zip(form.seams, ratios.ratios, strict=True)
     ]
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    together = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
+    result = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
     return Garment(
-        name=form.name, mannequin=mannequin, form=form, pieces=together.pieces, sewn=together, ratios=wished.ratios
+        name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, ratios=ratios.ratios
     )
 
 
+def _callback_by_name(
+    names: Sequence[str], callback: Callable[[str, Progress], None]
+) -> Callable[[int, Progress], None]:
+    """Return a callback that takes a piece's number, and passes its name on."""
+
+    def call(number: int, progress: Progress) -> None:
+        callback(names[number], progress)
+
+    return call
+
+
 def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
-    """Vertices along each side of a seam of the piece that has no fullness."""
+    """Return the vertices along each side of a seam of the piece that has no fullness."""
     sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
     return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
 
 
-def _partners(first: FormPiece, second: FormPiece, image: IntArray) -> IntArray | None:
-    """For each vertex of one piece the other's that is its mirror image on the mannequin; None if they are no pair.
+def _mirror_vertices(first: FormPiece, second: FormPiece, image: IntArray) -> IntArray | None:
+    """Return for each vertex of one piece its mirror image in the other, on the mannequin; None if they are no pair.
 
-    Told face by face: along a line that a piece is cut open at, a vertex of the mannequin is two of the piece.
+    Matched face by face: along a line at which a piece is cut open, a vertex of the mannequin is two of the piece.
     """
     if len(first.grid_vertices) != len(second.grid_vertices) or len(first.face_brick) != len(second.face_brick):
         return None

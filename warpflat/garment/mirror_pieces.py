@@ -25,9 +25,9 @@ class MirrorPair:
     """A piece that is cut by another one's pattern, turned over.
 
     Attributes:
-        name: of the piece that is not drawn.
-        of: the piece that is.
-        edges: names of the first one's edges, to those of the second's that are their mirror images.
+        name: the piece that is not drawn.
+        of: the piece that is drawn.
+        edges: for each edge of the first piece, the edge of the second that is its mirror image.
     """
 
     name: str
@@ -38,7 +38,7 @@ class MirrorPair:
 def find_mirror_pairs(
     garments: Mapping[str, FlatGarment], pieces: Mapping[str, Sequence[Piece]], seams: Sequence[Seam]
 ) -> tuple[MirrorPair, ...]:
-    """Pairs that are so in every size, with like edges, each of whose seams is the other's mirror image too.
+    """Find pieces that are mirror images in every size, with equal edges, and whose seams are mirror images too.
 
     Args:
         garments: flattened, by size.
@@ -50,21 +50,21 @@ def find_mirror_pairs(
     for first, second in next(iter(garments.values())).pairs:
         if not all((first, second) in pairs for pairs in every):
             continue
-        matched = [_matched(garments[size], pieces[size], first, second) for size in garments]
+        matched = [_matching_edges(garments[size], pieces[size], first, second) for size in garments]
         if matched[0] is not None and all(edges == matched[0] for edges in matched):
             found.append(MirrorPair(name=second, of=first, edges=matched[0]))
-    # One that is sewn otherwise than its partner needs notches of its own; without it others may be so too.
-    while odd := _sewn_otherwise(found, seams):
-        found = [twin for twin in found if twin.name not in odd]
+    # A piece that is sewn differently needs notches of its own; leaving it out may make others differ.
+    while different := _sewn_differently(found, seams):
+        found = [pair for pair in found if pair.name not in different]
     return tuple(found)
 
 
-def sew_mirror_pairs(seams: Sequence[Seam], twins: Sequence[MirrorPair]) -> tuple[Seam, ...]:
-    """The seams with every twin's edges replaced by those of the piece that is drawn.
+def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) -> tuple[Seam, ...]:
+    """Replace the edges of pieces that are not drawn by those of the pieces that are.
 
-    Such a seam runs as its mirror image does, so that the notches of the one are those of the other.
+    Such a seam runs as its mirror image does, so that the notches of one are those of the other.
     """
-    by_name = {twin.name: twin for twin in twins}
+    by_name = {pair.name: pair for pair in mirror_pairs}
     sewn = []
     for seam in seams:
         sides = (_replaced(seam.sides[0], by_name), _replaced(seam.sides[1], by_name))
@@ -80,13 +80,13 @@ def sew_mirror_pairs(seams: Sequence[Seam], twins: Sequence[MirrorPair]) -> tupl
             sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
         there = next(side for side in other.sides[place] if _key(side) == _key(own[0]))
         if there.reversed != own[0].reversed:
-            sides = (_turned(sides[0]), _turned(sides[1]))
+            sides = (_reversed_side(sides[0]), _reversed_side(sides[1]))
         sewn.append(replace(seam, sides=sides, ease=ease))
     return tuple(sewn)
 
 
-def _matched(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
-    """The second piece's edges by the first's that are their mirror images; None if one pattern will not do for both."""
+def _matching_edges(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: str) -> dict[str, str] | None:
+    """Return the first piece's edge for each of the second's; None if one pattern does not serve for both."""
     one, two = (next(piece for piece in pieces if piece.name == name) for name in (first, second))
     partners = garment.mirror_vertices(first, second)
     edges: dict[str, str] = {}
@@ -103,9 +103,9 @@ def _matched(garment: FlatGarment, pieces: Sequence[Piece], first: str, second: 
     return edges if len(edges) == len(two.edges) else None
 
 
-def _sewn_otherwise(twins: Sequence[MirrorPair], seams: Sequence[Seam]) -> set[str]:
-    """Twins with an edge that is sewn where their partner's is not."""
-    by_name = {twin.name: twin for twin in twins}
+def _sewn_differently(mirror_pairs: Sequence[MirrorPair], seams: Sequence[Seam]) -> set[str]:
+    """Return the pieces with an edge that is sewn where their mirror image's is not."""
+    by_name = {pair.name: pair for pair in mirror_pairs}
     return {
         part.piece
         for seam in seams
@@ -115,30 +115,34 @@ def _sewn_otherwise(twins: Sequence[MirrorPair], seams: Sequence[Seam]) -> set[s
     }
 
 
-def _mirror_seam(side: SeamSide, seams: Sequence[Seam], twins: Mapping[str, MirrorPair]) -> tuple[Seam, int] | None:
-    """The seam at which the edge that is drawn is sewn itself, and on which side of it."""
+def _mirror_seam(
+    side: SeamSide, seams: Sequence[Seam], mirror_pairs: Mapping[str, MirrorPair]
+) -> tuple[Seam, int] | None:
+    """Return the seam at which the drawn edge is sewn itself, and the side of it."""
     for seam in seams:
         for number in (0, 1):
-            if any(part.piece not in twins and _key(part) == _key(side) for part in seam.sides[number]):
+            if any(part.piece not in mirror_pairs and _key(part) == _key(side) for part in seam.sides[number]):
                 return seam, number
     return None
 
 
-def _replaced(side: Sequence[SeamSide], twins: Mapping[str, MirrorPair]) -> tuple[SeamSide, ...]:
+def _replaced(side: Sequence[SeamSide], mirror_pairs: Mapping[str, MirrorPair]) -> tuple[SeamSide, ...]:
+    """Replace the edges of pieces that are not drawn."""
     return tuple(
         SeamSide(
-            piece=twins[part.piece].of,
-            edge=twins[part.piece].edges[part.edge],
+            piece=mirror_pairs[part.piece].of,
+            edge=mirror_pairs[part.piece].edges[part.edge],
             reversed=not part.reversed,
             mirrored=True,
         )
-        if part.piece in twins
+        if part.piece in mirror_pairs
         else part
         for part in side
     )
 
 
-def _turned(side: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
+def _reversed_side(side: Sequence[SeamSide]) -> tuple[SeamSide, ...]:
+    """Return a side of a seam, run the other way."""
     return tuple(replace(part, reversed=not part.reversed) for part in reversed(side))
 
 

@@ -1,4 +1,4 @@
-"""The pattern files of a run: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`, and the marker if it is asked for."""
+"""Pattern files of a run: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`, and the marker if it is asked for."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ FORMATS = ("dxf", "svg", "pdf", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class PatternOptions:
-    """What is written of a pattern, and how.
+    """Which files of a pattern are written, and how.
 
     Attributes:
         formats: some of "dxf", "svg", "pdf", "json".
@@ -58,7 +58,13 @@ class PatternOptions:
 
 @dataclass(frozen=True, kw_only=True)
 class WrittenPattern:
-    """Names of the files, what the maker should know, one sentence each, and entries of `metrics.json`."""
+    """The written files.
+
+    Attributes:
+        files: their names.
+        notes: what the maker should know, one sentence each.
+        metrics: entries of `metrics.json`.
+    """
 
     files: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
@@ -75,14 +81,14 @@ def garment_files(
 ) -> WrittenPattern:
     """Write the pattern of a garment in one or more sizes; several lie upon each other as a nest.
 
-    A pattern that cannot be drawn is a note, not a mistake: by then the garment has been flattened and its other files
-    are good.
+    A pattern that cannot be drawn becomes a note, not an error: by then the garment has been flattened and its other
+    files are good.
 
     Args:
         garments: flattened, by size; "" where there is none.
-        folder: made if need be.
+        folder: created if it does not exist.
         name: of the files.
-        options: see the class.
+        options: formats, rules and cloth.
         sample_size: the one that the files show first.
 
     Raises:
@@ -91,7 +97,7 @@ def garment_files(
     from warpflat.garment.to_pattern import pattern_of_garment
 
     options = options or PatternOptions()
-    return _drawn(
+    return _write_pattern(
         lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
         folder, name, options,
     )  # fmt: skip
@@ -105,14 +111,24 @@ def surface_files(
     options: PatternOptions | None = None,
     seams: Sequence[NamedSeam] = (),
 ) -> WrittenPattern:
-    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it; else as above.
+    """Write the pattern of a flattened surface, or of the pieces into which cuts have parted it.
 
-    `seams` are those of its border that were named.
+    A pattern that cannot be drawn becomes a note, as in :func:`garment_files`.
+
+    Args:
+        results: the pieces.
+        folder: created if it does not exist.
+        name: of the files.
+        options: formats, rules and cloth.
+        seams: the named seams of its border.
+
+    Raises:
+        InputError: the folder cannot be written.
     """
     from warpflat.garment.surface_to_pattern import pattern_of_surface
 
     options = options or PatternOptions()
-    return _drawn(
+    return _write_pattern(
         lambda: pattern_of_surface(results, name=name, rules=options.rules, seams=seams), folder, name, options
     )
 
@@ -132,10 +148,11 @@ def export_patterns(
         formats: some of "dxf", "svg", "pdf" and "json".
         dialect: of a DXF.
         paper: of a PDF.
-        sizes: only these; None takes all. Not of "json", which is what the others are made from.
+        sizes: only these; None takes all. Not for "json", from which the others are made.
 
     Raises:
-        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder cannot be written.
+        InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
+            cannot be written.
     """
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.manifest import record_file
@@ -150,7 +167,7 @@ def export_patterns(
         )
     source = folder / "pattern.json"
     drafted = read_pattern_json(source)
-    # As JSON it may be written over itself: that is what was asked for.
+    # pattern.json may be written over itself: that is what was asked for.
     with output_folder(folder, sources=[] if "json" in formats else [source]):
         files = [
             _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
@@ -161,10 +178,10 @@ def export_patterns(
     return files
 
 
-def _drawn(
+def _write_pattern(
     make: Callable[[], tuple[Pattern, tuple[str, ...]]], to: str | Path, name: str, options: PatternOptions
 ) -> WrittenPattern:
-    """Make, draft and write a pattern; geometry that defeats it becomes a note, and in `metrics.json` `not_drawn` of `pattern`."""
+    """Make, draft and write a pattern; geometry that defeats it becomes a note, and `not_drawn` in the metrics."""
     from shapely.errors import ShapelyError
 
     from warpflat.core.atomic_files import output_folder
@@ -174,16 +191,16 @@ def _drawn(
     report_activity("drafting the pattern")
     try:
         pattern, notes = make()
-        drafted, told = _drafted(pattern, options.tolerance)
+        drafted, remarks = _draft(pattern, options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
         return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
-    notes = (*notes, *told)
+    notes = (*notes, *remarks)
     notes = (
         *notes,
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
-    metrics: dict[str, Any] = {"pattern": _measures(drafted)}
+    metrics: dict[str, Any] = {"pattern": _quality(drafted)}
     with output_folder(to) as folder:
         files = [
             _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
@@ -191,15 +208,15 @@ def _drawn(
             if kind in options.formats
         ]
         if options.cloth is not None:
-            marked, told, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
+            marked, remarks, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
             files += marked
-            notes = (*notes, *told)
+            notes = (*notes, *remarks)
             metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
 
 
-def _measures(drafted: DraftedGarment) -> dict[str, Any]:
-    """How far curves keep from the mesh, and sides of seams from each other, at worst."""
+def _quality(drafted: DraftedGarment) -> dict[str, Any]:
+    """Return how far curves stray from the mesh, and sides of seams from each other, at worst."""
     edges = [edge for pieces in drafted.pieces.values() for piece in pieces for edge in piece.edges]
     near = [seam.local_mm for seam in drafted.seams if seam.local_mm is not None]
     return {
@@ -210,8 +227,8 @@ def _measures(drafted: DraftedGarment) -> dict[str, Any]:
     }
 
 
-def _drafted(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
-    """The pattern drafted, and where its curves had to leave the border of the mesh."""
+def _draft(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
+    """Return the drafted pattern, and a note where its curves had to leave the border of the mesh."""
     from warpflat.pattern.curves import TOLERANCE
     from warpflat.pattern.draft import draft_garment
 
@@ -240,6 +257,7 @@ def _write(
     paper: str,
     sizes: Sequence[str] | None = None,
 ) -> str:
+    """Write one file and return its name."""
     from warpflat.core.atomic_files import file_in
     from warpflat.export.dxf import write_dxf
     from warpflat.export.pattern_json import write_pattern_json
@@ -262,7 +280,7 @@ def _write(
 def _marker(
     drafted: DraftedGarment, folder: Path, name: str, cloth: Cloth, seconds: int
 ) -> tuple[list[str], tuple[str, ...], dict[str, Any]]:
-    """Write `NAME.marker.svg` and `NAME.marker.json`, for one garment of each size."""
+    """Write `NAME.marker.svg` and `NAME.marker.json`, one garment of each size; return names, notes and metrics."""
     from warpflat.core.atomic_files import file_in
     from warpflat.core.json_file import write_json
     from warpflat.export.svg import write_marker_svg
@@ -293,8 +311,8 @@ def _marker(
         "garments": len(drafted.pieces),
     }
     write_json(files[1], {"schema": 1, **measures, "placements": placements})
-    told = (
+    remarks = (
         f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
         f"{counted(len(placements), 'piece')}"
     )
-    return [file.name for file in files], (told,), measures
+    return [file.name for file in files], (remarks,), measures

@@ -1,4 +1,4 @@
-"""Seams as they came out: the lengths of their two sides, what is amiss, and what they cost."""
+"""Lengths of the two sides of a seam in the pattern, their difference, and the energy that the seam costs."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ class SeamLengths:
     Attributes:
         name: after the feature line, or the cut.
         sides: "piece.edge" twice.
-        length_3d: of the one curve in space that both sides come from [m].
+        length_3d: length of the curve in space that both sides come from [m].
         lengths: of its two sides in the pattern [m].
         ease: by how much the second side is meant to be longer, as a share of the first; as in `pattern.json`.
-        price: half the work of the seam's forces: what it costs that its sides match [J]; None if they were not made to.
+        cost: half the work of the seam's forces [J], the energy that matching its sides costs; None if they were not
+            matched.
     """
 
     name: str
@@ -26,15 +27,15 @@ class SeamLengths:
     length_3d: float
     lengths: tuple[float, float]
     ease: float = 0.0
-    price: float | None = None
+    cost: float | None = None
 
     @property
     def difference(self) -> float:
-        """By how much the second side is too long for the first and its ease [m]."""
+        """Excess length of the second side over that of the first and its ease [m]."""
         return self.lengths[1] - self.lengths[0] * (1.0 + self.ease)
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
+        """Return the entry of `metrics.json`."""
         return {
             "name": self.name,
             "sides": list(self.sides),
@@ -42,5 +43,5 @@ class SeamLengths:
             "length_3d_mm": 1e3 * self.length_3d,
             "difference_mm": 1e3 * self.difference,
             "ease": self.ease,
-            "price_j": self.price,
+            "price_j": self.cost,
         }

@@ -1,4 +1,4 @@
-"""One flattened surface, cut or not: sides of darts, partings and named seams made equally long, constraints kept."""
+"""Sewing one flattened surface, cut or not: its darts, cuts, named seams and constraints."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ class SewnSurface:
     """A surface relaxed under the seams of its cuts and under constraints.
 
     Attributes:
-        result: the piece, whole, also where cuts have parted it.
-        sewn: how it went.
-        seams: of the cuts, then those that were named, measured.
+        result: the piece, whole, even where cuts have parted it.
+        sewn: outcome of the relaxation.
+        seams: measured; those of the cuts, then the named ones.
     """
 
     result: Flattening
@@ -34,10 +34,10 @@ class SewnSurface:
     seams: tuple[SeamLengths, ...]
 
     def metrics(self) -> dict[str, Any]:
-        """What `metrics.json` says of it besides its pieces."""
+        """Return the entries of `metrics.json` besides the pieces."""
         return {
             "seams": [seam.as_dict() for seam in self.seams],
-            "constraints": [held.as_dict() for held in self.sewn.constraints],
+            "constraints": [result.as_dict() for result in self.sewn.constraints],
             "sewing": self.sewn.as_dict(),
         }
 
@@ -49,7 +49,7 @@ def sew_surface(
     seams: Sequence[NamedSeam] = (),
     options: RelaxOptions | None = None,
 ) -> SewnSurface | None:
-    """Relax a piece on, so that its seams and darts' legs match and its constraints are kept; None if it has none.
+    """Relax a piece again so that its seams and darts match and its constraints hold; None if it has none of these.
 
     Args:
         result: flattened, perhaps cut.
@@ -58,7 +58,7 @@ def sew_surface(
         options: of the relaxation.
 
     Raises:
-        InputError: a constraint or a seam names a line that the piece has not, or asks what the line cannot be.
+        InputError: a constraint or a seam names a line that the piece does not have, or asks what the line cannot be.
     """
     found = surface_seams(result.network.surface, seams)
     result = _with_fullness(result, found, options)
@@ -97,15 +97,15 @@ def sew_surface(
                 polyline_length(after.positions[pair.vertices[1]]),
             ),
             ease=1.0 / pair.ratio - 1.0,
-            price=held.price,
+            cost=result.cost,
         )
-        for pair, title, held in zip(pairs, titles, sewn.held, strict=False)
+        for pair, title, result in zip(pairs, titles, sewn.results, strict=False)
     )
     return SewnSurface(result=after, sewn=sewn, seams=measured)
 
 
 def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: RelaxOptions | None) -> Flattening:
-    """The piece with more cloth along the sides that are meant to be longer."""
+    """Return the piece with more cloth along the sides that are meant to be longer."""
     full = [
         FullEdge(vertices=seam.vertices[seam.named.longer], factor=seam.named.factor, gathered=seam.named.gathered)
         for seam in seams

@@ -1,13 +1,13 @@
 """Sewing: all pieces of a garment are relaxed together, so that both sides of every seam become equally long.
 
-Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0 with r the wished ratio
-(1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same kind. All are held by
-1/2 k (c + o)^2 with a finite stiffness, so that the steps stay cheap; the offset o grows by what is still amiss after each
-round (augmented Lagrangian), until nothing is. The minimum is that of the pieces' own energy under the constraints.
+Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished
+ratio (1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same
+kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k, so that the steps stay cheap. After each
+round the offset o grows by the residual c (augmented Lagrangian), until all residuals are within their tolerances.
 
-**Prices.** What each seam and each constraint costs, in joules: half the work of its forces on the way from where the pieces
-lay on their own, 1/2 sum k (c + o) c_alone. Were the energy quadratic and the equations linear, these would add up to the
-energy that the constraints together have cost; `Sewn.price` is that energy itself.
+**Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the
+pieces lay on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add
+up to the energy that all constraints together have cost; `Sewn.cost` is that energy itself.
 """
 
 from __future__ import annotations
@@ -41,16 +41,17 @@ from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.falloff import falloff_weights
 
-__all__ = ["Held", "SeamPair", "Sewn", "sew"]
+__all__ = ["ConstraintResult", "SeamPair", "Sewn", "sew"]
 
 
-# Of a tie's spring over the median spring of the cloth.
-_STIFFNESS = 4.0
-# Steps of a round at most: what is amiss over a whole seam takes a dozen rounds, whether the cloth has come to rest before the offsets
-# grow or only begun to. Every so many rounds they become a quarter longer: offsets that follow a cloth that still swings keep it swinging.
-_ROUND = 40
-_LONGER = 5
-# Ties that contradict each other: in so many rounds what is amiss has come down by less than a tenth.
+# Stiffness of an equation over the median spring of the cloth.
+_RELATIVE_STIFFNESS = 4.0
+# Steps of a round at most: the residuals of a whole seam take a dozen rounds, whether the cloth has come to rest before
+# the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow
+# cloth that still swings keep it swinging.
+_STEPS_PER_ROUND = 40
+_ROUNDS_UNTIL_LONGER = 5
+# Equations contradict each other if their violation has come down by less than a tenth over this many rounds.
 _PATIENCE = 20
 
 
@@ -74,37 +75,38 @@ class SeamPair:
 
 
 @dataclass(frozen=True, kw_only=True)
-class Held:
-    """A seam or a constraint, as it came out.
+class ConstraintResult:
+    """A seam or a constraint after sewing.
 
     Attributes:
         name: the seam's or the constraint's; "PIECE fold" of a fold.
         kind: "seam", "fold", "straight", "length" or "symmetric".
-        price: half the work of its forces: what it costs [J].
-        amiss: largest miss of a seam's two lengths, of a line's whole length, of a place [m].
+        cost: half the work of its forces [J].
+        violation: largest error of a seam's two lengths, of a line's whole length, or of a place [m].
     """
 
     name: str
     kind: str
-    price: float
-    amiss: float
+    cost: float
+    violation: float
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
-        return {"name": self.name, "kind": self.kind, "price_j": self.price, "amiss_mm": 1e3 * self.amiss}
+        """Return the entry of `metrics.json`."""
+        return {"name": self.name, "kind": self.kind, "price_j": self.cost, "amiss_mm": 1e3 * self.violation}
 
 
 @dataclass(frozen=True, kw_only=True)
 class Sewn:
-    """What sewing gave.
+    """Pieces relaxed together.
 
     Attributes:
-        pieces: by name, relaxed together.
+        pieces: by name.
         converged: whether all came to rest with the seams' sides equal and the constraints kept.
-        contradictory: whether it ended since seams and constraints came no nearer to agreeing: more steps do not help.
+        contradictory: whether it ended because seams and constraints came no nearer to agreeing: more steps do not
+            help.
         steps: approximate implicit steps over all pieces.
         energy_before, energy_after: of all pieces, springs and guard [J].
-        held: every seam, fold and constraint with its price, in the order in which they were given.
+        results: every seam, fold and constraint with its cost, in the order in which they were given.
         seconds: wall clock.
     """
 
@@ -114,11 +116,11 @@ class Sewn:
     steps: int
     energy_before: float
     energy_after: float
-    held: tuple[Held, ...]
+    results: tuple[ConstraintResult, ...]
     seconds: float
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
+        """Return the entry of `metrics.json`."""
         return {
             "converged": self.converged,
             "contradictory": self.contradictory,
@@ -126,24 +128,24 @@ class Sewn:
             "seconds": self.seconds,
             "energy_before_j": self.energy_before,
             "energy_after_j": self.energy_after,
-            "price_j": self.price,
+            "price_j": self.cost,
             "largest_difference_mm": 1e3 * self.largest_difference,
         }
 
     @property
-    def price(self) -> float:
-        """What all seams, folds and constraints cost together [J]."""
+    def cost(self) -> float:
+        """Energy that all seams, folds and constraints cost together [J]."""
         return self.energy_after - self.energy_before
 
     @property
     def largest_difference(self) -> float:
-        """Of a seam's two sides [m], ease taken out."""
-        return max((held.amiss for held in self.held if held.kind == "seam"), default=0.0)
+        """Largest difference between a seam's two sides, besides ease [m]."""
+        return max((result.violation for result in self.results if result.kind == "seam"), default=0.0)
 
     @property
-    def constraints(self) -> tuple[Held, ...]:
-        """What is held besides seams."""
-        return tuple(held for held in self.held if held.kind != "seam")
+    def constraints(self) -> tuple[ConstraintResult, ...]:
+        """Results of constraints and folds, without seams."""
+        return tuple(result for result in self.results if result.kind != "seam")
 
 
 def sew(
@@ -158,155 +160,180 @@ def sew(
 
     Args:
         pieces: relaxed one by one, of one fabric.
-        seams: what is sewn to what.
+        seams: which edges are sewn to each other.
         constraints: on borders and lines.
         folds: by piece, vertices that must lie on one upright line, exactly.
         options: of the relaxation.
 
     Raises:
-        InputError: a constraint names what there is not, or a piece cannot be laid with its fold straight.
+        InputError: a constraint names what does not exist, or a piece cannot be laid with its fold straight.
     """
-    begun = time.perf_counter()
+    start_time = time.perf_counter()
     options = given_options(options)
-    whole = SewingNetwork(pieces)
+    joined = SewingNetwork(pieces)
     folds = folds or {}
-    alone = np.concatenate([piece.positions for piece in pieces.values()])
-    ties, kinds, laid = _ties(whole, alone, seams, constraints, folds)
-    start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
-    network = whole.network()
+    unsewn = np.concatenate([piece.positions for piece in pieces.values()])
+    equations, kinds, oriented = _constraint_equations(joined, unsewn, seams, constraints, folds)
+    start = np.concatenate([_straighten_fold(piece, folds.get(name)) for name, piece in pieces.items()])
+    network = joined.network()
     if folds:
-        network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
-    if len(ties):
+        network.guide(np.concatenate([joined.numbers(name, ids) for name, ids in folds.items()]))
+    if len(equations):
         thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
         median = float(np.median(network.spring_arrays.listed_stiffness))
-        hold = np.where(ties.soft > 0, ties.soft * thread, _STIFFNESS * median)
-        network.sew(ties.ends, ties.ratio, hold, kind=ties.kind, target=ties.target, lever=ties.lever)
-    # A piece with a guided line needs no other hold: the line cannot turn.
-    alignments = [piece for name, piece in whole.upright.items() if name not in folds and name not in laid]
+        stiffness = np.where(equations.soft > 0, equations.soft * thread, _RELATIVE_STIFFNESS * median)
+        network.sew(
+            equations.ends,
+            equations.ratio,
+            stiffness,
+            kind=equations.kind,
+            target=equations.target,
+            lever=equations.lever,
+        )
+    # A piece with a guided line needs nothing else to hold it: the line cannot turn.
+    alignments = [piece for name, piece in joined.upright.items() if name not in folds and name not in oriented]
     state = Relaxation(network, options, start=start, alignments=alignments)
-    outcome, misses, kept, contradictory = _relax_in_rounds(state, ties, options)
-    seconds = time.perf_counter() - begun
-    converged = outcome.converged and kept
-    sewn = whole.split(state, converged=converged, seconds=seconds, residual=outcome.residual)
+    outcome, residuals, satisfied, contradictory = _relax_in_rounds(state, equations, options)
+    seconds = time.perf_counter() - start_time
+    converged = outcome.converged and satisfied
+    sewn = joined.split(state, converged=converged, seconds=seconds, residual=outcome.residual)
     return Sewn(
         pieces=sewn,
         converged=converged,
         contradictory=contradictory,
         steps=state.steps,
-        energy_before=sum(_energy(piece.network, piece.positions) for piece in pieces.values()),
-        energy_after=sum(_energy(piece.network, piece.positions) for piece in sewn.values()),
-        held=(*_held(state, ties, kinds, misses, alone), *_held_folds(state, whole, folds, alone)),
+        energy_before=sum(_potential(piece.network, piece.positions) for piece in pieces.values()),
+        energy_after=sum(_potential(piece.network, piece.positions) for piece in sewn.values()),
+        results=(
+            *_constraint_results(state, equations, kinds, residuals, unsewn),
+            *_fold_results(state, joined, folds, unsewn),
+        ),
         seconds=seconds,
     )
 
 
-def _ties(
-    whole: SewingNetwork,
-    alone: FloatArray,
+def _constraint_equations(
+    joined: SewingNetwork,
+    unsewn: FloatArray,
     seams: Sequence[SeamPair],
     constraints: Sequence[Constraint],
     folds: Mapping[str, IntArray],
 ) -> tuple[ConstraintEquations, list[tuple[str, str]], set[str]]:
-    """All ties in the whole's numbering, name and kind of each group, and the pieces that constraints lay on the cloth."""
-    ties, kinds, laid = [], [], set()
-    on_fold = {name: whole.numbers(name, ids) for name, ids in folds.items()}
+    """Return the equations of seams and constraints in the numbering of the joined pieces.
+
+    With them come name and kind of each group, and the names of the pieces that are oriented on the cloth, which need no
+    other constraint against turning.
+    """
+    equations, kinds, oriented = [], [], set()
+    on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
     for seam in seams:
-        first, second = (whole.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
+        first, second = (joined.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
         sides = zip((first, second), seam.pieces, strict=True)
-        smooth = [smooth_equations(side, alone, on_fold.get(name)) for side, name in sides]
+        smooth = [smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides]
         if seam.joints is None:
-            held = seam_equations(first, second, seam.ratio)
+            sewn = seam_equations(first, second, seam.ratio)
         else:
-            held = stretch_equations(first, second, seam.joints, whole.surface.vertices, alone, seam.ratio)
-        ties.append(one_group(held, *smooth))
+            sewn = stretch_equations(first, second, seam.joints, joined.surface.vertices, unsewn, seam.ratio)
+        equations.append(one_group(sewn, *smooth))
         kinds.append((seam.name, "seam"))
     for constraint in constraints:
-        own, lays = equations_of_constraint(constraint, piece_of(constraint, whole.pieces), folds.get(constraint.piece))
-        ties.append(replace(own, ends=whole.numbers(constraint.piece, own.ends)))
+        own, orients = equations_of_constraint(
+            constraint, piece_of(constraint, joined.pieces), folds.get(constraint.piece)
+        )
+        equations.append(replace(own, ends=joined.numbers(constraint.piece, own.ends)))
         kinds.append((constraint.name, constraint.kind))
-        if lays:
-            laid.add(constraint.piece)
-    return join_equations(ties), kinds, laid
+        if orients:
+            oriented.add(constraint.piece)
+    return join_equations(equations), kinds, oriented
 
 
 def _relax_in_rounds(
-    state: Relaxation, ties: ConstraintEquations, options: RelaxOptions
+    state: Relaxation, equations: ConstraintEquations, options: RelaxOptions
 ) -> tuple[Outcome, FloatArray, bool, bool]:
-    """Relax, let the offsets grow, and again until all is at rest and the ties agree, twice in a row, since within the tolerances the
-    energy still changes; the outcome of the last round, the misses (#P [m]), whether they agree, and whether they contradict each other."""
+    """Relax, let the offsets grow, and repeat until all is at rest and the equations hold in two rounds running.
+
+    Two rounds, since within the tolerances the energy may still change.
+
+    Returns:
+        The outcome of the last round, the residuals (#P [m]), whether the equations hold, and whether they contradict
+        each other.
+    """
     seams = state.network.seams
     if seams is None:
         return relax(state), np.zeros(0), True, False
-    amiss: list[float] = []
+    violations: list[float] = []
     report_activity("sewing")
     while True:
-        steps = _ROUND + len(amiss) // _LONGER * _ROUND // 4
+        steps = _STEPS_PER_ROUND + len(violations) // _ROUNDS_UNTIL_LONGER * _STEPS_PER_ROUND // 4
         state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
-        outcome, misses = relax(state), _misses(state)
-        amiss.append(ties.amiss(misses))
-        furthest = np.abs(np.where(ties.soft > 0, 0.0, misses)).max(initial=0.0)
-        report_activity(f"sewing, step {state.steps}, {1e3 * furthest:.2g} mm amiss")
-        done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
-        contradictory = not done and _contradict(amiss)
+        outcome, residuals = relax(state), _residuals(state)
+        violations.append(equations.amiss(residuals))
+        farthest = np.abs(np.where(equations.soft > 0, 0.0, residuals)).max(initial=0.0)
+        report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
+        done = outcome.converged and len(violations) > 1 and max(violations[-2:]) <= 1.0
+        contradictory = not done and _stagnates(violations)
         if done or contradictory or state.steps >= options.max_steps:
-            return outcome, misses, amiss[-1] <= 1.0, contradictory
-        seams.offset.assign(seams.offset.numpy() + np.where(ties.soft > 0, 0.0, misses))
+            return outcome, residuals, violations[-1] <= 1.0, contradictory
+        seams.offset.assign(seams.offset.numpy() + np.where(equations.soft > 0, 0.0, residuals))
 
 
-def _contradict(amiss: Sequence[float]) -> bool:
-    """Whether ties no longer come nearer to agreeing, by what was amiss after each round."""
-    before, lately = amiss[:-_PATIENCE], amiss[-_PATIENCE:]
+def _stagnates(violations: Sequence[float]) -> bool:
+    """Return whether the equations no longer come nearer to holding, by their violation after each round."""
+    before, lately = violations[:-_PATIENCE], violations[-_PATIENCE:]
     return bool(before) and min(lately) > max(0.9 * min(before), 1.0)
 
 
-def _held(
+def _constraint_results(
     state: Relaxation,
-    ties: ConstraintEquations,
+    equations: ConstraintEquations,
     kinds: Sequence[tuple[str, str]],
-    misses: FloatArray,
-    alone: FloatArray,
-) -> list[Held]:
-    """Seams and constraints with their prices: half the work of each one's forces since the pieces lay alone."""
+    residuals: FloatArray,
+    unsewn: FloatArray,
+) -> list[ConstraintResult]:
+    """Return seams and constraints with their costs: half the work of each one's forces since the pieces lay unsewn."""
     seams = state.network.seams
     if seams is None:
         return []
-    pull = seams.stiffness.numpy() * (seams.offset.numpy() + misses)
-    price = ties.sums(0.5 * pull * _misses(state, alone))
+    force = seams.stiffness.numpy() * (seams.offset.numpy() + residuals)
+    cost = equations.sums(0.5 * force * _residuals(state, unsewn))
     largest = np.zeros(len(kinds))
-    np.maximum.at(largest, ties.group, np.where(ties.soft > 0, 0.0, np.abs(misses)))
-    summed = np.isfinite(ties.sum_tolerance)
-    amiss = np.where(summed, np.abs(ties.sums(misses)), largest)
+    np.maximum.at(largest, equations.group, np.where(equations.soft > 0, 0.0, np.abs(residuals)))
+    summed = np.isfinite(equations.sum_tolerance)
+    violation = np.where(summed, np.abs(equations.sums(residuals)), largest)
     return [
-        Held(name=name, kind=kind, price=float(price[number]), amiss=float(amiss[number]))
+        ConstraintResult(name=name, kind=kind, cost=float(cost[number]), violation=float(violation[number]))
         for number, (name, kind) in enumerate(kinds)
     ]
 
 
-def _held_folds(
-    state: Relaxation, whole: SewingNetwork, folds: Mapping[str, IntArray], alone: FloatArray
-) -> list[Held]:
-    """Folds with their prices, by the forces with which the lines that hold them push."""
+def _fold_results(
+    state: Relaxation, joined: SewingNetwork, folds: Mapping[str, IntArray], unsewn: FloatArray
+) -> list[ConstraintResult]:
+    """Return folds with their costs, by the forces of the lines that hold them."""
     if not folds:
         return []
     position = state.positions()
     freedom = state.network.bonds.freedom
-    kept = freedom.numpy().copy()
+    saved = freedom.numpy().copy()
     freedom.fill_(wp.vec2d(1.0, 1.0))
     force = state.forces()
-    freedom.assign(kept)
-    held = []
+    freedom.assign(saved)
+    results = []
     for name, ids in folds.items():
-        line = whole.numbers(name, ids)
-        moved = position[line, 0] - alone[line, 0]
-        price = -0.5 * float(force[line, 0] @ (moved - moved.mean()))
-        held.append(Held(name=f"{name} fold", kind="fold", price=price, amiss=float(np.ptp(position[line, 0]))))
-    return held
+        line = joined.numbers(name, ids)
+        moved = position[line, 0] - unsewn[line, 0]
+        cost = -0.5 * float(force[line, 0] @ (moved - moved.mean()))
+        results.append(
+            ConstraintResult(name=f"{name} fold", kind="fold", cost=cost, violation=float(np.ptp(position[line, 0])))
+        )
+    return results
 
 
-def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
-    """The piece's layout with these vertices on one line along the grain and no face mirrored.
+def _straighten_fold(piece: Flattening, vertices: IntArray | None) -> FloatArray:
+    """Lay some vertices of a piece on one line along the grain, without mirroring a face.
 
-    Moved sideways, each by as much as the line bends there; the move fades out across the piece, or it would press the faces beside.
+    Each vertex moves sideways by as much as the line bends there. The move fades out across the piece, since it would
+    press the faces beside the line otherwise.
 
     Raises:
         InputError: neither its pattern nor its development can be laid so.
@@ -327,12 +354,13 @@ def _straightened(piece: Flattening, vertices: IntArray | None) -> FloatArray:
     )
 
 
-def _energy(network: SpringNetwork, positions: FloatArray) -> float:
+def _potential(network: SpringNetwork, positions: FloatArray) -> float:
+    """Return the potential energy of a layout [J]."""
     return Relaxation(network, RelaxOptions(), start=positions).energies().potential
 
 
-def _misses(state: Relaxation, positions: FloatArray | None = None) -> FloatArray:
-    """#P, c of each tie [m], in the present layout or another one."""
+def _residuals(state: Relaxation, positions: FloatArray | None = None) -> FloatArray:
+    """Return the residual c of each equation (#P [m]), in the present layout or another one."""
     network = state.network
     at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
     return network.seam_misses(at)

@@ -26,9 +26,9 @@ class SewingNetwork:
 
     Attributes:
         pieces: by name.
-        first: of each, the number of its first vertex.
-        surface: all of them.
-        upright: of each, the two vertices that lie one above the other.
+        first: by piece, the number of its first vertex.
+        surface: all pieces as one mesh.
+        upright: by piece, the two vertices that lie one above the other.
     """
 
     def __init__(self, pieces: Mapping[str, Flattening]) -> None:
@@ -47,18 +47,21 @@ class SewingNetwork:
         }
 
     def numbers(self, name: str, vertices: IntArray) -> IntArray:
-        """Vertices of a piece in the whole's numbering."""
+        """Return the numbers of a piece's vertices in the joined mesh."""
         return np.asarray(vertices, dtype=np.int32) + np.int32(self.first[name])
 
     def network(self) -> SpringNetwork:
-        """The pieces' own springs and cells, as one network on their device, nothing sewn yet; it comes to rest as a whole."""
-        # A single piece's own one would be sewn for good.
+        """Return the springs and cells of all pieces as one network on their device, not sewn yet.
+
+        All pieces come to rest together.
+        """
+        # A copy: a single piece's own network must not stay sewn.
         network = replace(join_networks([piece.network for piece in self.pieces.values()]))
         network.parts = ()
         return network
 
     def split(self, state: Relaxation, *, converged: bool, seconds: float, residual: float) -> dict[str, Flattening]:
-        """Each piece with its share of the layout, and a stage "sew" in its history."""
+        """Return each piece with its part of the layout, and a stage "sew" in its history."""
         layout, sewn = state.positions(), {}
         for name, piece in self.pieces.items():
             own = layout[self.first[name] : self.first[name] + len(piece.positions)]
@@ -79,7 +82,7 @@ class SewingNetwork:
 
 
 def _upper_end(piece: Flattening) -> int:
-    """The last vertex of the datum that hangs together with its first one: a cut may part it."""
+    """Return the last vertex of the datum that is connected to its first one: a cut may part it."""
     if not piece.cuts:
         return int(piece.datum[-1])
     part = components(piece.faces)

@@ -1,10 +1,11 @@
-"""From a flattened surface, whole or parted by cuts, to a pattern: its border as edges, its cuts as darts and seams."""
+"""From a flattened surface, whole or cut into pieces, to a pattern: border as edges, cuts as darts and seams."""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
+from itertools import combinations
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.applied_cut import seam_kind
-from warpflat.garment.edge_rules import EdgeRules, unused
+from warpflat.garment.edge_rules import EdgeRules, unused_name
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
@@ -29,15 +30,15 @@ if TYPE_CHECKING:
 __all__ = ["check_edge_names", "pattern_of_surface"]
 
 
-#: The grain line keeps so far [m] from darts and holes, and stands aside in steps of so much [m] to get there.
+#: Least distance [m] of the grain line from darts and holes, and the steps [m] in which it is moved aside.
 GRAIN_CLEAR, GRAIN_STEP = 0.008, 0.010
 
 
 def check_edge_names(surfaces: Iterable[Surface], rules: EdgeRules, *, cuts: Iterable[str] = ()) -> None:
-    """See that every name in the rules can be an edge's, before anything is flattened.
+    """Check that every name in the rules can be an edge's, before anything is flattened.
 
-    Lines along the border name the edges, holes are numbered. Where its corners part them, and what lies between, shows in the plane only:
-    "bottom_2" and "edge_7" pass if there is a bottom, and a stretch of border without a line.
+    Lines along the border name the edges, holes are numbered. Where corners split them shows only in the plane.
+    Therefore "bottom_2" passes if there is a bottom, and "edge_7" if there is a stretch of border without a line.
 
     Args:
         surfaces: with their lines, cut as they are going to be.
@@ -69,16 +70,16 @@ def pattern_of_surface(
     size: str = "",
     seams: Sequence[NamedSeam] = (),
 ) -> tuple[Garment, tuple[str, ...]]:
-    """The pattern of one flattened surface, or of the pieces that cuts have left of it.
+    """Make the pattern of one flattened surface, or of the pieces into which cuts have parted it.
 
-    Cuts with a tip inside become darts of their names, those with two fish-eye darts, their tips moved back as the cut
-    asks for; what parted the surface is a seam between the two pieces.
+    A cut with one tip inside becomes a dart of its name, one with two tips a fish-eye dart; their tips are moved back
+    as the cut asks for. A cut that parts the surface is a seam between the two pieces.
 
     Args:
         results: pieces of different names.
         name: of the pattern.
-        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are called
-            "edge_1" and so on, counter-clockwise.
+        rules: kinds and allowances of edges and holes; an edge along a feature line has the line's name, others are
+            called "edge_1" and so on, counter-clockwise.
         size: for the label.
         seams: of the border, by the lines that are sewn to each other.
 
@@ -86,20 +87,20 @@ def pattern_of_surface(
         The pattern, and what was chosen on the way, one sentence each: names of edges that no piece has are left out.
 
     Raises:
-        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip
-            is moved back too far, or a named seam's side is no edge.
+        InputError: the rules have an unknown kind, a border crosses itself, a crack overlaps, its tip is moved back too
+            far, or a named seam's side is no edge.
     """
     rules = rules or EdgeRules()
     pieces = [_piece(result, size) for result in results]
-    named = [_named(seam, results, pieces) for seam in seams]
+    named = [_named_seam(seam, results, pieces) for seam in seams]
     names = {p.name: [*(edge.name for edge in p.edges), *(hole.name for hole in p.holes)] for p in pieces}
     rules, notes = rules.known(names)
     rules.check(names)
     pieces = [
         replace(
             piece,
-            edges=[_ruled(piece.name, edge, rules) for edge in piece.edges],
-            holes=[_ruled_hole(piece.name, hole, rules) for hole in piece.holes],
+            edges=[_apply_rules(piece.name, edge, rules) for edge in piece.edges],
+            holes=[_apply_rules_to_hole(piece.name, hole, rules) for hole in piece.holes],
         )
         for piece in pieces
     ]
@@ -107,8 +108,9 @@ def pattern_of_surface(
 
 
 def _piece(result: Flattening, size: str) -> Piece:
+    """Return one piece with its cuts as darts, and its grain."""
     darts: dict[str, tuple[int, int, int]] = {}
-    eyes: dict[str, Cut] = {}
+    fisheyes: dict[str, Cut] = {}
     tip_back: dict[str, float] = {}
     loops = border_loops(result.faces)
     for cut in result.cuts:
@@ -117,7 +119,7 @@ def _piece(result: Flattening, size: str) -> Piece:
             tip_back[title] = cut.tip_back
             kind = seam_kind(seam)
             if kind == "fish-eye":
-                eyes[title] = seam
+                fisheyes[title] = seam
             elif kind == "dart" and (places := _dart_places(loops, seam)) is not None:
                 darts[title] = places
     piece = piece_from_mesh(
@@ -127,17 +129,17 @@ def _piece(result: Flattening, size: str) -> Piece:
         features=MeshFeatures(
             lines=result.network.surface.lines,
             darts=darts,
-            fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in eyes.items()},
+            fisheyes={title: np.union1d(seam.left, seam.right) for title, seam in fisheyes.items()},
         ),
         size=size,
         fabric=result.fabric.name,
     )
-    for title in [title for title in (*darts, *eyes) if tip_back[title] > 0]:
+    for title in [title for title in (*darts, *fisheyes) if tip_back[title] > 0]:
         try:
             if title in darts:
-                piece = _drawn_back(piece, title, tip_back[title])
+                piece = _shorten_dart(piece, title, tip_back[title])
             else:
-                piece = _eye_drawn_back(piece, title, eyes[title], result.positions, tip_back[title])
+                piece = _shorten_fisheye(piece, title, fisheyes[title], result.positions, tip_back[title])
         except InputError as reason:
             raise InputError(f"piece {piece.name!r}: dart {title!r}: {reason}") from None
     drawn = [
@@ -146,12 +148,12 @@ def _piece(result: Flattening, size: str) -> Piece:
     ]
     on_border = np.isin(result.datum, np.concatenate(loops)).mean() > 0.5
     datum = None if on_border else result.positions[result.datum]
-    grain = _beside(grain_of(piece.outline, result, datum), piece)
+    grain = _clear_of_holes(grain_of(piece.outline, result, datum), piece)
     return replace(piece, darts=drawn, grain=grain)
 
 
-def _beside(grain: FloatArray, piece: Piece) -> FloatArray:
-    """The grain line, moved aside as far as it takes to keep off holes and fish-eye darts."""
+def _clear_of_holes(grain: FloatArray, piece: Piece) -> FloatArray:
+    """Move the grain line aside as far as it takes to keep off holes and fish-eye darts."""
     import shapely
 
     along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
@@ -165,8 +167,8 @@ def _beside(grain: FloatArray, piece: Piece) -> FloatArray:
     return grain
 
 
-def _drawn_back(piece: Piece, title: str, tip_back: float) -> Piece:
-    """The piece with a dart whose legs meet so far [m] short of the end of the cut, as the cut asks for."""
+def _shorten_dart(piece: Piece, title: str, tip_back: float) -> Piece:
+    """Move the tip of a dart back by `tip_back` [m] from the end of its cut."""
     left, right = piece.edge(f"{title}.left"), piece.edge(f"{title}.right")
     legs = pull_back(left.points, right.points[::-1], tip_back)
     moved = {left.name: legs[0], right.name: legs[1][::-1]}
@@ -174,8 +176,8 @@ def _drawn_back(piece: Piece, title: str, tip_back: float) -> Piece:
     return replace(piece, edges=edges)
 
 
-def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: FloatArray, tip_back: float) -> Piece:
-    """Likewise with both ends of a fish-eye dart."""
+def _shorten_fisheye(piece: Piece, title: str, seam: Cut, positions: FloatArray, tip_back: float) -> Piece:
+    """Move both tips of a fish-eye dart back by `tip_back` [m] from the ends of its cut."""
     station = fish_eye_measure(positions, seam.left, seam.right).station
     left, right = pull_back_eye(positions[seam.left], positions[seam.right], station, tip_back)
     ring = np.concatenate([right[:-1], left[:0:-1]])
@@ -183,7 +185,7 @@ def _eye_drawn_back(piece: Piece, title: str, seam: Cut, positions: FloatArray, 
 
 
 def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | None:
-    """Left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
+    """Return left mouth, tip and right mouth of a dart, counter-clockwise; None where it does not open at a border."""
     at_end = cut.left[-1] == cut.right[-1]
     tip = int(cut.left[-1] if at_end else cut.left[0])
     mouths = [int(side[0] if at_end else side[-1]) for side in (cut.left, cut.right)]
@@ -195,7 +197,8 @@ def _dart_places(loops: Sequence[IntArray], cut: Cut) -> tuple[int, int, int] | 
     return None
 
 
-def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
+def _apply_rules(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
+    """Return an edge with the kind and the allowance that the rules give it."""
     if edge.kind == "dart":
         # For a dart that is cut away, not folded.
         return replace(edge, allowance=rules.allowance(piece, edge.name, "seam"))
@@ -203,7 +206,8 @@ def _ruled(piece: str, edge: Edge, rules: EdgeRules) -> Edge:
     return replace(edge, kind=kind, allowance=rules.allowance(piece, edge.name, kind))
 
 
-def _ruled_hole(piece: str, hole: Hole, rules: EdgeRules) -> Hole:
+def _apply_rules_to_hole(piece: str, hole: Hole, rules: EdgeRules) -> Hole:
+    """Return a hole with the allowance that the rules give it."""
     if hole.kind == "dart":
         return hole
     kind = rules.kind(piece, hole.name, "seam")
@@ -213,15 +217,15 @@ def _ruled_hole(piece: str, hole: Hole, rules: EdgeRules) -> Hole:
     return replace(hole, allowance=DEFAULT_ALLOWANCE[kind] if width is None else width)
 
 
-def _named(seam: NamedSeam, results: Sequence[Flattening], pieces: Sequence[Piece]) -> Seam:
-    """A named seam by the edges that its two lines have become; these run against each other."""
+def _named_seam(seam: NamedSeam, results: Sequence[Flattening], pieces: Sequence[Piece]) -> Seam:
+    """Return a named seam by the edges that its two lines have become; these run against each other."""
     first, second = (_edges_along(line, results, pieces) for line in seam.sides)
     back = tuple(replace(part, reversed=True) for part in reversed(second))
     return Seam(name=seam.name, sides=(first, back), ease=seam.ease)
 
 
 def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piece]) -> tuple[SeamSide, ...]:
-    """The edges along a line, in order, as the border runs."""
+    """Return the edges along a line, in order, as the border runs."""
     for result, piece in zip(results, pieces, strict=True):
         ids = result.network.surface.lines.get(line)
         if ids is None:
@@ -238,27 +242,31 @@ def _edges_along(line: str, results: Sequence[Flattening], pieces: Sequence[Piec
 def _seams(
     results: Sequence[Flattening], pieces: Sequence[Piece], rules: EdgeRules, named: Sequence[Seam]
 ) -> tuple[Seam, ...]:
-    """Edges that are one curve in space are sewn together, besides those that are named."""
-    ends: dict[tuple[bytes, ...], list[tuple[SeamSide, FloatArray]]] = {}
+    """Return the seams: those that are named, and pairs of edges that are one curve in space."""
+    seams: list[Seam] = [*named]
+    for edges in _edges_by_ends(results, pieces, named):
+        for (first, curve), (second, other) in combinations(edges, 2):
+            against = not np.array_equal(curve, other)
+            if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
+                name = first.edge.removesuffix(".left").removesuffix(".right")
+                name = unused_name(name, {seam.name for seam in seams})
+                sides = ((first,), (replace(second, reversed=against),))
+                seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+    return tuple(seams)
+
+
+def _edges_by_ends(
+    results: Sequence[Flattening], pieces: Sequence[Piece], named: Sequence[Seam]
+) -> list[list[tuple[SeamSide, FloatArray]]]:
+    """Group the edges that may be sewn by their two ends in space, each with its curve (#P by 3 [m])."""
     done = {(side.piece, side.edge) for seam in named for row in seam.sides for side in row}
+    groups: dict[tuple[bytes, ...], list[tuple[SeamSide, FloatArray]]] = {}
     for result, piece in zip(results, pieces, strict=True):
         vertices = result.network.surface.vertices
         for edge in piece.edges:
-            if edge.kind not in ("seam", "cut") or edge.vertices is None:
-                continue
-            if (piece.name, edge.name) in done:
+            if edge.kind not in ("seam", "cut") or edge.vertices is None or (piece.name, edge.name) in done:
                 continue
             curve = vertices[edge.vertices]
-            key = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
-            ends.setdefault(key, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
-    seams: list[Seam] = [*named]
-    for edges in ends.values():
-        for i, (first, curve) in enumerate(edges):
-            for second, other in edges[i + 1 :]:
-                against = not np.array_equal(curve, other)
-                if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
-                    name = first.edge.removesuffix(".left").removesuffix(".right")
-                    name = unused(name, {seam.name for seam in seams})
-                    sides = ((first,), (replace(second, reversed=against),))
-                    seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
-    return tuple(seams)
+            ends = tuple(sorted((curve[0].tobytes(), curve[-1].tobytes())))
+            groups.setdefault(ends, []).append((SeamSide(piece=piece.name, edge=edge.name), curve))
+    return list(groups.values())

@@ -1,7 +1,7 @@
 """From a flattened garment to a pattern: the edges of its pieces with their kinds, its seams, its labels.
 
-Which edge is a seam, a hem or the fold follows from the form alone, so that a wrong name in a scene is found before
-anything is relaxed (:func:`plan_form`); the flat layouts give the shapes (:func:`pattern_of_garment`).
+Which edge is a seam, a hem or the fold follows from the form alone (:func:`plan_form`), so that a wrong name in a scene
+is found before anything is relaxed. The flat layouts give the shapes (:func:`pattern_of_garment`).
 """
 
 from __future__ import annotations
@@ -14,14 +14,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.garment.edge_rules import EdgeRules, unused
+from warpflat.garment.edge_rules import EdgeRules, unused_name
 from warpflat.garment.form_plan import (
     EdgePlan,
+    FormPlan,
     check_fold_grain,
     folds_of,
     plan_form,
 )
-from warpflat.garment.mirror_pieces import find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
@@ -41,11 +42,11 @@ ON_DATUM = 1e-3
 def pattern_of_garment(
     garments: Mapping[str, FlatGarment], *, name: str, rules: EdgeRules | None = None, sample_size: str | None = None
 ) -> tuple[Garment, tuple[str, ...]]:
-    """The pattern of a garment in one or more sizes.
+    """Make the pattern of a garment in one or more sizes.
 
-    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece whose
-    centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the centre. Notes
-    say so.
+    Of two pieces that are each other's mirror images in every size the first is drawn, to be cut twice. A half piece
+    whose centre did not come out straight cannot lie on the fold: it is cut twice, in every size, with a seam in the
+    centre. Notes say so.
 
     Args:
         garments: flattened, by size; "" where there is none.
@@ -57,52 +58,84 @@ def pattern_of_garment(
         The pattern, and what was chosen on the way, one sentence each.
 
     Raises:
-        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline crosses itself,
-            or the sizes differ in their edges.
+        InputError: the rules name an edge that does not exist, the grain is oblique to a fold, a piece's outline
+            crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
-    bent = _bent_folds(garments)
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
-    folds = {name: edge for name, edge in folds_of(form, plan).items() if name not in bent}
+    bent = _bent_folds(garments)
+    folds = {piece: edge for piece, edge in folds_of(form, plan).items() if piece not in bent}
     opened = {name: piece.fold for name, piece in form.pieces.items() if piece.fold and name not in folds}
-    for flat in (garment.pieces[name] for garment in garments.values() for name in folds):
+    for flat in (garment.pieces[piece] for garment in garments.values() for piece in folds):
         check_fold_grain(folds, flat.grain_angle)
     pieces = {
-        size: tuple(
-            _piece(
-                flat, garment.form.pieces[piece], plans[size].edges[piece], rules=rules, size=size,
-                quantity=2 if piece in opened else plan.quantities[piece], open_fold=piece in opened,
-            )
-            for piece, flat in garment.pieces.items()
-        )
+        size: _pieces(garment, plans[size], rules, size=size, opened=set(opened), quantities=plan.quantities)
         for size, garment in garments.items()
-    }  # fmt: skip
-    seams = plan.seams
-    for piece, edge in opened.items():
-        side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=unused(edge, {seam.name for seam in seams}), sides=(side, side)))
-    twins = find_mirror_pairs(garments, pieces, seams)
-    seams = sew_mirror_pairs(seams, twins)
-    drawn = {twin.of for twin in twins}
-    pieces = {
-        size: tuple(
-            replace(piece, quantity=2 * piece.quantity) if piece.name in drawn else piece
-            for piece in row
-            if piece.name not in {twin.name for twin in twins}
-        )
-        for size, row in pieces.items()
     }
-    notes = tuple(f"{twin.of}: cut twice, once mirrored, it serves for {twin.name} too" for twin in twins)
+    seams = _with_opened_folds(plan.seams, opened)
+    pairs = find_mirror_pairs(garments, pieces, seams)
+    drawn = {size: _without_mirror_images(row, pairs) for size, row in pieces.items()}
+    notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
-    return Garment(name=name, pieces=pieces, seams=seams, sample_size=sample_size), notes
+    return Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size), notes
+
+
+def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
+    """Add a seam in the centre of each piece that is cut twice instead of on the fold."""
+    for piece, edge in opened.items():
+        side = (SeamSide(piece=piece, edge=edge),)
+        seams = (*seams, Seam(name=unused_name(edge, {seam.name for seam in seams}), sides=(side, side)))
+    return seams
+
+
+def _pieces(
+    garment: FlatGarment,
+    plan: FormPlan,
+    rules: EdgeRules,
+    *,
+    size: str,
+    opened: set[str],
+    quantities: Mapping[str, int],
+) -> tuple[Piece, ...]:
+    """Return all pieces of one size; those in `opened` are halves that cannot lie on the fold and are cut twice."""
+    return tuple(
+        _piece(
+            flat,
+            garment.form.pieces[name],
+            plan.edges[name],
+            rules=rules,
+            size=size,
+            quantity=2 if name in opened else quantities[name],
+            open_fold=name in opened,
+        )
+        for name, flat in garment.pieces.items()
+    )
+
+
+def _without_mirror_images(pieces: Sequence[Piece], pairs: Sequence[MirrorPair]) -> tuple[Piece, ...]:
+    """Leave out the pieces that are cut by another one's pattern, which is cut twice as often."""
+    drawn, left_out = {pair.of for pair in pairs}, {pair.name for pair in pairs}
+    return tuple(
+        replace(piece, quantity=2 * piece.quantity) if piece.name in drawn else piece
+        for piece in pieces
+        if piece.name not in left_out
+    )
 
 
 def grain_of(outline: FloatArray, flat: Flattening, datum: FloatArray | None = None) -> FloatArray:
-    """2 by 2 [m], along the warp: on the datum (#P by 2 [m]) where that is straight, else through the widest place."""
+    """Return the grain line along the warp (2 by 2 [m]), on the datum where that is straight.
+
+    Elsewhere it runs through the widest place.
+
+    Args:
+        outline: #P by 2 [m].
+        flat: the piece.
+        datum: #P by 2 [m]; None if it does not lie inside the piece.
+    """
     from warpflat.fabric.fabric import grain_axes
 
     x, y = grain_axes(flat.grain_angle)[0]
@@ -128,12 +161,12 @@ def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: Flo
     found: dict[str, FloatArray] = {}
     for name, line in lines.items():
         for stretch in inner_stretches(np.asarray(line), edges):
-            found[unused(name, found)] = flat[stretch]
+            found[unused_name(name, found)] = flat[stretch]
     return found
 
 
 def _bent_folds(garments: Mapping[str, FlatGarment]) -> dict[str, float]:
-    """Half pieces whose fold strays from straight in some size, and by how much [m] at most."""
+    """Return half pieces whose fold strays from straight in some size, and by how much [m] at most."""
     bent: dict[str, float] = {}
     for garment in garments.values():
         for name, flat in garment.pieces.items():
@@ -159,6 +192,7 @@ def _piece(
     quantity: int,
     open_fold: bool,
 ) -> Piece:
+    """Return one piece of a garment with its edges, internal lines and grain."""
     name = piece.surface.name
     edges = []
     for part in plan:

@@ -140,7 +140,8 @@ def cut_hole(ring: FloatArray, width: float) -> FloatArray | None:
         width: allowance [m].
 
     Returns:
-        #Q by 2 [m], counter-clockwise, closed, the first point not repeated; None where the hole is too small or too narrow.
+        #Q by 2 [m], counter-clockwise, closed, the first point not repeated; None where the hole is too small or too
+        narrow.
     """
     import shapely
 

@@ -63,7 +63,7 @@ class _Border:
 
 
 def find_corners(ring: FloatArray, angle: float) -> set[int]:
-    """Return the vertices at which the border turns by more than `angle` [rad], and most within the window around them."""
+    """Return vertices where the border turns by more than `angle` [rad], and most within the window around them."""
     border = _Border(ring)
     turns = np.abs(border.turning_at_vertices())
     corners = _narrow_end_corners(border, angle)
@@ -77,9 +77,9 @@ def find_corners(ring: FloatArray, angle: float) -> set[int]:
 def _narrow_end_corners(border: _Border, angle: float) -> list[int]:
     """Return the corners at the ends of straps, ties and bindings, which lie within one window of each other.
 
-    Between two such corners the border turns back by more than `END`. A tooth of a ragged border turns back too, but the
-    border turns the other way beside it. Each corner turns by more than `angle` [rad] over a quarter of the distance to the
-    other one, as no rounded end does.
+    Between two such corners the border turns back by more than `END`. A tooth of a ragged border turns back too, but
+    the border turns the other way beside it. Each corner turns by more than `angle` [rad] over a quarter of the
+    distance to the other one, as no rounded end does.
     """
     found: list[tuple[float, float, int, int]] = []
     for steps in range(1, border.count // 2):

@@ -25,8 +25,8 @@ LENGTH = 6e-5
 LENGTH_WEIGHT = 8e-6
 #: A curve of another length than its points' chords may lie this many tolerances from them.
 OTHER_LENGTHS = 3.0
-#: A curve that must keep near its points gets the lengths of one that runs inside them by these shares of the tolerance,
-#: until it does keep near. The second number says by how much less its lengths then count.
+#: A curve that must keep near its points gets the lengths of one that runs inside them by these shares of the
+#: tolerance, until it does keep near. The second number says by how much less its lengths then count.
 INSIDE, NEAR = (0.8, 0.5, 0.2, 0.0), 4.0
 #: The chords by which a curve is drawn or cut stay this close [m] to it.
 CHORD = 2e-5
@@ -45,7 +45,7 @@ class Curve:
     straight: BoolArray
 
     def sample(self, tolerance: float = CHORD) -> FloatArray:
-        """Return points on the curve (#P by 2 [m]) whose chords stray at most `tolerance` [m]; ends and joints are exact."""
+        """Return points on the curve (#P by 2 [m]) whose chords stray at most `tolerance` [m]; joints are exact."""
         parts = []
         for control, straight in zip(self.bezier, self.straight, strict=True):
             if straight:
@@ -68,7 +68,7 @@ class Curve:
         return np.concatenate([self.bezier[:, 0], self.bezier[-1:, 3]])
 
     def transformed(self, matrix: FloatArray) -> Curve:
-        """The curve under a 2 by 3 affine matrix."""
+        """Return the curve under a 2 by 3 affine matrix."""
         return Curve(bezier=self.bezier @ matrix[:, :2].T + matrix[:, 2], straight=self.straight)
 
     def reversed(self) -> Curve:
@@ -86,18 +86,18 @@ def fit_curve(
     """Fit a smooth curve near the points, of few segments, that is as long as the line of chords through them.
 
     The ends are exact, so neighbouring edges still share their corners; a sharp inner vertex stays a corner. Between
-    corners the curve is a smoothing cubic spline (Dierckx's FITPACK through scipy) whose coefficients are then moved until
-    its length up to every point is that of the chords. The result is in Bézier form.
+    corners the curve is a smoothing cubic spline (Dierckx's FITPACK through scipy) whose coefficients are then moved
+    until its length up to every point is that of the chords. The result is in Bézier form.
 
-    A curve through the points themselves would be longer than their chords by as much as it bends. The two sides of a seam,
-    equal on the mesh, would then differ once they are drawn. An arc of radius R through chords h keeps their length if it
-    runs h^2 / (24 R) inside: 0.07 mm for chords of 10 mm on a radius of 60 mm. Where that is farther than the tolerance,
-    `near` says which of the two is given up.
+    A curve through the points themselves would be longer than their chords by as much as it bends. The two sides of a
+    seam, equal on the mesh, would then differ once they are drawn. An arc of radius R through chords h keeps their
+    length if it runs h^2 / (24 R) inside: 0.07 mm for chords of 10 mm on a radius of 60 mm. Where that is farther than
+    the tolerance, `near` says which of the two is given up.
 
     Args:
         points: #P by 2 [m]; repeated points are dropped.
-        tolerance: largest distance [m] of a point from the curve, besides what equal length takes. One wider than that of
-            clean borders is meant to smooth a zigzag away, and the curve's length counts less.
+        tolerance: largest distance [m] of a point from the curve, besides what equal length takes. One wider than that
+            of clean borders is meant to smooth a zigzag away, and the curve's length counts less.
         lengths: #P, the wanted length [m] of the curve up to each point; None for that of the chords.
         near: keep within the tolerance everywhere, and the chords' length only as far as that allows.
     """
@@ -123,14 +123,15 @@ def fit_curve(
 def _bends_more_at_end(points: FloatArray) -> bool:
     """Return whether a line bends more in its second half, and is fitted from its other end.
 
-    FITPACK places its knots from one end to the other, and the left and the right half of a piece run against each other.
+    FITPACK places its knots from one end to the other, and the left and the right half of a piece run against each
+    other.
     """
     arc = arc_lengths(points)
     return bool(np.abs(turning_angles(points)) @ (arc[1:-1] / arc[-1] - 0.5) > 1e-9)
 
 
 def _corners(points: FloatArray, tolerance: float) -> list[int]:
-    """Return the inner points that are corners; along a zigzag only those that are corners over a longer stretch too."""
+    """Return the inner points that are corners; along a zigzag, those that are so over a longer stretch too."""
     sharp = CORNER if tolerance <= TOLERANCE else CORNER_SMOOTHED
     found: list[int] = (np.flatnonzero(np.abs(turning_angles(points)) > sharp) + 1).tolist()
     if tolerance <= TOLERANCE:
@@ -179,9 +180,9 @@ class _FitGoal:
         points: #P by 2 [m], what it runs along.
         arc: #P, the wanted length [m] up to each point.
         tolerance: [m].
-        room: largest distance [m] of a point from a curve that need not bend.
-        bend: how far [m] a curve of the same length leaves the corners of a coarse border on one side, and its chords on the
-            other, times 4 to 24.
+        room: largest distance [m] of a point from a curve along a straight stretch.
+        bend: largest product of turning angle and step along the points [m]. A curve of equal length strays from a coarse
+            border by a share of it, to one side at corners and to the other side at chords.
         slack: by how much less an error of length counts.
         strict: the room holds everywhere, whatever the bend.
     """
@@ -195,7 +196,7 @@ class _FitGoal:
     strict: bool
 
     def score(self, curve: Curve, length_error: float) -> float:
-        """Return the larger of both errors, of place and of length [m], over what is allowed; infinite if it is too far."""
+        """Return the larger of both errors, of place and length, over what is allowed; infinite if it is too far."""
         samples = curve.sample(self.tolerance / 10)
         stray = _stray(samples, self.points)
         if stray > self.room + self.bend / 6 or _stray(self.points, samples) > self.room + self.bend / 4:
@@ -269,7 +270,8 @@ def _length_keeping_spline(
         length_weight: [m], an error of length that counts as much as one tolerance of place.
 
     Returns:
-        Control points (#S by 4 by 2), and by how much [m] the length up to some point is off; None if there is no curve.
+        Control points (#S by 4 by 2), and by how much [m] the length up to some point is off; None if there is no
+        curve.
     """
     from scipy.interpolate import BSpline, splprep
 

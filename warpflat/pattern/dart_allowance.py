@@ -42,8 +42,8 @@ def dart_allowance(
 ) -> tuple[tuple[FloatArray, FloatArray], list[Geometry], list[str]]:
     """Prolong a dart's legs through the allowance, and shape the cap over it.
 
-    The neighbour's cut line is mirrored on the leg, then on the fold, so that the cap folds flat. A note says where the cap
-    would have to reach too far for that. The strips beside the dart are trimmed in place.
+    The neighbour's cut line is mirrored on the leg, then on the fold, so that the cap folds flat. A note says where the
+    cap would have to reach too far for that. The strips beside the dart are trimmed in place.
 
     Returns:
         The unit vectors in which the left and the right leg run on, what is added to the strips, and notes.
@@ -84,8 +84,8 @@ def dart_allowance(
 def _prolonged_legs(wedge: Wedge, left: Side, right: Side) -> tuple[FloatArray, FloatArray]:
     """Return the unit vectors in which a dart's legs run on through the allowance.
 
-    They run straight on, but bend at a hem so that it folds up flat: what is turned up is then as long, from side to side, as
-    what it lies on. Both legs bend by the same angle, so that the wedge can be folded on its middle.
+    They run straight on, but bend at a hem so that it folds up flat: what is turned up is then as long, from side to
+    side, as what it lies on. Both legs bend by the same angle, so that the wedge can be folded on its middle.
     """
     to_left, to_right = unit_vector(wedge.left[0] - wedge.tip), unit_vector(wedge.right[-1] - wedge.tip)
     if not left.kind == right.kind == "hem":

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from itertools import chain
 
 import numpy as np
 
@@ -93,12 +94,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
     holes = {hole.name: _moved(hole.points, frame) for hole in piece.holes}
     fisheyes = {hole.name: smooth_fisheye(holes[hole.name], tolerance) for hole in piece.holes if hole.kind == "dart"}
     cutouts = {hole.name: _cutout(hole, holes[hole.name]) for hole in piece.holes if hole.kind == "cutout"}
-    internal = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
-    internal = {name: smooth_line(line) if tolerance is None else line for name, line in internal.items()}
+    internal = _internal_lines(piece, frame, tolerance)
     sew_line = np.concatenate([edge.line[:-1] for edge in edges])
     grain = default_grain(sew_line, list(holes.values())) if piece.grain is None else _moved(piece.grain, frame)
-    obstacles = [grain, *internal.values()]
-    obstacles += [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
+    leg_lines = [np.concatenate([legs.left.line, legs.right.line]) for legs in darts.values()]
     widened = replace(piece, edges=[replace(edge.edge, allowance=edge.width) for edge in edges])
     return DraftedPiece(
         piece=piece,
@@ -117,13 +116,13 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
             garment,
             (sew_line, cut.points),
             list(holes.values()),
-            obstacles,
+            [grain, *internal.values(), *leg_lines],
             [edge.line for edge in edges if edge.kind == "fold"],
         ),
         notes=(
             *cut.notes,
             *_ragged_edges(edges, tolerance),
-            *(note for legs in darts.values() for note in dart_notes(legs)),
+            *chain.from_iterable(map(dart_notes, darts.values())),
             *_small_cutouts(piece, cutouts),
             *_uneven_fisheyes(fisheyes),
         ),
@@ -133,6 +132,12 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
 def _wedges(darts: Mapping[str, DartLegs]) -> dict[str, Wedge]:
     """Return the darts that are folded."""
     return {name: legs.wedge for name, legs in darts.items() if legs.wedge is not None}
+
+
+def _internal_lines(piece: Piece, frame: FloatArray, tolerance: float | None) -> dict[str, FloatArray]:
+    """Return the lines inside, without the teeth in which they run along a mesh unless a tolerance is given."""
+    lines = {name: _moved(line, frame) for name, line in piece.internal_lines.items()}
+    return {name: smooth_line(line) if tolerance is None else line for name, line in lines.items()}
 
 
 def _drill_holes(darts: Sequence[DraftedDart], fisheyes: Mapping[str, FloatArray]) -> tuple[DrillHole, ...]:
@@ -260,7 +265,7 @@ def _cutout(hole: Hole, points: FloatArray) -> DraftedCutout:
 
 
 def nest_label(pieces: Sequence[DraftedPiece]) -> Label:
-    """Return the label of sizes that lie upon each other: the middle one's, moved beside all if it stands beside its piece."""
+    """Return the label of sizes that lie upon each other: the middle one's, moved beside all if it has a leader."""
     middle = pieces[len(pieces) // 2]
     if middle.label.leader is None:
         return middle.label

@@ -34,10 +34,10 @@ class DraftedEdge:
         edge: as it came in.
         curve: fitted, from corner to corner.
         line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
-        width: the allowance [m] that it got.
+        width: its allowance [m].
         places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
-        fit_error: how far [m] the curve keeps from these points, at most.
-        tolerance: how far [m] it was allowed to, beside what equal length takes.
+        fit_error: largest distance [m] of the curve from these points.
+        tolerance: the distance [m] that was allowed, besides what equal length takes.
     """
 
     edge: Edge
@@ -64,7 +64,15 @@ class DraftedEdge:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedDart:
-    """A dart's lines: the legs are edges; `fold` is #P by 2 [m], from the tip to the cut line (None where it is cut)."""
+    """The lines of a dart, whose legs are edges.
+
+    Attributes:
+        dart: as it came in.
+        tip: [m].
+        fold: #P by 2 [m], from the tip to the cut line; None where the dart is cut away.
+        fold_to: side to which the wedge is pressed, "left" or "right"; "" where it is cut away.
+        opening: of the mouth [m].
+    """
 
     dart: Dart
     tip: FloatArray
@@ -75,7 +83,12 @@ class DraftedDart:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedCutout:
-    """A hole that is cut out: its sewing and its cutting line (#P by 2 [m], closed), one if its allowance is 0 [m]."""
+    """A hole that is cut out.
+
+    Attributes:
+        sew_line, cut_line: #P by 2 [m], closed; one line if the allowance is 0.
+        width: allowance [m].
+    """
 
     sew_line: FloatArray
     cut_line: FloatArray
@@ -92,7 +105,7 @@ class DrillHole:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedPiece:
-    """One piece in one size with all its lines, in metres, grain upwards, its fixed point of grading in the origin.
+    """One piece in one size with all its lines, in metres: grain upwards, the fixed point of grading in the origin.
 
     Attributes:
         piece: as it came in.
@@ -103,7 +116,7 @@ class DraftedPiece:
         internal_lines, fisheyes: #P by 2 [m] by name; the latter closed.
         cutouts: by name.
         grain: 2 by 2 [m], from and to, upwards.
-        label: what is written on it, and where.
+        label: its text and place.
         notes: what the cutter should know, one sentence each.
     """
 
@@ -140,14 +153,24 @@ class DraftedPiece:
         return tuple(edge for edge in self.edges if edge.kind == "fold")
 
     def edge(self, name: str) -> DraftedEdge:
-        """The edge of that name; InputError with the nearest name otherwise."""
+        """Return the edge of that name.
+
+        Raises:
+            InputError: there is none; gives the nearest name.
+        """
         self.piece.edge(name)
         return next(edge for edge in self.edges if edge.name == name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedGarment:
-    """All pieces by size, and how well the sides of every seam agree."""
+    """A garment ready for the cutting table.
+
+    Attributes:
+        garment: as it came in.
+        pieces: by size.
+        seams: how well the two sides of every seam agree.
+    """
 
     garment: Garment
     pieces: Mapping[str, tuple[DraftedPiece, ...]]
@@ -158,20 +181,20 @@ class DraftedGarment:
         return self.garment.name
 
     def all_sizes(self, name: str) -> tuple[DraftedPiece, ...]:
-        """One piece in every size, in the order of the sizes."""
+        """Return one piece in every size, in the order of the sizes."""
         return tuple(p for pieces in self.pieces.values() for p in pieces if p.name == name)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Notch:
-    """One notch.
+    """A mark on the cut line that meets its counterpart when a seam is sewn.
 
     Attributes:
         seam: the seam, or the dart, that it belongs to.
         edge: the edge on which it stands.
         length: its place [m] along the seam from the seam's start, measured on this side.
         at: its point [m] on the sewing line.
-        base: where it starts on the cut line [m]; a double notch has two.
+        base: its start on the cut line [m]; a double notch has two.
         direction: unit vector into the piece.
         depth: [m].
     """
@@ -191,16 +214,16 @@ class Notch:
 
 @dataclass(frozen=True, kw_only=True)
 class SeamReport:
-    """How the two sides of a seam agree in one size.
+    """The lengths of the two sides of a seam in one size.
 
     Attributes:
         name, size: of the seam.
         sides: each side's edges, as "piece.edge + piece.edge".
         length_mm: of both sides [mm].
-        ease: what the seam asks for.
-        difference_mm: what the second side is too long (or, negative, too short) for that ease [mm].
-        local_mm: the same over the worst 50 mm of the first side, without its sign, measured between the vertices of
-            the mesh that both sides share; None where they come from no mesh, or not with the same vertices.
+        ease: by how much the second side is meant to be longer, as a share.
+        difference_mm: by how much the second side is too long (or, negative, too short) for that ease [mm].
+        local_mm: the largest difference over 50 mm of the first side, without its sign, measured between the vertices
+            of the mesh that both sides share; None where they come from no mesh, or from different vertices.
     """
 
     name: str

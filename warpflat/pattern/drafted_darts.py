@@ -20,7 +20,8 @@ from warpflat.surface.cut.dart_legs import are_curved
 __all__ = ["DartLegs", "dart_legs", "dart_line", "dart_notes", "fisheye_legs", "smooth_fisheye"]
 
 
-#: Allowance [m] of the legs of a dart that is cut away, where they name none, and the least width between both allowances.
+#: Allowance [m] of the legs of a dart that is cut away, where they name none, and the least width between both
+#: allowances.
 LEG_ALLOWANCE, LEAST_WASTE = 0.010, 0.005
 #: Points of the fold between curved legs.
 FOLD_POINTS = 33
@@ -58,7 +59,7 @@ class DartLegs:
 
 
 def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]:
-    """Decide which darts of a piece are folded, and give the legs their allowance: none, or a seam's if they are cut."""
+    """Decide which darts of a piece are folded, and give all legs their allowance: none if folded, else a seam's."""
     by_name = {edge.name: edge for edge in edges}
     found = {}
     for dart in piece.darts:
@@ -88,7 +89,7 @@ def _leg_width(leg: DraftedEdge) -> float:
 
 
 def _fold_side(left: FloatArray, right: FloatArray) -> str:
-    """Return the side to which a wedge is pressed: downwards, or towards the middle if the dart lies along the grain."""
+    """Return the side to which a wedge is pressed: downwards, or towards the middle for a dart along the grain."""
     tip = left[-1]
     away = (left[0] + right[-1]) / 2 - tip
     if abs(away[0]) > abs(away[1]):

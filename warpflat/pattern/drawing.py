@@ -40,7 +40,8 @@ class Stroke:
     """One line of a drawing.
 
     Attributes:
-        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout", "leader".
+        role: "cut", "sew", "hem", "fold", "dart", "dart_fold", "internal", "grain", "notch", "drill", "cutout",
+            "leader".
         name: what it is called in files, unique among the strokes of a piece; empty for decoration.
         points: #P by 2 [m].
         closed: the last point joins the first.
@@ -258,7 +259,7 @@ def _text_box(words: Words) -> Polygon:
 
 
 def _words_along(name: str, line: FloatArray, share: float, half: float, *, inwards: bool) -> Words:
-    """Write a name beside a line, upright: above it, or to its left where the line is a border, so that it stands inside."""
+    """Write a name beside a line, upright: above it, or to its left (`inwards`) if the line is a border."""
     length = max(float(arc_lengths(line)[-1]), 1e-12)
     near, far = resample(line, share - half / length), resample(line, share + half / length)
     along = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
@@ -339,7 +340,7 @@ def _most_graded_edge(pieces: tuple[DraftedPiece, ...]) -> str:
 
 
 def _size_tags(piece: DraftedPiece, edge: str, index: int, count: int) -> list[Words]:
-    """Write the size on its own cut line, staggered along an edge so that the tags of neighbouring sizes do not collide."""
+    """Write the size on its own cut line, staggered along an edge so that the tags of sizes do not collide."""
     import shapely
 
     if not edge:

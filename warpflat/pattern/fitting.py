@@ -22,9 +22,9 @@ Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
 #: A clean border has at most this many curves, and one more for each of these lengths [m].
 CURVES, CURVE = 4, 0.012
-#: In waves shorter than about `WAVE` [m] a clean border turns back and forth by at most this [rad], and this for each metre.
-#: The borders of garments that follow the mesh stay below 2 rad/m; a cut across the mesh, whose triangles jut out in turns, reaches
-#: 7 and more.
+#: In waves shorter than about `WAVE` [m] a clean border turns back and forth by at most this [rad], and this for each
+#: metre. The borders of garments that follow the mesh stay below 2 rad/m; a cut across the mesh, whose triangles jut
+#: out in turns, reaches 7 and more.
 SWING, SWING_PER_METRE = 0.3, 3.5
 WAVE = 0.04
 #: Inside a piece, waves of these numbers of mesh edges are smoothed away, the short ones first, until a line is clean.
@@ -40,12 +40,12 @@ def fit_edges(
 ) -> dict[EdgeKey, tuple[Curve, float]]:
     """Fit a curve to every edge, and return it with how far [m] it was allowed to keep from the points.
 
-    Each curve keeps within the tolerance of its points, and as near to the length of its chords as that allows. Where the
-    sides of a seam would then differ too much, as on coarse meshes, both keep the length of their chords all along, and run
-    as far from their points as that takes (see :func:`fit_curve`). Where a border is so ragged that its curve would be all
-    wiggles, a wider tolerance smooths them away, and their length with them. The other side of the seam or dart gets the
-    same tolerance, and both get the lengths of the shorter one. Where curves would cross, as on coarse meshes in narrow
-    places, the chords stay.
+    Each curve keeps within the tolerance of its points, and as near to the length of its chords as that allows. Where
+    the sides of a seam would then differ too much, as on coarse meshes, both keep the length of their chords all along,
+    and run as far from their points as that takes (see :func:`fit_curve`). Where a border is so ragged that its curve
+    would be all wiggles, a wider tolerance smooths them away, and their length with them. The other side of the seam or
+    dart gets the same tolerance, and both get the lengths of the shorter one. Where curves would cross, as on coarse
+    meshes in narrow places, the chords stay.
 
     Args:
         pieces: of one size.

@@ -62,8 +62,8 @@ def piece_from_mesh(
 
     The border is split at its corners, at the ends of darts and wherever a feature line begins or ends to run along
     it. An edge is named by the line along it ("side"; a second stretch is "side_2"), others "edge_1", "edge_2" ...;
-    the legs of a dart "NAME.left" and "NAME.right". Border loops inside become cutouts and fish-eye darts, feature lines
-    inside internal lines.
+    the legs of a dart "NAME.left" and "NAME.right". Border loops inside become cutouts and fish-eye darts, feature
+    lines inside internal lines.
 
     Args:
         faces: #F by 4, -1 in the last column of a triangle, consistently wound.
@@ -113,7 +113,7 @@ def _front_up(faces: IntArray, flat: FloatArray, name: str) -> tuple[FloatArray,
 def _find_darts(
     flat: FloatArray, loop: IntArray, corners: set[int], given: Mapping[str, DartPlaces], name: str
 ) -> tuple[dict[str, DartPlaces], set[int]]:
-    """Return the places of all darts, those that are given and the cracks that are found, and the corners with theirs."""
+    """Return the places of all darts, given ones and cracks that are found, and the corners with theirs."""
     darts = _dart_places(loop, given, name)
     corners = corners | {place for places in darts.values() for place in places}
     found = find_cracks(flat[loop], corners, {places[1] for places in darts.values()})

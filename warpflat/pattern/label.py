@@ -24,15 +24,16 @@ TITLE, TEXT, LEADING = 0.007, 0.0045, 1.55
 #: Distances [m] of labels from the sewing line and holes, from other lines, and from a fold, whose bracket and arrows
 #: are 16 mm wide; the second row holds where there is little room.
 CLEARANCES = ((0.004, 0.006, 0.022), (0.0015, 0.0025, 0.0165))
-#: Smallest share of its full size at which a label stands on its piece, not beside it; below the second share it may come
-#: nearer to lines.
+#: Smallest share of its full size at which a label stands on its piece, not beside it; below the second share it may
+#: come nearer to lines.
 LEAST, ENOUGH = 0.3, 0.6
 #: A label beside its piece: its size, its greatest width [m], its distance from the piece [m], and how far [m] its
 #: leader reaches into the cloth.
 BESIDE_SIZE, BESIDE_WIDTH, BESIDE_GAP, LEADER = 0.6, 0.075, 0.010, 0.005
 #: Room is sought by ellipses of these ratios of height to width: labels are wide, wrapped ones less so.
 ELLIPSES = (0.4, 0.15, 1.0)
-#: Factor by which a label must get larger to be turned, to have one more line break, to have a name as small as the rest.
+#: Factor by which a label must get larger to be turned, to have one more line break, to have a name as small as the
+#: rest.
 TURNED, BROKEN, SMALL_TITLE = 1.25, 1.06, 1.15
 #: Lines may be broken at these shares of the widest one.
 BREAKS = (0.75, 0.55, 0.4, 0.28)
@@ -44,7 +45,8 @@ class Label:
 
     Attributes:
         at: the centre [m].
-        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts the rows of a line.
+        lines: (text, height of capitals [m]) from top to bottom, the first in bold; a line break parts the rows of a
+            line.
         angle: [rad] counter-clockwise.
         leader: 2 by 2 [m], from a label beside its piece to the cloth; None where the label stands on the piece.
     """
@@ -132,7 +134,7 @@ def place_label(
     obstacles: Sequence[FloatArray],
     folds: Sequence[FloatArray],
 ) -> Label:
-    """Place the label on the widest free place of a piece, smaller where there is little room, beside it where there is none.
+    """Place the label on the widest free place of a piece, smaller if need be, or beside the piece.
 
     Args:
         piece: whose label it is.
@@ -169,7 +171,7 @@ def _relative_size(label: Label) -> float:
 
 
 def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: float = LEAST) -> Label | None:
-    """Fit lines into an area [m] as large as they get, upright or turned, wrapped or not; None where they get too small.
+    """Fit lines into an area [m] as large as they get, turned or wrapped if that helps; None if too small.
 
     Args:
         area: where there is room [m].

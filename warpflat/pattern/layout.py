@@ -99,7 +99,7 @@ def lay_out(
 
 
 def _rows(extents: Sequence[FloatArray], width: float, gap: float) -> list[list[tuple[int, float]]]:
-    """Return rows of (box, left edge): boxes by falling height, each in the first row with room (first fit decreasing)."""
+    """Return rows of (box, left edge): boxes by falling height, each in the first row with room."""
     rows: list[list[tuple[int, float]]] = []
     ends: list[float] = []
     for i in sorted(range(len(extents)), key=lambda i: (-float(extents[i][1]), i)):

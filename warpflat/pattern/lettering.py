@@ -1,4 +1,4 @@
-"""The letters of every drawing of a pattern, DejaVu Sans: how wide a text is, and where its lines are broken."""
+"""The letters of every drawing of a pattern, DejaVu Sans: the width of a text, and its line breaks."""
 
 from __future__ import annotations
 
@@ -13,15 +13,21 @@ __all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrap
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 #: Height of capitals over the font's size.
 CAPITALS = 0.729
-#: Width over the font's size of letters that the font lacks: other fonts' are no wider than their body.
+#: Width over the font's size of letters that the font lacks: in other fonts they are no wider than their body.
 UNKNOWN = 1.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Words:
-    """One line of text, centred on `at` [m]; `height` of its capitals [m], `angle` [rad] counter-clockwise.
+    """One line of text.
 
-    A `tag` names a size on its own line: it takes that line's colour, on a white ground.
+    Attributes:
+        text: what it says.
+        at: its centre [m].
+        height: of its capitals [m].
+        angle: [rad] counter-clockwise.
+        bold: in bold letters.
+        tag: names a size on that size's own line: in the line's colour, on a white ground.
     """
 
     text: str
@@ -33,28 +39,28 @@ class Words:
 
 
 def font_file(name: str) -> Path:
-    """The file of FONT or BOLD: it knows most of the world's letters, and comes with matplotlib."""
+    """Return the file of FONT or BOLD, which has most of the world's letters and comes with matplotlib."""
     import matplotlib
 
     return Path(matplotlib.get_data_path()) / "fonts" / "ttf" / f"{name}.ttf"
 
 
 def text_width(text: str, height: float, *, bold: bool = False) -> float:
-    """Width [m] of one line whose capitals are `height` [m] high."""
+    """Return the width [m] of one line whose capitals are `height` [m] high."""
     widths = _widths(BOLD if bold else FONT)
     return sum(widths.get(ord(letter), UNKNOWN) for letter in text) * height / CAPITALS
 
 
 @cache
 def _widths(name: str) -> dict[int, float]:
-    """Width over the font's size of each letter, by code point."""
+    """Return the width of each letter over the font's size, by code point."""
     from reportlab.pdfbase.ttfonts import TTFontFile
 
     return {code: width / 1000 for code, width in TTFontFile(str(font_file(name))).charWidths.items()}
 
 
 def wrapped(text: str, height: float, width: float, *, bold: bool = False) -> str:
-    """The text with its spaces turned into line breaks where a line would be wider [m]; words stay whole."""
+    """Turn spaces of a text into line breaks where a line would be wider than `width` [m]; words stay whole."""
     rows: list[str] = []
     for word in text.split():
         longer = f"{rows[-1]} {word}" if rows else word

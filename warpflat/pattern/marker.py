@@ -18,10 +18,10 @@ from warpflat.pattern.pieces import unknown_size
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
 
-#: Copies are nested as polygons that are larger by up to this [m], with far fewer corners.
+#: Copies are nested as polygons that are larger by up to this [m] and have far fewer corners.
 SIMPLER = 1e-3
-#: Height of capitals [m] of a copy's name and of what else is said of it, the least share of it, and the distances [m]
-#: that they keep from lines, the second where there is little room.
+#: Height of capitals [m] of a copy's name and of its other lines, the least share of these, and their distances [m]
+#: from lines, the second where there is little room.
 NAME, MORE, LEAST, CLEARANCES = 0.012, 0.009, 0.1, (0.004, 0.001)
 #: Two placed copies may touch, but not share more than this area [m2].
 OVERLAP = 1e-8
@@ -33,8 +33,10 @@ class Cloth:
 
     Attributes:
         width: usable width between the selvedges [m].
-        one_way: all pieces point the same way along the warp (nap, pile, one-way prints); else they may turn round.
-        reversible: both faces look alike, so that pairs may be cut either way up; else one of each pair is mirrored.
+        one_way: all pieces point the same way along the warp (nap, pile, one-way prints); otherwise they may turn
+            round.
+        reversible: both faces are equal, so that pairs may be cut either way up; otherwise one of each pair is
+            mirrored.
         gap: between pieces, and to the selvedges and ends [m].
     """
 
@@ -52,10 +54,18 @@ class Cloth:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Copy:
-    """One copy on the cloth, all lines placed [m]: warp along x, `matrix` 2 by 3 from the drafted piece.
+    """One copy on the cloth, all lines placed [m], warp along x.
 
-    A half on the fold is whole here: cut line, cutouts and notches of both halves, `fold_lines` where they meet.
-    `name` says which piece it is, where it has room on it; None where it has none.
+    A half on the fold is whole here: cut line, cutouts and notches are those of both halves.
+
+    Attributes:
+        piece: what is copied.
+        mirrored: cut turned over.
+        turned: pointing the other way along the warp.
+        matrix: 2 by 3, from the drafted piece to the cloth.
+        cut_line, cutouts, notches, grain: #P by 2 [m].
+        fold_lines: lines at which the two halves meet, #P by 2 [m].
+        name: its label, if there is room for one.
     """
 
     piece: DraftedPiece
@@ -77,7 +87,14 @@ class Copy:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Marker:
-    """A lay plan: cloth from 0 to `length` along x and 0 to `width` across [m]; `name` is the garment's."""
+    """A lay plan.
+
+    Attributes:
+        name: the garment's.
+        fabric: which pieces it holds; "" for all.
+        width, length: of the cloth, which lies from 0 to `length` along x and from 0 to `width` across [m].
+        placements: the copies.
+    """
 
     name: str
     fabric: str
@@ -87,7 +104,7 @@ class Marker:
 
     @property
     def utilisation(self) -> float:
-        """Area of the pieces over the area of the cloth that they take: cloth that is cut out of a piece is waste."""
+        """Area of the pieces over the area of the cloth; cutouts count as waste."""
         import shapely
 
         used = sum(
@@ -116,7 +133,7 @@ def make_marker(
         fabric: only pieces of that fabric; "" where all have the same.
         sizes: how many garments of each size; None makes one of each drafted size.
         seconds: time for the solver.
-        seed: the same seed explores alike, but what is reached depends on the machine's speed.
+        seed: of the solver's search; what it reaches still depends on the machine's speed.
 
     Raises:
         InputError: an unknown size or fabric, or a piece wider than the cloth.
@@ -141,11 +158,12 @@ def make_marker(
 
 
 def _length(placements: list[Copy]) -> float:
+    """Return the length [m] of cloth that copies take."""
     return max(float(copy.cut_line[:, 0].max()) for copy in placements)
 
 
 def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seconds: int, seed: int) -> list[Copy]:
-    """Where sparrow puts the copies; in the order in which the cutter meets them."""
+    """Nest the copies with sparrow, and return them in the order in which the cutter meets them."""
     import spyrrow
 
     items, matrices, usable = [], [], cloth.width - 2 * cloth.gap
@@ -174,7 +192,7 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
 
 
 def _solved(instance: Any, config: Any) -> list[Any]:
-    """What the solver placed. Where it gives up it panics, which Python sees as an exception beside all others."""
+    """Run the solver, and turn its panic, a bare exception in Python, into an error message."""
     try:
         return list(instance.solve(config).placed_items)
     except BaseException as error:
@@ -184,7 +202,7 @@ def _solved(instance: Any, config: Any) -> list[Any]:
 
 
 def _check(marker: Marker) -> None:
-    """The solver's word is not taken for it: copies must not overlap and must lie on the cloth."""
+    """Check that copies do not overlap and lie on the cloth, whatever the solver says."""
     import shapely
 
     polygons = [shapely.Polygon(copy.cut_line) for copy in marker.placements]
@@ -198,20 +216,20 @@ def _check(marker: Marker) -> None:
 
 
 def unfolded(piece: DraftedPiece) -> FloatArray:
-    """#P by 2 [m], the cut line of the whole piece: a half is joined to its mirror image along the fold."""
+    """Return the cut line of the whole piece (#P by 2 [m]): a half is joined to its mirror image along the fold."""
     import shapely
 
     whole = shapely.Polygon(piece.cut_line)
     for edge in piece.fold_edges:
         mirror = shapely.transform(whole, _mirror(edge))
-        # Both halves end on the fold within rounding; a hair of overlap joins them.
+        # Both halves end on the fold within rounding; a tiny overlap joins them.
         joined = shapely.union_all([half.buffer(2e-6, join_style="mitre") for half in (whole, mirror)])
         whole = max(shapely.get_parts(joined.buffer(-2e-6, join_style="mitre")), key=lambda part: part.area)
     return np.asarray(shapely.orient_polygons(shapely.Polygon(whole.exterior)).exterior.coords)[:-1]
 
 
 def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
-    """The mirror on the line of a fold, for #P by 2 points."""
+    """Return the reflection on the line of a fold, for #P by 2 points."""
     start = edge.line[0]
     x, y = (edge.line[-1] - start) / np.linalg.norm(edge.line[-1] - start)
     turn = np.array([[2 * x * x - 1, 2 * x * y], [2 * x * y, 2 * y * y - 1]])
@@ -219,18 +237,19 @@ def _mirror(edge: DraftedEdge) -> Callable[[FloatArray], FloatArray]:
 
 
 def _slits(piece: DraftedPiece) -> list[FloatArray]:
-    """Every notch, 2 by 2 [m], from the cut line inwards."""
+    """Return every notch from the cut line inwards, each 2 by 2 [m]."""
     return [np.stack([b, b + n.depth * n.direction]) for n in piece.notches for b in n.base]
 
 
 def _of_both_halves(piece: DraftedPiece, lines: list[FloatArray]) -> list[FloatArray]:
-    """Lines (#P by 2 [m]) of a piece, and of a half on the fold their mirror images."""
+    """Return lines (#P by 2 [m]) of a piece, with their mirror images where it is a half on the fold."""
     for edge in piece.fold_edges:
         lines = lines + [_mirror(edge)(line) for line in lines]
     return lines
 
 
 def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> list[tuple[DraftedPiece, bool]]:
+    """Return the copies to be cut, each with whether it is mirrored."""
     copies = []
     for size, count in sizes.items():
         if size not in garment.pieces:
@@ -250,12 +269,12 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
 
 
 def _onto_cloth(mirrored: bool) -> FloatArray:
-    """2 by 2: the grain, upwards in a drafted piece, comes to lie along x."""
+    """Return the matrix (2 by 2) that lays the grain, upwards in a drafted piece, along x."""
     return np.array([[0.0, 1.0], [1.0, 0.0]]) if mirrored else np.array([[0.0, 1.0], [-1.0, 0.0]])
 
 
 def _simpler(cut: FloatArray) -> FloatArray:
-    """A polygon with few corners that contains the cut line."""
+    """Return a polygon with few corners that contains the cut line."""
     import shapely
 
     exact = shapely.Polygon(cut)
@@ -267,6 +286,7 @@ def _simpler(cut: FloatArray) -> FloatArray:
 def _placed(
     piece: DraftedPiece, mirrored: bool, linear: FloatArray, degrees: float, shift: tuple[float, float], margin: float
 ) -> Copy:
+    """Return a copy at the solver's place."""
     angle = np.radians(degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
@@ -289,7 +309,7 @@ def _placed(
 
 
 def _named(copy: Copy) -> Copy:
-    """With its name in the room between its lines."""
+    """Return a copy with its name in the room between its lines."""
     import shapely
 
     piece = copy.piece

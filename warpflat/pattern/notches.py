@@ -1,4 +1,4 @@
-"""Seams measured and notched: the same mark at the same length on both sides of every seam."""
+"""Seams measured and notched: equal marks at equal lengths on both sides of every seam."""
 
 from __future__ import annotations
 
@@ -25,14 +25,14 @@ RAW_DEPTH = 0.003
 SHORTEST, SPACING = 0.080, 0.200
 #: The two slits of a double notch stand this far [m] apart.
 DOUBLE_SPACING = 0.008
-#: A notch this close [m] to a joint of edges would be lost in it.
+#: Least distance [m] of a notch from a joint of edges, in which it would be lost.
 CLEAR = 0.012
-#: A place at which one side cannot be notched is tried again at these shares of its length from the seam's start.
+#: Where a side cannot be notched, the notch is tried at these shares of its distance from the seam's start.
 SHARES_FROM_START = (1.0, 0.5, 0.25)
 
 
 def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size: str) -> list[SeamReport]:
-    """Lengths of both sides of every seam, along the fitted sewing lines."""
+    """Measure both sides of every seam along the fitted sewing lines."""
     reports = []
     for seam in seams:
         lines = [_SeamLine(side, pieces) for side in seam.sides]
@@ -52,15 +52,15 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
 
 
 def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> dict[str, list[Notch]]:
-    """Notches by piece.
+    """Return the notches of seams by piece.
 
     Both sides of a seam get a notch at the same fraction of the seam's length, which is the same length wherever the
     sides are equal; ease is spread evenly. Fractions are not symmetric about the middle, so that a side sewn on the
     wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
     other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
 
-    Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved towards
-    the seam's start, on both sides.
+    Where one side's allowance is not cut (deep in a dart, where it meets that of the other leg), the place is moved
+    towards the seam's start, on both sides.
     """
     notches: dict[str, list[Notch]] = {}
     for seam in seams:
@@ -81,7 +81,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
 
 
 def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list[tuple[str, Notch]]:
-    """The notches of both sides for one share of the seam's length, each with its piece; none if they cannot be cut."""
+    """Return the notches of both sides at a fraction of the seam's length, by piece; none if they cannot be cut."""
     for share in SHARES_FROM_START:
         places = [(line, share * fraction * line.length) for line in lines]
         names = [line.piece_name(length).lower() for line, length in places]
@@ -96,6 +96,7 @@ def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list
 
 
 def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
+    """Return the fractions of a seam's length at which it is notched."""
     if seam.notches is not None:
         return list(seam.notches)
     if first.length < SHORTEST:
@@ -107,7 +108,7 @@ def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
 
 
 def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
-    """The darts that are cut away, as the seams by which they are closed, both legs from the border to the tip."""
+    """Return the darts that are cut away as seams that close them, both legs from the border to the tip."""
     return [
         Seam(
             name=f"{name}.{dart.dart.name}",
@@ -124,7 +125,7 @@ def cut_darts(pieces: Mapping[str, DraftedPiece]) -> list[Seam]:
 
 
 def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> tuple[Notch, ...]:
-    """A single notch at the end of each leg of every folded dart, in the direction in which the leg runs on."""
+    """Return a single notch at the end of each leg of every folded dart, in the direction in which the leg runs on."""
     notches = []
     for dart in piece.darts:
         wedge = wedges.get(dart.name)
@@ -145,7 +146,10 @@ def dart_notches(piece: Piece, wedges: Mapping[str, Wedge], cut: CutOutline) -> 
 
 
 def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_line: FloatArray) -> FloatArray | None:
-    """Where the cut line is met, straight out from a point of the sewing line; None if it is not, within twice the width."""
+    """Return the point of the cut line straight out from a point of the sewing line.
+
+    None if there is none within twice the width [m].
+    """
     import shapely
 
     ring = shapely.LinearRing(cut_line)
@@ -157,7 +161,7 @@ def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_li
 
 
 def _local_difference(one: _SeamLine, other: _SeamLine, ease: float) -> float | None:
-    """The worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
+    """Return the worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
     if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
         return None
     worst = worst_difference(one.places, other.places, ease)
@@ -165,7 +169,7 @@ def _local_difference(one: _SeamLine, other: _SeamLine, ease: float) -> float | 
 
 
 class _SeamLine:
-    """One side of a seam as one long line, run in the seam's direction."""
+    """One side of a seam as one long line, in the seam's direction."""
 
     def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
         self.side = side
@@ -177,11 +181,12 @@ class _SeamLine:
 
     @property
     def length(self) -> float:
+        """Length of the side [m]."""
         return float(self.joints[-1])
 
     @property
     def places(self) -> FloatArray:
-        """The length at each point of the edges as they came in, joints once."""
+        """Length [m] along the side of each point of its edges as they came in, joints once."""
         rows: list[FloatArray] = []
         for edge, start, side in zip(self.edges, self.joints, self.side, strict=False):
             along = edge.length - edge.places[::-1] if side.reversed else edge.places
@@ -189,18 +194,19 @@ class _SeamLine:
         return np.concatenate(rows)
 
     def index(self, length: float) -> int:
-        """The edge on which that length falls."""
+        """Return the edge at a length [m]."""
         return int(np.clip(np.searchsorted(self.joints, length, side="right") - 1, 0, len(self.lines) - 1))
 
     def piece_name(self, length: float) -> str:
+        """Return the piece at a length [m]."""
         return self.side[self.index(length)].piece
 
     def mirrored(self, length: float) -> bool:
-        """Whether the edge there is that of a second copy, cut turned over."""
+        """Return whether the edge at a length [m] is that of a second copy, cut turned over."""
         return self.side[self.index(length)].mirrored
 
     def notch(self, seam: str, length: float, double: bool) -> Notch | None:
-        """A notch at that length; both slits of a double one lie as far to either side of it.
+        """Return a notch at a length [m]; the two slits of a double one lie on either side of it.
 
         None where the cut line does not run along the edge, since the allowance there meets another one.
         """
@@ -219,13 +225,13 @@ class _SeamLine:
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
     def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
-        """Point on the sewing line and unit normal into the piece."""
+        """Return the point on the sewing line at a length [m], and the unit normal into the piece."""
         line, arc = self.lines[index], self.arcs[index]
         length = float(np.clip(length, 0.0, arc[-1]))
         step = int(np.clip(np.searchsorted(arc, length) - 1, 0, len(line) - 2))
         span = float(arc[step + 1] - arc[step])
         at = line[step] + (line[step + 1] - line[step]) * ((length - arc[step]) / span if span > 0 else 0.0)
-        # The direction over a few millimetres: that of a single short chord would jitter.
+        # The direction is taken over a few millimetres: single short chords jitter.
         near, far = points_at_lengths(line, [length - 2e-3, length + 2e-3])
         tangent = (far - near) / max(float(np.linalg.norm(far - near)), 1e-12)
         inwards = np.array([-tangent[1], tangent[0]])

@@ -1,4 +1,4 @@
-"""What a pattern is made of: edges, darts, pieces, seams, a garment in its sizes. Checked at the door."""
+"""The parts of a pattern: edges, darts, pieces, seams, and a garment in its sizes; validated when they are made."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
 SAME_POINT = 1e-6
 #: How far [m] an edge on the fold of the cloth may stray from straight.
 FOLD_STRAIGHT = 5e-4
-# As Shapely tells a place: "Self-intersection[0.036 0.674]".
+# A place in Shapely's messages: "Self-intersection[0.036 0.674]".
 _PLACE = re.compile(r"\[(\S+) (\S+)\]")
 
 
@@ -77,7 +77,7 @@ class Edge:
 
     @property
     def width(self) -> float:
-        """The allowance [m] that is added to this edge."""
+        """Allowance [m] of this edge, its own or that of its kind."""
         return DEFAULT_ALLOWANCE[self.kind] if self.allowance is None else float(self.allowance)
 
     @property
@@ -96,7 +96,8 @@ class Dart:
         right: the edge that runs from the tip back to the border.
         fold_to: the side to which the wedge is pressed, "left" or "right"; None lets the piece decide: downwards for
             a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
-        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for that.
+        cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for
+            that.
     """
 
     name: str
@@ -140,7 +141,7 @@ class Hole:
 
     @property
     def width(self) -> float:
-        """The allowance [m] that is left inside a cutout."""
+        """Allowance [m] inside a cutout."""
         if self.kind == "dart":
             return 0.0
         return DEFAULT_ALLOWANCE["seam"] if self.allowance is None else float(self.allowance)
@@ -194,16 +195,20 @@ class Piece:
 
     @property
     def on_fold(self) -> bool:
-        """True for the half of a symmetric piece."""
+        """Whether it is the half of a symmetric piece."""
         return any(edge.kind == "fold" for edge in self.edges)
 
     @property
     def outline(self) -> FloatArray:
-        """#P by 2 [m], the closed outline along all edges, dart legs included, first point not repeated."""
+        """Outline along all edges, dart legs included (#P by 2 [m]), closed, first point not repeated."""
         return np.concatenate([edge.points[:-1] for edge in self.edges])
 
     def edge(self, name: str) -> Edge:
-        """The edge of that name; InputError with the nearest name otherwise."""
+        """Return the edge of that name.
+
+        Raises:
+            InputError: there is none; gives the nearest name.
+        """
         for edge in self.edges:
             if edge.name == name:
                 return edge
@@ -212,12 +217,13 @@ class Piece:
 
 @dataclass(frozen=True, kw_only=True)
 class SeamSide:
-    """One stretch of a seam's side: an edge of a piece, walked in the seam's direction.
+    """A stretch of a seam's side: an edge of a piece, walked in the seam's direction.
 
     Attributes:
         piece, edge: names.
         reversed: the seam runs against the edge's own (counter-clockwise) direction.
-        mirrored: the edge is that of the piece's second copy, which is cut turned over; its notches are those of the first.
+        mirrored: the edge belongs to the piece's second copy, which is cut turned over; both copies have the same
+            notches.
     """
 
     piece: str
@@ -277,23 +283,8 @@ class Garment:
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):
             raise InputError(f"garment {self.name!r} has no pieces; every size needs at least one")
-        names: set[str] | None = None
         for size, pieces in self.pieces.items():
-            here = [piece.name for piece in pieces]
-            doubled = sorted({n for n in here if here.count(n) > 1})
-            if doubled:
-                raise InputError(
-                    f"garment {self.name!r}, size {size}: piece {doubled[0]!r} occurs twice; names are unique"
-                )
-            if names is not None and set(here) != names:
-                odd = sorted(set(here) ^ names)[0]
-                raise InputError(
-                    f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
-                )
-            names = set(here)
-            for piece in pieces:
-                if piece.size != size:
-                    raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
+            self._check_pieces(size, pieces)
             self._check_seams(size)
         if self.sample_size is not None and self.sample_size not in self.pieces:
             raise unknown_size(self.name, self.sample_size, self.pieces)
@@ -301,7 +292,24 @@ class Garment:
         if len(set(seen)) < len(seen):
             raise InputError(f"garment {self.name!r}: a seam's name occurs twice; names are unique")
 
+    def _check_pieces(self, size: str, pieces: Sequence[Piece]) -> None:
+        """Check that one size has the same pieces as the first one, each once."""
+        names = [piece.name for piece in pieces]
+        doubled = sorted({n for n in names if names.count(n) > 1})
+        if doubled:
+            raise InputError(f"garment {self.name!r}, size {size}: piece {doubled[0]!r} occurs twice; names are unique")
+        expected = {piece.name for piece in next(iter(self.pieces.values()))}
+        if set(names) != expected:
+            odd = sorted(set(names) ^ expected)[0]
+            raise InputError(
+                f"garment {self.name!r}: piece {odd!r} is not in every size; all sizes have the same pieces"
+            )
+        for piece in pieces:
+            if piece.size != size:
+                raise InputError(f"piece {piece.name!r} says size {piece.size!r} but is listed under {size!r}")
+
     def _check_seams(self, size: str) -> None:
+        """Check that every seam's edges exist in one size and are not on the fold."""
         for seam in self.seams:
             for side in (*seam.sides[0], *seam.sides[1]):
                 try:
@@ -313,16 +321,20 @@ class Garment:
 
     @property
     def sizes(self) -> tuple[str, ...]:
-        """The sizes in their order."""
+        """Sizes in their order."""
         return tuple(self.pieces)
 
     @property
     def sample(self) -> str:
-        """The size shown where only one is."""
+        """Size that is shown where only one is."""
         return self.sample_size if self.sample_size is not None else self.sizes[len(self.sizes) // 2]
 
     def piece(self, name: str, size: str) -> Piece:
-        """The piece of that name and size; InputError with the nearest name otherwise."""
+        """Return the piece of that name and size.
+
+        Raises:
+            InputError: there is none; gives the nearest name.
+        """
         if size not in self.pieces:
             raise unknown_size(self.name, size, self.pieces)
         for piece in self.pieces[size]:
@@ -336,13 +348,14 @@ class Garment:
 
 
 def unknown_size(garment: str, size: str, sizes: Iterable[str]) -> InputError:
-    """For a size that is asked for and not there."""
+    """Return the error for a size that does not exist."""
     if tuple(sizes) == ("",):
         return InputError(f"garment {garment!r} has no sizes: it is not graded; leave {size!r} out")
     return InputError(f"garment {garment!r} has no size {size!r}; {nearest(size, sizes)}")
 
 
 def _points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:
+    """Return points as an array after checking shape and values."""
     array = np.asarray(points, dtype=np.float64)
     if array.ndim != 2 or array.shape[1] != 2 or len(array) < at_least:
         raise InputError(f"{where}: points have shape {array.shape}; they must be #P by 2 with #P at least {at_least}")
@@ -353,6 +366,7 @@ def _points(points: ArrayLike, where: str, *, at_least: int) -> FloatArray:
 
 
 def _check_names(piece: Piece, where: str) -> None:
+    """Check that names are printable and unique."""
     for what, names in (
         ("edge", [e.name for e in piece.edges]),
         ("dart", [d.name for d in piece.darts]),
@@ -367,6 +381,7 @@ def _check_names(piece: Piece, where: str) -> None:
 
 
 def _check_outline(piece: Piece, where: str) -> None:
+    """Check that edges follow each other around a simple outline, counter-clockwise."""
     import shapely
 
     if not piece.edges:
@@ -385,13 +400,13 @@ def _check_outline(piece: Piece, where: str) -> None:
         raise InputError(f"{where}: the outline has {len(outline)} points; it needs at least 3")
     polygon = shapely.Polygon(outline)
     if not polygon.is_valid or polygon.area <= 0:
-        raise InputError(f"{where}: the outline {_amiss(polygon)}")
+        raise InputError(f"{where}: the outline {_outline_fault(polygon)}")
     if not polygon.exterior.is_ccw:
         raise InputError(f"{where}: the outline runs clockwise; list its edges counter-clockwise")
 
 
-def _amiss(polygon: shapely.Polygon) -> str:
-    """What keeps a closed line from being an outline, and what to do about it."""
+def _outline_fault(polygon: shapely.Polygon) -> str:
+    """Return why a closed line is no outline, and what to do about it."""
     import shapely
 
     if polygon.length <= 0 or polygon.convex_hull.area <= 1e-9 * polygon.length**2:
@@ -402,6 +417,7 @@ def _amiss(polygon: shapely.Polygon) -> str:
 
 
 def _check_straight(edge: Edge, where: str) -> None:
+    """Check that a fold is straight."""
     start, end = edge.points[0], edge.points[-1]
     span = float(np.linalg.norm(end - start))
     if span < SAME_POINT:
@@ -417,6 +433,7 @@ def _check_straight(edge: Edge, where: str) -> None:
 
 
 def _check_darts(piece: Piece, where: str) -> None:
+    """Check that a dart's legs are edges of its kind that follow each other."""
     names = [edge.name for edge in piece.edges]
     legs = []
     for dart in piece.darts:
@@ -439,6 +456,7 @@ def _check_darts(piece: Piece, where: str) -> None:
 
 
 def _check_holes(piece: Piece, where: str) -> None:
+    """Check that the cloth around holes does not overlap."""
     for hole in piece.holes:
         width = overlap_width(hole.points)
         if width <= OVERLAP:

@@ -65,7 +65,7 @@ def polygons_only(geometry: Geometry) -> Geometry:
 
 
 def close_slits(area: Geometry) -> Geometry:
-    """Close the slits and spikes that rounding leaves where parts meet along a slanted line, such as the fold of a dart."""
+    """Close the slits and spikes that rounding leaves where parts meet along a slanted line."""
     # With long mitres GEOS sometimes loses a whole polygon: a result counts only if its area is the same.
     for limit in (200.0, 20.0, 5.0):
         closed = area
@@ -91,7 +91,7 @@ def cut_off(area: Geometry, point: FloatArray, direction: FloatArray, side: Floa
 def parallelogram(
     point: FloatArray, along: FloatArray, reach: tuple[float, float], side: FloatArray, depth: tuple[float, float]
 ) -> Polygon:
-    """Return the parallelogram from `point` over `reach` [m] along one unit vector and over `depth` [m] along another."""
+    """Return a parallelogram from `point`, over `reach` [m] along one unit vector and `depth` [m] along another."""
     import shapely
 
     corners = [(reach[0], depth[0]), (reach[1], depth[0]), (reach[1], depth[1]), (reach[0], depth[1])]

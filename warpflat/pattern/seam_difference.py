@@ -15,11 +15,11 @@ STRETCH = 0.050
 
 
 def worst_difference(first: FloatArray, second: FloatArray, ease: float) -> float | None:
-    """How far [m] two sides of a seam differ over the worst `STRETCH` of it; None if they do not share their vertices.
+    """Return the largest difference [m] of two sides of a seam over any `STRETCH`; None if they share no vertices.
 
     Args:
         first, second: #P, the lengths [m] at which both sides have their common vertices.
-        ease: by how much the second is meant to be longer, as a share.
+        ease: by how much the second side is meant to be longer, as a share.
     """
     if len(first) != len(second):
         return None

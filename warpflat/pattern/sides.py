@@ -80,7 +80,7 @@ def outline_points(side: Side | Wedge) -> FloatArray:
 
 
 def allowance_strip(side: Side, body: Polygon) -> Geometry:
-    """Return the strip of cloth beside an edge, square at both ends, without what would fall on the piece or beyond it."""
+    """Return the strip of cloth beside an edge, square at both ends, without what would fall on the piece."""
     import shapely
 
     if side.width <= 0:
@@ -102,7 +102,7 @@ def allowance_strip(side: Side, body: Polygon) -> Geometry:
 
 
 def _parts_along(strip: Geometry, line: FloatArray) -> Geometry:
-    """Keep the parts of a strip that lie along its edge: a wide strip may pass through a narrow piece and come out again."""
+    """Keep the parts of a strip along its edge: a wide strip may pass through a narrow piece and come out again."""
     import shapely
 
     parts = shapely.get_parts(strip)
@@ -116,8 +116,8 @@ def _parts_along(strip: Geometry, line: FloatArray) -> Geometry:
 def corner_fill(corner: FloatArray, a: FloatArray, b: FloatArray, width_a: float, width_b: float) -> Polygon | None:
     """Return the cloth between two strips at a corner, where the outline turns left; None where it does not.
 
-    The outer lines of the strips run on until they meet. Where that is too far they are squared off. Where one strip is so
-    much wider that its line would have to turn back, its square end stays and the narrow strip runs up against it.
+    The outer lines of the strips run on until they meet. Where that is too far they are squared off. Where one strip is
+    so much wider that its line would have to turn back, its square end stays and the narrow strip runs up against it.
 
     Args:
         corner: [m].

@@ -78,9 +78,10 @@ class _Fit:
 class _LengthSystem:
     """The equations of one Gauss-Newton step towards given lengths.
 
-    Up to each point the length depends on all control points before it, so the normal equations would be dense. Therefore the
-    errors e of the lengths are unknowns as well, bound by e_j - e_{j-1} = excess length between two points. With the
-    multipliers of these equations in place of e, and all unknowns in their order along the curve, the matrix is banded.
+    Up to each point the length depends on all control points before it, so the normal equations would be dense.
+    Therefore the errors e of the lengths are unknowns as well, bound by e_j - e_{j-1} = excess length between two
+    points. With the multipliers of these equations in place of e, and all unknowns in their order along the curve, the
+    matrix is banded.
     """
 
     def __init__(
@@ -183,7 +184,7 @@ class _LengthSystem:
 
 
 def _cubic_basis(knots: FloatArray, at: FloatArray) -> tuple[NDArray[np.int64], FloatArray, FloatArray]:
-    """Return the four cubic B-splines that are not zero at each place: their numbers, values and slopes, #N by 4 each."""
+    """Return the cubic B-splines that are not zero at each place: numbers, values and slopes, #N by 4 each."""
     from scipy.interpolate import BSpline
 
     cubic, square = (BSpline.design_matrix(at, knots, degree) for degree in (3, 2))

@@ -13,7 +13,7 @@ from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
 from warpflat.garment.constraints import Constraint
-from warpflat.garment.ease import SeamWish, wished_seams
+from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, folds_of, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
@@ -109,7 +109,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
         check_fold_grain(folds_of(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
-        drawing = replace(drawing, rules=replace(drawing.rules, ease=wished_seams(form, wishes).ease))
+        drawing = replace(drawing, rules=replace(drawing.rules, ease=seam_ratios(form, wishes).ease))
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
