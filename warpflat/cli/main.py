@@ -21,7 +21,7 @@ from warpflat.cli.flatten import flatten
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.run import run
-from warpflat.cli.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
+from warpflat.cli.signals import INTERRUPTED, Stopped, raised_by_signals, signal_message
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import one_line
@@ -137,7 +137,7 @@ def _discard_output() -> None:
 
 
 def _report_signal(code: int) -> int:
-    words = words_of(code)
+    words = signal_message(code)
     if words is not None:
         click.echo(words, err=True)
     return code

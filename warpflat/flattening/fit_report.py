@@ -43,7 +43,7 @@ class Remedy:
     outside: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The remedy as an entry of `would_help` in `metrics.json`."""
+        """Return the remedy as an entry of `would_help` in `metrics.json`."""
         return {"cut": self.words, "length_m": self.length, "outside_after": self.outside}
 
 

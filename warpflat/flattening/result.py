@@ -186,7 +186,7 @@ class Flattening:
         return advised
 
     def metrics(self) -> dict[str, Any]:
-        """All of `metrics.json`."""
+        """Build all of `metrics.json`."""
         return run_metrics({self.surface.name: self.measures}, self.network.device)
 
     def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:

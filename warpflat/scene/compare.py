@@ -1,4 +1,4 @@
-"""The same garment in several fabrics: how far the patterns differ, in figures, a picture and a true-size drawing."""
+"""A scene is run in several fabrics, and the patterns are compared: in a table, a picture and a true-size drawing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def compare_fabrics(
     on_progress: Callable[[str, Progress], None] | None = None,
     device: str | None = None,
 ) -> Comparison:
-    """Run a scene in each fabric, all else alike: its cuts, seams and constraints are kept in each of them.
+    """Run a scene in each of several fabrics, with the same cuts, seams and constraints.
 
     Args:
         scene: a surface with its cuts, all of which are made, or a garment on a mannequin; its own fabric does not count.

@@ -30,7 +30,7 @@ __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
 
 
 def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
-    """The scene's mannequin, or another one, and the pieces of its form.
+    """Build the pieces of the scene's form on its mannequin, or on another one; return both.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
@@ -52,15 +52,15 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GarmentPlan:
-    """A scene's garment, checked, before anything of it is flattened.
+    """A scene's garment, checked and not yet flattened.
 
     Attributes:
-        scene: whose it is.
+        scene: the scene.
         mannequin, form: the body, and the pieces on it.
-        drawing: what is written of its pattern.
-        wishes: ease and gathers of its seams.
-        constraints: on its edges and lines.
-        settings: what else :func:`warpflat.garment.garment.flatten_form` takes.
+        drawing: options of the pattern files.
+        wishes: ease and gathers of seams.
+        constraints: on edges and lines.
+        settings: further arguments of :func:`warpflat.garment.garment.flatten_form`.
     """
 
     scene: Scene
@@ -72,7 +72,7 @@ class GarmentPlan:
     settings: Mapping[str, Any]
 
     def flatten(self, *, callback: Callable[[str, Progress], None] | None = None) -> Garment:
-        """Flatten and sew it.
+        """Flatten and sew the garment.
 
         Raises:
             InputError: as :func:`warpflat.garment.garment.flatten_form`.
