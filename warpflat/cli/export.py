@@ -1,4 +1,4 @@
-"""`warpflat export`: pattern files are written again from a run"s pattern.json."""
+"""`warpflat export`: pattern files are written again from a run's pattern.json."""
 
 from __future__ import annotations
 

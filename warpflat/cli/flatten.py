@@ -99,6 +99,6 @@ def flatten(
 
 
 def _safe_name(mesh: Path) -> str:
-    """The file's name as a name for a piece and its files: "Ärmel (1).obj" gives "Armel_1"."""
+    """Return a name for a piece and its files from the file's name: "Ärmel (1).obj" gives "Armel_1"."""
     name = re.sub(r"[^A-Za-z0-9_.-]+", "_", plain_letters(mesh.stem)).strip("_.-")
     return name or "piece"

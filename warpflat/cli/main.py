@@ -1,4 +1,4 @@
-"""The program: its commands, and what it says when one of them fails."""
+"""The program: its commands, its errors and its exit codes."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from warpflat.cli.flatten import flatten
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.run import run
-from warpflat.cli.signals import INTERRUPTED, Stopped, raised_by_signals, words_of
+from warpflat.cli.signals import INTERRUPTED, Stopped, raised_by_signals, signal_message
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import one_line
@@ -87,27 +87,27 @@ def main(arguments: Sequence[str] | None = None) -> int:
         hint = f"; see {context.command_path} --help" if context is not None else ""
         return _fail(error.format_message().rstrip(".") + hint)
     except _Interrupted as stopped:
-        return _stopped(stopped.args[0])
+        return _report_signal(stopped.args[0])
     except (KeyboardInterrupt, click.Abort):
-        return _stopped(INTERRUPTED)
+        return _report_signal(INTERRUPTED)
     except BrokenPipeError:
         # The reader of a pipe, such as head, has what it wanted.
         sys.stderr.close()
         return DONE
     except (MemoryError, RuntimeError, ImportError, OSError) as error:
         if is_out_of_memory(error):
-            return _fail(f"not enough memory: {_end_of_memory(error)}; use a coarser mesh, or give it more memory")
+            return _fail(f"not enough memory: {_memory_words(error)}; use a coarser mesh, or give it more memory")
         if not isinstance(error, OSError):
             raise
         reason = (error.strerror or str(error)).lower()
         if error.filename is None and _was_printing(error):
-            _drop_output()
+            _discard_output()
             return _fail(f"cannot write to standard output: {reason}")
         return _fail(f"cannot read or write {error.filename or 'a temporary file'}: {reason}")
 
 
 def _open_stderr() -> None:
-    """Where standard error is closed, open it on nothing: what is told there is lost, no file that is opened takes its number."""
+    """Open standard error on the null device if it is closed, so that no file takes its number."""
     if not _is_open(sys.stderr):
         sys.stderr = open(os.devnull, "w", encoding="utf-8")  # noqa: SIM115 (open as long as the process)
         if sys.stderr.fileno() != 2:
@@ -115,7 +115,7 @@ def _open_stderr() -> None:
 
 
 def _is_open(stream: TextIO | None) -> bool:
-    """Whether it can be written to, if it is a file: what a shell has closed may be another file by now, to be read only."""
+    """Return whether a stream can be written; a descriptor that a shell has closed may belong to a file that is read by now."""
     try:
         os.write(-1 if stream is None else stream.fileno(), b"")
     except (AttributeError, io.UnsupportedOperation):
@@ -126,26 +126,25 @@ def _is_open(stream: TextIO | None) -> bool:
 
 
 def _was_printing(error: OSError) -> bool:
-    """Whether an error came out of what prints results, and not of a file without a name."""
+    """Return whether an error was raised while results were printed."""
     return any(frame.f_code is click.echo.__code__ for frame, _ in traceback.walk_tb(error.__traceback__))
 
 
-def _drop_output() -> None:
-    """What could not be written is tried again at the end of the process, which would fail once more."""
+def _discard_output() -> None:
+    """Send standard output to the null device: at the end of the process what is left of it would fail once more."""
     with suppress(OSError, ValueError), open(os.devnull, "w", encoding="utf-8") as nothing:
         os.dup2(nothing.fileno(), sys.stdout.fileno())
 
 
-def _stopped(code: int) -> int:
-    words = words_of(code)
+def _report_signal(code: int) -> int:
+    words = signal_message(code)
     if words is not None:
         click.echo(words, err=True)
     return code
 
 
-def _end_of_memory(error: BaseException) -> str:
-    told = [str(error) or "no more is to be had", memory_limit()]
-    return ", ".join(filter(None, told))
+def _memory_words(error: BaseException) -> str:
+    return ", ".join(filter(None, [str(error) or "no more is to be had", memory_limit()]))
 
 
 def _fail(message: str) -> int:

@@ -87,7 +87,7 @@ def mannequin(
 def _check_body(
     options: Mapping[str, Any], *, size: str | None, measures: Sequence[str], landmarks: Sequence[str]
 ) -> None:
-    """See that the body is given in one way, and that no option is of another one."""
+    """Check that the body is given in one way, without options of another one."""
     scan = options.get("scan")
     if (scan is None) == (size is None and not measures):
         raise InputError(
@@ -101,7 +101,7 @@ def _check_body(
 
 
 def _lengths(texts: Sequence[str], option: str) -> dict[str, float]:
-    """Every NAME=METRES, each name once."""
+    """Return the lengths of all NAME=METRES, each name once."""
     found: dict[str, float] = {}
     for text in texts:
         name, value = _metres(text, option)
@@ -114,7 +114,7 @@ def _lengths(texts: Sequence[str], option: str) -> dict[str, float]:
 
 
 def _metres(text: str, option: str) -> tuple[str, float]:
-    """NAME=METRES as a pair."""
+    """Split NAME=METRES."""
     name, equals, value = text.partition("=")
     try:
         metres = float(value)

@@ -18,14 +18,19 @@ __all__ = ["ProgressBar"]
 
 _REFRESH = 0.1  # [s]
 _STEPS = "{desc}: {n_fmt} steps [{elapsed}{postfix}]"
-_DOING = "{desc} [{elapsed}]"
+_ACTIVITY = "{desc} [{elapsed}]"
 
 
 class ProgressBar:
-    """Steps, energy and residual on stderr while a run goes on, or what else it does; nothing where stderr is no terminal or `hidden`."""
+    """A bar on stderr with steps, model energy and residual, or the activity of a run; nothing if stderr is no terminal."""
 
     def __init__(self, name: str, *, hidden: bool = False) -> None:
-        """Show nothing yet: `name` is what is being flattened."""
+        """Prepare the bar.
+
+        Args:
+            name: of what is flattened.
+            hidden: show nothing.
+        """
         self._name = name
         self._hidden = hidden or not sys.stderr.isatty()
         self._bar: Any = None
@@ -41,9 +46,9 @@ class ProgressBar:
                 file=sys.stderr,
                 leave=False,
                 mininterval=_REFRESH,
-                bar_format=_DOING,
+                bar_format=_ACTIVITY,
             )
-            self._listening.enter_context(activity_listener(self.say))
+            self._listening.enter_context(activity_listener(self.show_activity))
         return self
 
     def __exit__(
@@ -53,14 +58,14 @@ class ProgressBar:
         if self._bar is not None:
             self._bar.close()
 
-    def say(self, words: str) -> None:
-        """Show what is being done."""
+    def show_activity(self, activity: str) -> None:
+        """Show what the run does."""
         if self._bar is not None:
-            self._bar.bar_format = _DOING
-            self._bar.set_description_str(f"{self._name}: {words}", refresh=True)
+            self._bar.bar_format = _ACTIVITY
+            self._bar.set_description_str(f"{self._name}: {activity}", refresh=True)
 
     def __call__(self, progress: Progress) -> None:
-        """Show where the run stands."""
+        """Show the progress of a relaxation."""
         if self._bar is None:
             return
         if progress.stage != self._stage and progress.step == 0:
@@ -68,8 +73,8 @@ class ProgressBar:
         self._stage = progress.stage
         self._bar.bar_format = _STEPS
         self._bar.set_description_str(f"{self._name}: {progress.stage}", refresh=False)
-        told = f"model energy {progress.model_energy * 1e3:.4g} mJ"
+        numbers = f"model energy {progress.model_energy * 1e3:.4g} mJ"
         if math.isfinite(progress.residual):
-            told += f", residual {progress.residual:.1e}"
-        self._bar.set_postfix_str(told, refresh=False)
+            numbers += f", residual {progress.residual:.1e}"
+        self._bar.set_postfix_str(numbers, refresh=False)
         self._bar.update(max(0, progress.step - self._bar.n))

@@ -65,7 +65,7 @@ def start_warp_silently() -> None:
 
 
 def report_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool) -> int:
-    """Print what a run has come to, and return the exit code."""
+    """Print the result of a run, and return the exit code."""
     from warpflat.cli.tables import run_summary, warnings_of
     from warpflat.flattening.fit_report import fit_lines
 

@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "words_of"]
+__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "signal_message"]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
@@ -30,13 +30,13 @@ class Stopped(KeyboardInterrupt):
     """
 
     def __init__(self, number: int) -> None:
-        """By the signal of this number."""
+        """Keep the number of the signal."""
         super().__init__(number)
         self.code = 128 + number
 
 
-def words_of(code: int) -> str | None:
-    """What is told at the exit code of a signal; None where the terminal is closed and nobody can be told."""
+def signal_message(code: int) -> str | None:
+    """Return the message for the exit code of a signal; None if the terminal is closed."""
     return _WORDS.get(code)
 
 
@@ -48,7 +48,7 @@ def end_at_once(code: int | None = None) -> None:
     """
 
     def end(number: int, _: object) -> None:
-        words = words_of(128 + number) if code is None else None
+        words = signal_message(128 + number) if code is None else None
         if words is not None:
             os.write(2, f"{words}\n".encode())
         os._exit(128 + number if code is None else code)
@@ -115,7 +115,7 @@ def raised_by_signals() -> Iterator[None]:
 
 
 def _imports(frame: FrameType | None) -> int:
-    """How many of the frames, this one and those that called it, are of Python's import."""
+    """Return how many frames of the call stack belong to Python's import."""
     count = 0
     while frame is not None:
         count += frame.f_globals.get("__name__") == "importlib._bootstrap"
@@ -124,7 +124,7 @@ def _imports(frame: FrameType | None) -> int:
 
 
 def _ours() -> list[int]:
-    """Signals that end a process unless somebody has decided otherwise: they may be ignored, as by nohup, or the caller's business."""
+    """Return the signals that still have their default action; others are ignored, as by nohup, or handled by the caller."""
     import threading
 
     if threading.current_thread() is not threading.main_thread():

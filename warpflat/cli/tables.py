@@ -23,11 +23,18 @@ __all__ = [
     "warnings_of",
 ]
 
-_AMISS = 0.2  # [mm] of a seam or constraint that is told
+# A seam or constraint that fails by more than this gets a warning [mm].
+_WARNED_MISS = 0.2
+_UNITS = {
+    "areal_density": "kg/m2",
+    "stiffness_warp": "N/m",
+    "stiffness_weft": "N/m",
+    "shear_stiffness": "N/m per rad",
+}
 
 
 def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
-    """The table at the end of a run, and where its files are.
+    """Return the table at the end of a run, with the names of its files.
 
     Args:
         metrics: as `metrics.json`.
@@ -82,7 +89,7 @@ def _price(joules: float | None) -> str:
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """One line for each piece that did not converge or has flipped faces, of every size, and for a pattern or marker that is missing."""
+    """Return a line for each piece, of every size, that did not converge or has flipped faces, and for a missing pattern or marker."""
     lines = []
     given_up = metrics.get("sewing", {}).get("contradictory", False)
     for name, piece in metrics["pieces"].items():
@@ -91,7 +98,7 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
             asked = given_up and last["name"] == "sew"
             way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
             lines.append(
-                f"{name} did not converge within {_work(last)} ({_left(last)}); the pattern is not final: {way_out}"
+                f"{name} did not converge within {_work_words(last)} ({_remainder_words(last)}); the pattern is not final: {way_out}"
             )
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
@@ -101,7 +108,7 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         lines += [
             f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
             for name, by in amiss
-            if by > _AMISS
+            if by > _WARNED_MISS
         ]
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
@@ -114,7 +121,7 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
 
 
 def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
-    """Height and girths of every level, from the neck down."""
+    """Return height and girths of every level as text, from the neck down."""
     rows = []
     for name, level in levels.items():
         body = level.girth if level.section is None else level.section
@@ -123,7 +130,7 @@ def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
 
 
 def ledger_table(ledger: Ledger) -> str:
-    """The candidates of a ledger, the best first, with the numbers that `--apply` takes."""
+    """Return the candidates of a ledger as text, best first, with the numbers that `--apply` takes."""
     from warpflat.cutting.ledger_picture import candidate_words
 
     head = (
@@ -153,7 +160,7 @@ def ledger_table(ledger: Ledger) -> str:
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:
-    """One line per fabric, with units and grades."""
+    """Return the fabrics as text, a line each, with units and grades."""
     head = ("fabric", "kg/m2", "K warp", "K weft", "G [N/m]", "nu", "limit", "grade", "description")
     rows = []
     used: set[str] = set()
@@ -163,10 +170,10 @@ def fabric_table(fabrics: Iterable[Fabric]) -> str:
         rows.append(
             (
                 fabric.name,
-                f"{_mark(fabric, 'areal_density')}{fabric.areal_density:.3f}",
-                f"{_mark(fabric, 'stiffness_warp')}{fabric.stiffness_warp:,.0f}",
-                f"{_mark(fabric, 'stiffness_weft')}{fabric.stiffness_weft:,.0f}",
-                f"{_mark(fabric, 'shear_stiffness')}{fabric.shear_stiffness:,.0f}",
+                f"{_estimate_sign(fabric, 'areal_density')}{fabric.areal_density:.3f}",
+                f"{_estimate_sign(fabric, 'stiffness_warp')}{fabric.stiffness_warp:,.0f}",
+                f"{_estimate_sign(fabric, 'stiffness_weft')}{fabric.stiffness_weft:,.0f}",
+                f"{_estimate_sign(fabric, 'shear_stiffness')}{fabric.shear_stiffness:,.0f}",
                 f"{fabric.poisson_ratio:.2g}",
                 f"{100 * fabric.strain_limit:.3g} %",
                 grades or "-",
@@ -183,46 +190,43 @@ def fabric_table(fabrics: Iterable[Fabric]) -> str:
 
 
 def fabric_sheet(fabric: Fabric) -> str:
-    """One fabric: each value with unit, test load, grade and source."""
-    units = {
-        "areal_density": "kg/m2",
-        "stiffness_warp": "N/m",
-        "stiffness_weft": "N/m",
-        "shear_stiffness": "N/m per rad",
-    }
-    rows = []
+    """Return one fabric as text: each value with its unit, test load, grade and source."""
     sources: dict[str, str] = {}
+    rows = []
     for key in value_names():
-        value = getattr(fabric, key)
-        if value == ():
+        if getattr(fabric, key) == ():
             continue
         origin = fabric.provenance.get(key, Provenance(source="default"))
-        shown = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
-        if origin.at_least:
-            shown = f">= {shown}"
-        if origin.spread is not None:
-            shown += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
         number = sources.setdefault(origin.source, f"[{len(sources) + 1}]")
-        rows.append((key, shown, units.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
-    title = f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name
-    parts = [title]
+        value = _value_words(fabric, key, origin)
+        rows.append((key, value, _UNITS.get(key, ""), origin.test_load or "-", origin.grade or "-", number))
+    parts = [f"{fabric.name}: {fabric.description}" if fabric.description else fabric.name]
     if fabric.aliases:
         parts.append(f"also: {', '.join(fabric.aliases)}")
     parts += ["", _aligned(("value", "", "unit", "test load", "grade", "source"), rows, left=(0, 2, 3, 4, 5))]
-    for direction in ("warp", "weft"):
-        points = getattr(fabric, f"curve_{direction}")
-        if points:
+    for key in ("curve_warp", "curve_weft"):
+        if points := getattr(fabric, key):
             text = ", ".join(f"{100 * strain:.3g} %: {tension:.3g} N/m" for strain, tension in points)
-            parts.append(f"curve_{direction}: {text}")
+            parts.append(f"{key}: {text}")
     parts += ["", *(f"{number} {source}" for source, number in sources.items())]
-    used = sorted({origin.grade for origin in fabric.provenance.values() if origin.grade})
-    if used:
-        parts += ["", f"grades: {', '.join(f'{grade} {GRADES[grade]}' for grade in used)}"]
+    if grades := sorted({origin.grade for origin in fabric.provenance.values() if origin.grade}):
+        parts += ["", f"grades: {', '.join(f'{grade} {GRADES[grade]}' for grade in grades)}"]
     return "\n".join(parts)
 
 
+def _value_words(fabric: Fabric, key: str, origin: Provenance) -> str:
+    """Return a value as text: a curve as its number of points, a lower bound with >=, its spread in brackets."""
+    value = getattr(fabric, key)
+    words = f"{len(value)} points" if key.startswith("curve_") else f"{value:.6g}"
+    if origin.at_least:
+        words = f">= {words}"
+    if origin.spread is not None:
+        words += f" ({origin.spread[0]:g} to {origin.spread[1]:g})"
+    return words
+
+
 def fabric_data(fabric: Fabric) -> dict[str, Any]:
-    """A fabric as plain data: its values, and under `provenance` where each comes from."""
+    """Return a fabric as plain data: its values, and the origin of each under `provenance`."""
     data = {field.name: getattr(fabric, field.name) for field in fields(fabric) if field.name != "provenance"}
     return {**data, "provenance": {key: asdict(origin) for key, origin in fabric.provenance.items()}}
 
@@ -231,21 +235,21 @@ def _converged(piece: Mapping[str, Any]) -> bool:
     return all(stage["converged"] for stage in piece["stages"][-1:])
 
 
-def _work(stage: Mapping[str, Any]) -> str:
-    """What `max_steps` counts; with levels that is not the steps of the piece's own mesh alone."""
+def _work_words(stage: Mapping[str, Any]) -> str:
+    """Return the work of a stage, which `max_steps` limits: steps of the piece's mesh, or work units where coarser levels add to them."""
     steps, units = stage["steps"], stage["work_units"]
     return f"{steps:,} steps" if units <= steps else f"{units:,.0f} work units"
 
 
-def _left(stage: Mapping[str, Any]) -> str:
-    """How far from rest a stage has ended: by the residual, unless forces are infinite, as of crushed faces."""
+def _remainder_words(stage: Mapping[str, Any]) -> str:
+    """Return how far from rest a stage has ended: its residual, or its strain energy where crushed faces make forces infinite."""
     residual = stage["residual"]
     if residual is None or not math.isfinite(residual):
         return f"strain energy {1e3 * stage['strain_energy_j']:.3g} mJ"
     return f"residual {residual:.1e}"
 
 
-def _mark(fabric: Fabric, key: str) -> str:
+def _estimate_sign(fabric: Fabric, key: str) -> str:
     origin = fabric.provenance.get(key)
     if origin is None:
         return ""
@@ -253,7 +257,7 @@ def _mark(fabric: Fabric, key: str) -> str:
 
 
 def _aligned(head: Sequence[str], rows: Sequence[Sequence[str]], *, left: Sequence[int] = (0,)) -> str:
-    """Columns under their heads, numbers to the right, those of `left` to the left."""
+    """Align rows in columns under their heads, to the right but for the columns listed in `left`."""
     table = [head, *rows]
     widths = [max(len(row[column]) for row in table) for column in range(len(head))]
     return "\n".join(

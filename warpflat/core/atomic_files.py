@@ -49,7 +49,7 @@ _ABANDONED = 24 * 3600.0
 
 
 def file_in(folder: Path, name: str, ending: str) -> Path:
-    """The file of what is called `name` in a folder: whoever names it, nothing is written elsewhere.
+    """Return the path of a file in a folder; its name cannot lead out of the folder.
 
     Raises:
         InputError: `name` leads out of the folder, or cannot name a file for another reason.
@@ -59,7 +59,7 @@ def file_in(folder: Path, name: str, ending: str) -> Path:
 
 @contextmanager
 def hidden_file(final: Path) -> Iterator[Path]:
-    """Yield a fresh name for work on a file, with its suffix (writers choose the format by it); what is there at the end is removed.
+    """Yield a fresh hidden name with the suffix of a file; whatever has that name at the end is removed.
 
     It lies beside `final`, or in the hidden folder of the run to which that belongs.
     """
@@ -76,7 +76,7 @@ _unfinished: dict[Path, Sequence[Path]] = {}
 
 
 def _hidden(final: Path, made: Sequence[Path] = ()) -> Path:
-    """A fresh hidden name beside `final`, remembered before anything of that name exists: no interruption comes in between."""
+    """Return a fresh hidden name beside `final`, which is remembered before a file of that name exists."""
     mark = f"warpflat-{_machine()}-{os.getpid()}-{uuid.uuid4().hex[:8]}"
     path = final.absolute().with_name(f".{final.stem}-{mark}{final.suffix}")
     _unfinished[path] = made
@@ -84,7 +84,7 @@ def _hidden(final: Path, made: Sequence[Path] = ()) -> Path:
 
 
 def _clear(path: Path) -> None:
-    """Remove a hidden file, or a hidden folder once what it kept aside is where it was."""
+    """Remove a hidden file, or a hidden folder once the files kept in it are back in their places."""
     with suppress(OSError):
         if path.is_dir():
             _put_back(path)
@@ -100,14 +100,14 @@ def _clear(path: Path) -> None:
 
 @atexit.register
 def _clear_all() -> None:
-    """Remove what an interruption has left that came between the making of a file and whoever was to remove it."""
+    """Remove the hidden files that an interruption has left."""
     for path in list(_unfinished):
         if f"-{os.getpid()}-" in path.name:  # not in a child, by whom the parent's are known too
             _clear(path)
 
 
 def remove_unfinished(folder: Path) -> None:
-    """Remove what killed runs have left hidden, and put back what they had kept aside.
+    """Remove the hidden files of killed runs, and put back the files that they had moved aside.
 
     A run was killed if its process is gone, or if it is another machine's and a day has passed.
     """
@@ -140,7 +140,7 @@ def _is_running(process: int) -> bool:
 
 @functools.cache
 def _machine() -> str:
-    """Eight digits for where a process's number means one process: a machine, until it starts anew, and a container on it."""
+    """Return eight digits for the machine since its last start, and the container: within them a process number is unique."""
     known = [platform.node()]
     with suppress(OSError):
         known.append(Path("/proc/sys/kernel/random/boot_id").read_text(encoding="ascii"))
@@ -149,7 +149,7 @@ def _machine() -> str:
 
 
 def require_writable(final: str | os.PathLike[str]) -> None:
-    """Make sure that a file of this name can be written, without leaving one.
+    """Check that a file of this name can be written; none is left.
 
     Raises:
         InputError: the folder is missing or cannot be written, or `final` is a folder, or a file that the run has read.
@@ -244,7 +244,7 @@ class _Run:
             refuse_to_replace(self.folder / name, self._sources)
 
     def reads(self, path: Path) -> bool:
-        """Whether a file is one of those that have been read."""
+        """Return whether a file has been read."""
         return is_among(path, self._sources)
 
     def take(self, temporary: Path, name: str) -> None:
@@ -283,12 +283,12 @@ _runs: ContextVar[tuple[_Run, ...]] = ContextVar("runs", default=())
 
 
 def _run_into(folder: Path) -> _Run | None:
-    """The run that is writing into a folder, if there is one."""
+    """Return the run that is writing into a folder, if there is one."""
     return next((run for run in _going_on() if run.folder == folder or is_among(folder, [run.folder])), None)
 
 
 def _going_on() -> tuple[_Run, ...]:
-    """The runs that write at present; one that was interrupted at its very end may still be listed."""
+    """Return the runs that write at present."""
     return tuple(run for run in _runs.get() if run.hidden in _unfinished)
 
 
@@ -305,7 +305,7 @@ def _keep_aside(final: Path, aside: Path) -> None:
 
 
 def _put_back(hidden: Path) -> None:
-    """Undo a change of the files that was begun and not ended; done twice it does no more than once."""
+    """Undo an unfinished exchange of files; to do it twice does no harm."""
     try:
         fresh = json.loads((hidden / _FRESH).read_text(encoding="utf-8"))
     except (FileNotFoundError, ValueError, RecursionError):
@@ -326,7 +326,7 @@ def _put_back(hidden: Path) -> None:
 def output_folder(
     path: str | os.PathLike[str], files: Iterable[str] = (), *, sources: Iterable[Path] = ()
 ) -> Iterator[Path]:
-    """The folder for the files of a run: those written into it in the block appear together at its end, and none if it fails.
+    """Yield the folder for the files of a run; they appear together at the end of the block, or none of them if it fails.
 
     The folder is made if need be, and goes again if nothing has been written there. What is read in the block, and `sources`, is never
     replaced. A block in another one for the same folder is part of that.
@@ -372,7 +372,7 @@ def output_folder(
 
 
 def expect_files(folder: Path, files: Iterable[str]) -> None:
-    """Tell a run in an :func:`output_folder`, before it takes its time, which further files it will write.
+    """Announce further files that the run of an :func:`output_folder` will write, so that a conflict ends it early.
 
     Raises:
         InputError: one of them was read by the run, or is a folder.
@@ -388,13 +388,13 @@ def latest_file(path: Path) -> Path:
 
 
 def is_input(path: Path) -> bool:
-    """Whether the run that is writing into the folder of a file has read it."""
+    """Return whether a file was read by the run that is writing into its folder."""
     run = _run_into(path.parent)
     return run is not None and run.reads(path)
 
 
 def remove_file(path: Path) -> None:
-    """Remove a file of an earlier run, together with the change to the new ones where they are written in an :func:`output_folder`."""
+    """Remove a file of an earlier run; in an :func:`output_folder` it goes when the new files come."""
     run = _run_into(path.parent)
     if run is None:
         path.unlink(missing_ok=True)
@@ -428,7 +428,7 @@ def prepare_folder(path: str | os.PathLike[str]) -> Path:
 
 
 def _missing(folder: Path) -> list[Path]:
-    """The folder and its parents, as far as they do not exist."""
+    """Return the folder and its parents that do not exist."""
     try:
         return [each.absolute() for each in (folder, *folder.parents) if not each.exists()]
     except OSError:

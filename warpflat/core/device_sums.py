@@ -1,4 +1,4 @@
-"""Sums over the pieces of arrays on a CUDA device: worked out there, so that a number a piece comes to the host, not an array."""
+"""Sums over the pieces of arrays on a CUDA device, so that one number per piece is copied to the host."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class DeviceSums:
     """
 
     def __init__(self, counts: Sequence[int], device: wp.Device) -> None:
-        """Of ranges of so many."""
+        """Prepare sums over consecutive ranges of these lengths."""
         self._device, self._begin, self._chain = device, range_offsets(counts), list[wp.array]()
         ends = self._begin
         while True:

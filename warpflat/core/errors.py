@@ -1,4 +1,4 @@
-"""What goes wrong because of the user's input."""
+"""Errors in the user's input."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class InputError(ValueError):
 
 
 def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
-    """See that an argument is of the type that it must be.
+    """Check the type of an argument.
 
     Args:
         value: what was given.
@@ -46,7 +46,7 @@ def expect(value: object, kind: type | tuple[type, ...], name: str, right: str) 
 
 
 def expect_each(values: object, kind: type | tuple[type, ...], name: str, right: str) -> None:
-    """See that an argument is a list of what it must hold.
+    """Check that an argument is a list, and the type of its entries.
 
     Args:
         values: what was given.
@@ -64,7 +64,7 @@ def expect_each(values: object, kind: type | tuple[type, ...], name: str, right:
 
 
 def expect_callback(callback: object) -> None:
-    """See that a callback can be called, or is None.
+    """Check that a callback can be called or is None.
 
     Raises:
         InputError: it cannot.
@@ -74,12 +74,12 @@ def expect_callback(callback: object) -> None:
 
 
 def is_number(value: object, *, whole: bool = False) -> TypeGuard[float]:
-    """Whether it is a number, a whole one if that is asked for; Python's and NumPy's are, True and False are none."""
+    """Return whether a value is a number of Python or NumPy, or a whole one if asked; True and False are not."""
     return isinstance(value, numbers.Integral if whole else numbers.Real) and not isinstance(value, bool)
 
 
 def nearest(word: str, valid: Iterable[str]) -> str:
-    """The end of a message about an unknown `word`: the nearest valid one, then all of them, or the first ones of very many."""
+    """Return the end of a message about an unknown word: the nearest valid one, and the list of valid ones."""
     options = sorted(valid)
     # Somebody who writes EMT_warp means emt_warp.
     plain = {option.lower(): option for option in reversed(options)}

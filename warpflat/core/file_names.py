@@ -1,4 +1,4 @@
-"""Names that become files: what a file can be called on every system."""
+"""Checks of names that become names of files, on every system."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _MOST_BYTES = 200
 
 
 def checked_name(name: str) -> str:
-    """The name, if files can bear it on any system.
+    """Return a name if a file can have it on any system.
 
     Raises:
         InputError: it is no text, empty, too long, leads to another folder, or is refused by some system.
@@ -31,7 +31,7 @@ def checked_name(name: str) -> str:
 
 
 def checked_label(label: str, what: str) -> str:
-    """The name of a line, an edge or a size, if it can be written into every file: any text in one line.
+    """Return the name of a line, an edge or a size if it is text in one line, which every format can hold.
 
     Raises:
         InputError: it is no text, empty, or has a control character in it; `what` says of what it is the name.
@@ -44,19 +44,19 @@ def checked_label(label: str, what: str) -> str:
 
 
 def plain_label(label: str) -> str:
-    """The name that a file of somebody else gives to a line, with "_" where it has control characters."""
+    """Return the name of a line read from a file, with "_" for control characters."""
     return "".join("_" if control_in(letter) else letter for letter in label)
 
 
 def fitted_name(name: str, otherwise: str = "piece") -> str:
-    """A name that nobody chose for a file, such as that of a node in a scene, changed where no file can bear it."""
+    """Return a name that was not chosen for a file, such as that of a node in a scene, changed so that a file can have it."""
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
     return f"_{short}" if _is_device(short) else short or otherwise
 
 
 def plain_name(name: str, others: str = " _.-") -> str:
-    """The name of a scene or cut, if it is of plain letters: it is typed in a shell, and part of other names.
+    """Return the name of a scene or cut if it has plain letters only, since it is typed in a shell and part of other names.
 
     Raises:
         ValueError: it has letters beyond A to Z, a to z, 0 to 9 and `others`, or does not begin with one of the former.
@@ -72,7 +72,7 @@ def plain_name(name: str, others: str = " _.-") -> str:
 
 
 def same_file(name: str) -> str:
-    """What two names have in common that are one file on Windows or macOS, where capitals and composition do not count."""
+    """Return a key that is equal for names of one file on Windows or macOS, where capitals and composition do not count."""
     return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name).casefold())
 
 

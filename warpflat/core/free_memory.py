@@ -1,4 +1,4 @@
-"""Memory that is freed, but not yet back with the system."""
+"""Freed memory is returned to the system here."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["return_freed_memory"]
 
 
 def return_freed_memory() -> None:
-    """Let the C library return what was freed; where it is not glibc's, nothing is done.
+    """Let glibc return freed memory to the system; with another C library nothing is done.
 
     Each thread has a heap of its own, whose holes no other fills: after a development beside its coarser levels a tenth to a fifth of
     what a relaxation takes would lie idle.

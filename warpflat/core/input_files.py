@@ -1,4 +1,4 @@
-"""Files that are read, told to whoever listens: a run never replaces one of them."""
+"""Input files are recorded here, so that a run never replaces one of them."""
 
 from __future__ import annotations
 
@@ -19,20 +19,20 @@ _listeners: ContextVar[tuple[Listener, ...]] = ContextVar("readers", default=())
 
 
 def note_read(path: str | os.PathLike[str]) -> None:
-    """Tell that a file is read; every reader of a user's file does, before it spends time on it.
+    """Report that a file is read; every reader of a user's file calls this first.
 
     Raises:
         InputError: a run that is going on would replace the file.
     """
     # Absolute, since a script may change its folder before it saves what it has read.
     file = Path(path).absolute()
-    for told in _listeners.get():
-        told(file)
+    for listener in _listeners.get():
+        listener(file)
 
 
 @contextmanager
 def listening_to_reads(listener: Listener) -> Iterator[None]:
-    """Call `listener` with the path of each file that is read in the body."""
+    """Call `listener` with the path of each file that is read in the block."""
     before = _listeners.set((*_listeners.get(), listener))
     try:
         yield
@@ -41,7 +41,7 @@ def listening_to_reads(listener: Listener) -> Iterator[None]:
 
 
 def noting_resolver(file: Path) -> Any:
-    """A resolver for trimesh that notes the files which a mesh refers to, such as materials, textures and buffers."""
+    """Return a resolver for trimesh that reports the files of a mesh, such as materials, textures and buffers."""
     from trimesh.resolvers import FilePathResolver
 
     class Noting(FilePathResolver):
@@ -54,12 +54,12 @@ def noting_resolver(file: Path) -> Any:
 
 
 def is_among(path: Path, files: Iterable[Path]) -> bool:
-    """Whether a path is one of these files by whatever name or link, capitals included where the file system has none."""
+    """Return whether a path is one of these files, also by another link or, where the file system ignores it, other case."""
     return any(_is_same(path, file) for file in files)
 
 
 def refuse_to_replace(final: Path, files: Iterable[Path]) -> None:
-    """See that a file which is to be written is none of those that were read.
+    """Refuse to write a file that was read.
 
     Raises:
         InputError: it is.

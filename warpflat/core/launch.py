@@ -38,7 +38,7 @@ _GRAPH_AFTER = 2
 
 
 def split_range(size: int, parts: int, *, least: int | None = None) -> list[tuple[int, int]]:
-    """At most `parts` ranges (begin, end) that cover 0 to `size` in order, none but the last shorter than `least`."""
+    """Split 0 to `size` into at most `parts` ranges (begin, end), of which only the last may be shorter than `least`."""
     least = _LEAST_RANGE if least is None else least
     parts = max(1, min(parts, size // max(least, 1)))
     stride = -(-size // parts)
@@ -57,7 +57,7 @@ class Launch:
     def __init__(
         self, commands: SequenceOf[Command], keep: object = None, device: str | wp.Device | None = "cpu"
     ) -> None:
-        """Of the commands for the ranges; `keep` holds what they point to."""
+        """Hold the commands for the ranges, and in `keep` the objects that they point to."""
         self.commands = tuple(commands)
         self.device = wp.get_device(device)
         self._keep = keep
@@ -68,7 +68,7 @@ class Launch:
 
 
 class Sequence:
-    """Launches one after the other: the threads stay at it, with a barrier after each launch.
+    """Launches one after the other on the same threads, with a barrier after each.
 
     On a CUDA device they become one graph once they have been run a few times: to start that takes as long as to start one of them.
 
@@ -77,7 +77,7 @@ class Sequence:
     """
 
     def __init__(self, launches: SequenceOf[Launch]) -> None:
-        """Of these launches; those without any range are left out."""
+        """Hold these launches, without those that have no range."""
         self.launches = tuple(launches)
         self._phases = [launch.commands for launch in self.launches if launch.commands]
         self._device = next((launch.device for launch in self.launches if launch.device.is_cuda), None)
@@ -134,7 +134,7 @@ def record(
 
 
 def _fair_turns(dim: int, threads: int, most: int, least: int) -> int:
-    """How many ranges each of the threads can take, as many as the others."""
+    """Return how many ranges each thread takes if all take equally many."""
     if threads == 1:
         return 1
     return max(1, min(most, dim // (threads * least)))
@@ -180,7 +180,7 @@ def launch_each(
 
 
 class _Barrier:
-    """Where `size` threads wait for each other: in round r, thread i signals thread i + 2^r and waits for i - 2^r.
+    """A dissemination barrier of `size` threads: in round r, thread i signals thread i + 2^r and waits for i - 2^r.
 
     (The dissemination barrier of Hensgen, Finkel and Manber 1988.) The locks are binary semaphores. There are two sets in
     turn: a thread may come to the next barrier before another has left this one.
@@ -206,7 +206,7 @@ class _Barrier:
             wait()
 
     def open(self) -> None:
-        """Let everybody through, for good."""
+        """Open the barrier for good."""
         for lock in self._locks:
             _open(lock)
 
@@ -232,7 +232,7 @@ class _Job:
         self.abandoned = False
 
     def take_part(self, i: int) -> None:
-        """As thread i. After an error nothing more is run, but the barriers are kept, so that nobody waits for ever."""
+        """Take part as thread i. After an error only the barriers go on, so that no thread waits for ever."""
         wait = self.barrier.wait
         for commands in self.phases:
             if i < len(commands) and self.error is None:
@@ -272,7 +272,7 @@ class _Pool:
                         raise
 
     def run(self, phases: SequenceOf[SequenceOf[Command]], threads: int) -> None:
-        """Run the phases on so many threads. The caller has locked `busy`."""
+        """Run the phases on the pool's threads. The caller holds the lock `busy`."""
         barrier = self._barriers.get(threads) or self._barriers.setdefault(threads, _Barrier(threads))
         job = self._job = _Job(phases, barrier)
         try:
@@ -286,7 +286,7 @@ class _Pool:
             raise job.error
 
     def close(self) -> None:
-        """Let the threads go; the pool is of no use afterwards."""
+        """End the threads; the pool cannot be used afterwards."""
         global _pool
         if self.closed:
             return
@@ -306,7 +306,7 @@ _pool_making = threading.Lock()
 
 
 def _pool_of(size: int) -> _Pool:
-    """The pool, with at least so many threads."""
+    """Return the pool with at least this many threads."""
     global _pool
     with _pool_making:
         if _pool is None or _pool.size < size:
@@ -318,7 +318,7 @@ def _pool_of(size: int) -> _Pool:
 
 
 def _forget_pool() -> None:
-    """A forked process has none of its parent's threads, and perhaps a lock that one of them held."""
+    """Drop the pool in a forked process, which has none of its parent's threads."""
     global _pool, _pool_making
     _pool, _pool_making = None, threading.Lock()
 

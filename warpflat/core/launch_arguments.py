@@ -35,7 +35,7 @@ def commands_of(
     outputs: Sequence[Any],
     device: wp.Device,
 ) -> list[Command]:
-    """What runs a kernel over each range of its threads.
+    """Return the commands that run a kernel over each range of its threads.
 
     Args:
         kernel: takes ``first: int`` after `given`, before `outputs`.
@@ -81,14 +81,14 @@ class _Misfit(Exception):
 
 
 class _Form:
-    """How the arguments of a kernel are packed.
+    """The layout of a kernel's packed arguments.
 
     Attributes:
         fits: whether launches can be packed by it.
     """
 
     def __init__(self, recorded: wp.Launch, first: int) -> None:
-        """From a launch that Warp has recorded, with its argument number `first`."""
+        """Take the layout from a launch that Warp has recorded; `first` is the number of the argument that begins a range."""
         self._bounds, values = type(recorded.params[0]), recorded.params[1:]
         args = recorded.kernel.adj.args
         self._device, self._launch = recorded.device, copy(recorded)
@@ -115,7 +115,7 @@ class _Form:
         self.fits = self.fits and len(self._ways) == len(ways)
 
     def commands(self, ranges: Sequence[tuple[int, int]], values: Sequence[Any]) -> list[Command] | None:
-        """For each range; None if there are arguments that it does not know."""
+        """Return a command for each range; None if an argument is of an unknown type."""
         if not self.fits or len(values) != len(self._ways):
             return None
         try:

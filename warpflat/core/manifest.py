@@ -1,4 +1,4 @@
-"""What earlier runs have left in a folder, and what of it goes once the results of another run are there.
+"""The manifest of a folder's outputs, by which stale files of earlier runs are removed.
 
 `metrics.json` lists under `files`, by the name of the run, what each has written, with its SHA-256. Nothing else is ever removed,
 and of that only what is still as it was written, so that a file which somebody has drawn on, or put there under that name, stays.
@@ -25,7 +25,7 @@ _NAMELESS = ("frames.usdc", "picture.png", "wear.png", "pattern.pdf", "pattern.j
 
 
 def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
-    """Write `metrics.json`; what the one that was there knew of the files of earlier runs is kept.
+    """Write `metrics.json` and keep the manifest of the one before.
 
     Raises:
         InputError: it cannot be written.
@@ -37,7 +37,7 @@ def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:
 def remove_stale(
     folder: Path, metrics: Mapping[str, Any], *, name: str, files: Sequence[str]
 ) -> tuple[dict[str, Any], tuple[str, ...]]:
-    """Write `metrics.json` at the end of a run, and remove what earlier ones have left and would be taken for its own.
+    """Write `metrics.json` at the end of a run, and remove files of earlier runs that could be taken for its own.
 
     That is what a run of the same name has written and this one has not, and of other runs those files that bear no name,
     such as `pattern.json`; never a file from which this run was made. In an
@@ -74,13 +74,13 @@ def remove_stale(
             del earlier[run][file]
     if removed:
         notes.insert(0, f"removed what an earlier run had left and this one did not make: {', '.join(removed)}")
-    told = {**metrics, "files": {run: known for run, known in earlier.items() if known}}
-    write_json(folder / "metrics.json", told)
-    return told, tuple(notes)
+    complete = {**metrics, "files": {run: known for run, known in earlier.items() if known}}
+    write_json(folder / "metrics.json", complete)
+    return complete, tuple(notes)
 
 
 def record_file(folder: Path, name: str, file: str) -> None:
-    """Add a file, written again or later, to those of a run that `metrics.json` knows; without such a run do nothing.
+    """Add a file to the manifest of a run in `metrics.json`, if there is such a run.
 
     Raises:
         InputError: `metrics.json` cannot be written.
@@ -96,7 +96,7 @@ def record_file(folder: Path, name: str, file: str) -> None:
 
 
 def _take_away(path: Path, was: str) -> str:
-    """Remove a file that is still as a run wrote it, or say why it stays."""
+    """Remove a file that is still as a run wrote it; return why it stays, or nothing if it is gone."""
     if is_input(path):
         return "this run was made from it"
     if path.is_symlink() or (path.exists() and not path.is_file()):
@@ -111,7 +111,7 @@ def _take_away(path: Path, was: str) -> str:
 
 
 def require_own_metrics(folder: Path) -> None:
-    """Make sure that a `metrics.json` which is there is of warpflat, since a run replaces it.
+    """Check that the `metrics.json` of a folder is of warpflat, since a run replaces it.
 
     Raises:
         InputError: it is something else by that name.
@@ -120,7 +120,7 @@ def require_own_metrics(folder: Path) -> None:
 
 
 def _read(folder: Path) -> dict[str, Any]:
-    """What a folder's `metrics.json` holds; nothing where there is none.
+    """Return the content of a folder's `metrics.json`, which is empty if there is none.
 
     Raises:
         InputError: it is something else by that name.
@@ -140,7 +140,7 @@ def _read(folder: Path) -> dict[str, Any]:
 
 
 def _record(metrics: Mapping[str, Any]) -> Record:
-    """The files it lists, by run; only plain names, since a name with a folder in it is none that a run has written."""
+    """Return the listed files by run; names with a folder in them are left out, since no run writes such."""
     listed = metrics.get("files")
     if not isinstance(listed, dict):
         return {}

@@ -1,4 +1,4 @@
-"""Memory that a run needs is asked for before it begins: libraries in C++ crash where they get none."""
+"""Memory limits are checked before a run begins, since libraries in C++ crash where they get no memory."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ _SAID = (
 
 
 def require_memory_for_libraries() -> None:
-    """Make sure that the libraries of a run can be loaded.
+    """Check that there is memory for the libraries of a run.
 
     Raises:
         InputError: they cannot.
@@ -46,7 +46,7 @@ def require_memory_for_libraries() -> None:
 
 
 def require_memory_for_run(vertices: int, *, frames: bool) -> None:
-    """Make sure that a mesh of so many vertices can be flattened, and its film written.
+    """Check that there is memory to flatten a mesh and to write its frames.
 
     Raises:
         InputError: it cannot.
@@ -57,7 +57,7 @@ def require_memory_for_run(vertices: int, *, frames: bool) -> None:
 
 
 def require_memory_for_usd() -> None:
-    """Make sure that a USD file can be read.
+    """Check that there is memory for the USD library.
 
     Raises:
         InputError: it cannot.
@@ -67,7 +67,7 @@ def require_memory_for_usd() -> None:
 
 
 def is_out_of_memory(error: BaseException | None) -> bool:
-    """Whether memory was refused, as the error or one that it came from says."""
+    """Return whether an error, or one that caused it, says that there was no memory."""
     seen = set[int]()
     while error is not None and id(error) not in seen:
         if isinstance(error, MemoryError) or any(words in str(error).lower() for words in _SAID):
@@ -78,7 +78,7 @@ def is_out_of_memory(error: BaseException | None) -> bool:
 
 
 def memory_limit() -> str:
-    """The limit on the address space of this process, in words; empty where there is none."""
+    """Return the limit on the address space of this process as text; empty if there is none."""
     with suppress(ImportError, OSError, ValueError):
         import resource
 

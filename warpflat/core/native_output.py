@@ -13,7 +13,7 @@ __all__ = ["native_errors"]
 
 @contextmanager
 def native_errors() -> Iterator[list[str]]:
-    """Keep what is written to standard error in the body from it; its lines are in the list when the body has ended.
+    """Capture what native code writes to standard error in the block; its lines are in the list at the end.
 
     It holds for the whole process, other threads included, so the body should be short. Nothing is kept where there is no standard
     error or no room for a temporary file.

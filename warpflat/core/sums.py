@@ -1,4 +1,4 @@
-"""Sums over all vertices of a piece, on one core, and where lists one after another begin.
+"""Sums and percentiles of arrays on the host, and offsets of consecutive ranges.
 
 A linear algebra library wakes threads of its own for a product of ten thousand numbers, and lets them spin for a while afterwards, on
 the cores on which the kernels' ranges are to run: a quarter of the time of a relaxation. These are as fast and wake nobody.
@@ -34,16 +34,16 @@ def range_offsets(counts: Sequence[int] | NDArray[np.integer]) -> IntArray:
 
 
 def dot(a: FloatArray, b: FloatArray) -> float:
-    """The sum of all products of numbers at the same place."""
+    """Return the scalar product of two arrays of one shape."""
     return float(np.einsum("i,i->", a.ravel(), b.ravel()))
 
 
 def products(a: Rows, b: Rows) -> FloatArray:
-    """#A by #B, scalar products of the rows of `a` (#A by #N) with those of `b` (#B by #N), in double precision."""
+    """Return the scalar products (#A by #B) of the rows of `a` (#A by #N) with those of `b` (#B by #N), in double precision."""
     total = np.zeros((len(a), len(b)))
     count = len(a[0]) if len(a) else 0
     for begin in range(0, count, _GATHERED):
-        # What np.stack does, without the looks that take as long as it all for a few hundred numbers.
+        # As np.stack, whose checks would take as long as all the rest for a few hundred numbers.
         rows, others = (np.array([row[begin : begin + _GATHERED] for row in of], dtype=np.float64) for of in (a, b))
         for first in range(0, rows.shape[1], _COLUMNS):
             some = slice(first, first + _COLUMNS)
@@ -59,12 +59,12 @@ def weighted_rows(weight: FloatArray, rows: Rows, total: FloatArray) -> None:
 
 
 def weighted_percentile(values: ArrayLike, weights: ArrayLike, fraction: float) -> float:
-    """The smallest of `values` (#N) below or at which at least `fraction` of the `weights` (#N) lie; 0 for none."""
+    """Return the smallest of `values` (#N) up to which at least `fraction` of the `weights` (#N) lie; 0 if there is none."""
     return weighted_percentiles(values, weights, [fraction])[0]
 
 
 def weighted_percentiles(values: ArrayLike, weights: ArrayLike, fractions: Sequence[float]) -> list[float]:
-    """For each fraction what `weighted_percentile` is."""
+    """Return `weighted_percentile` for each fraction."""
     value, weight = np.asarray(values, dtype=np.float64), np.asarray(weights, dtype=np.float64)
     if value.size == 0:
         return [0.0] * len(fractions)

@@ -1,4 +1,4 @@
-"""Words of messages, and names of files."""
+"""Text of messages."""
 
 from __future__ import annotations
 
@@ -21,17 +21,17 @@ _LETTERS = str.maketrans(
 
 
 def counted(number: int, what: str) -> str:
-    """ "1 piece", "2 pieces", "1,200 pieces"."""
+    """Return a number with its noun: "1 piece", "2 pieces", "1,200 pieces"."""
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
 
 def size_words(size: str) -> str:
-    """ "size EU 38", "size EU 38 made to measure", "made to measure"."""
+    """Return the words for a size: "size EU 38", "size EU 38 made to measure", "made to measure"."""
     return size if size == MADE_TO_MEASURE else f"size {size}"
 
 
 def control_in(text: str, allowed: str = "") -> str:
-    """The first control character of a text but for those `allowed`, or nothing.
+    """Return the first control character of a text that is not `allowed`, or nothing.
 
     These are the ones that no line of text holds: what XML forbids, what breaks a line, and what turns the direction of writing, so
     that a name is not what it looks like.
@@ -48,7 +48,7 @@ def _is_control(letter: str) -> bool:
 
 
 def shown(value: object) -> str:
-    """A value of the user as messages quote it: in one line, control characters escaped, the middle left out of a long one."""
+    """Return a value as messages quote it: in one line, control characters escaped, a long one without its middle."""
     try:
         return _shortened(repr(value), LONGEST_SHOWN)
     except (ValueError, RecursionError):
@@ -56,7 +56,7 @@ def shown(value: object) -> str:
 
 
 def one_line(text: str) -> str:
-    """The text of a message in one line, control characters escaped, the middle left out of what is very long."""
+    """Return a message in one line, control characters escaped, very long parts without their middle."""
     line = " ".join(part.strip() for part in text.splitlines())
     plain = "".join(repr(letter)[1:-1] if _is_control(letter) else letter for letter in line)
     words = re.sub(rf"\S{{{LONGEST_WORD + 1},}}", lambda word: _shortened(word[0], LONGEST_WORD), plain)
@@ -69,6 +69,6 @@ def _shortened(text: str, most: int) -> str:
 
 
 def plain_letters(text: str) -> str:
-    """The text with its letters' accents dropped: "Ärmel" becomes "Armel"."""
+    """Return a text without the accents of its letters: "Ärmel" becomes "Armel"."""
     apart = unicodedata.normalize("NFKD", text.translate(_LETTERS))
     return "".join(letter for letter in apart if not unicodedata.combining(letter))

@@ -1,4 +1,4 @@
-"""How many threads share the work."""
+"""The number of threads."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ __all__ = ["thread_count"]
 
 
 def thread_count() -> int:
-    """Threads used if nothing else is asked for: ``WARPFLAT_THREADS``, or the cores this process may use.
+    """Return the number of threads: ``WARPFLAT_THREADS``, or the number of cores that this process may use.
 
     Raises:
         InputError: the variable is not a whole number of at least 1.

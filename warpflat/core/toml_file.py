@@ -1,4 +1,4 @@
-"""TOML files that people write: read and checked against a pydantic model, every mistake told in one line."""
+"""TOML files are read and checked against a pydantic model; a mistake becomes one line."""
 
 from __future__ import annotations
 
@@ -31,13 +31,13 @@ _BLANKS = "\t\n\r"
 
 
 class Table(BaseModel):
-    """A table of a file: no unknown keys, no "1" for 1, no NaN, and nothing changes after reading."""
+    """A frozen table of a file, without unknown keys, "1" for 1, or NaN."""
 
     model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
 
 
 def read_toml(path: Path) -> dict[str, Any]:
-    """The file's tables.
+    """Read the tables of a file.
 
     Raises:
         InputError: no such file, a directory, unreadable, or not TOML (with the line).
@@ -66,7 +66,7 @@ def read_toml(path: Path) -> dict[str, Any]:
 
 
 def _check_values(tables: dict[str, Any], path: Path) -> None:
-    """See that whole numbers are TOML's, that texts are written in letters, and that no table lies too deep for those who read it.
+    """Check that whole numbers fit into 64 bits, that texts have no control characters, and that tables are not nested too deeply.
 
     Raises:
         InputError: the first that is not.
@@ -92,7 +92,7 @@ def _check_values(tables: dict[str, Any], path: Path) -> None:
 
 
 def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
-    """The data as a `model`.
+    """Check data against a model and return them as one.
 
     Args:
         model: what it must be.
@@ -106,11 +106,11 @@ def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") ->
         return model.model_validate(data)
     except ValidationError as error:
         problems = error.errors(include_url=False)
-        # A misspelled key is usually also a missing one: tell the cause, not the consequence.
+        # A misspelled key is usually also a missing one: report the cause, not the consequence.
         problems.sort(key=lambda p: p["type"] != "extra_forbidden")
         more = f" (and {len(problems) - 1} more)" if len(problems) > 1 else ""
-        told = f"{_describe(model, data, problems[0])}{more}"
-        raise InputError(f"{where}: {told}" if where else told) from None
+        message = f"{_describe(model, data, problems[0])}{more}"
+        raise InputError(f"{where}: {message}" if where else message) from None
 
 
 def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDetails) -> str:
@@ -127,12 +127,12 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     message = problem["msg"].removeprefix("Value error, ").removeprefix("Input ")
     given = problem["input"]
     if kind == "value_error" or isinstance(given, (dict, list)):
-        told = message
+        words = message
     else:
-        told = f"{message}, got {shown(given)}"
+        words = f"{message}, got {shown(given)}"
         if kind in ("literal_error", "enum"):
-            told += _guess(given, parent)
-    return f"{path}: {told}" if path else told
+            words += _guess(given, parent)
+    return f"{path}: {words}" if path else words
 
 
 def _walk(model: type[BaseModel], data: Any, location: tuple[int | str, ...]) -> tuple[list[str], Any]:

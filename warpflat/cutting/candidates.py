@@ -1,4 +1,4 @@
-"""Where a piece could be cut: feature lines through or near the peaks of its energy, free paths that follow it, and ways inwards.
+"""Candidates for a cut: along feature lines near the peaks of the energy, along free paths that follow it, and inwards from the border.
 
 A candidate runs from the border to a peak, from border to border, or, where the peak is at the border, from there inwards.
 Peaks that mirror each other (two busts) make pairs: a pattern maker cuts both or none.
@@ -28,13 +28,13 @@ from warpflat.surface.paths.trace import SurfacePath, polyline_path
 __all__ = ["Candidate", "Peaks", "find_candidates", "find_peaks"]
 
 
-# All lengths are shares of the piece's diagonal.
+# Lengths are shares of the piece's diagonal.
 _SMOOTHING = 0.02
 _APART = 0.15
 _REACH = 0.12
 _SHORTEST = 0.04
 _STRAY = 0.01
-# A peak counts beside the highest from this share of its density on.
+# A peak counts from this share of the highest peak's density.
 _NEARLY_AS_HIGH = 0.7
 _MOST_PEAKS = 4
 # Two cuts whose lengths agree to this share mirror each other.
@@ -43,8 +43,8 @@ _ALIKE = 0.03
 _INWARDS = {"inward": 0.8, "short inward": 0.4}
 # A piece whose edges are all within this share of their lengths is flat but for rounding.
 _FREE_OF_STRAIN = 1e-6
-# Where no energy is, a free path costs so many times its length at the peak.
-_DEAR = 20.0
+# A free path costs this many times more where there is no energy than at the peak.
+_COST_RATIO = 20.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -83,7 +83,7 @@ class Peaks:
 
 
 def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None) -> Peaks:
-    """The highest points of the smoothed energy density inside a piece.
+    """Find the highest points of the smoothed energy density inside a piece.
 
     Args:
         result: the flattened piece.
@@ -105,7 +105,7 @@ def find_peaks(result: Flattening, *, landmarks: Mapping[str, int] | None = None
 
 
 def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Candidate, ...]:
-    """Cuts worth comparing on a flattened piece, cut before or not.
+    """Find cuts worth comparing on a flattened piece, cut before or not.
 
     Each feature line that passes near a peak, from each of its ends on the border to that peak and as a whole; one free
     path per peak from there to the border; from the border near a peak two ways inwards; and the pairs of those that mirror each other.
@@ -122,9 +122,9 @@ def find_candidates(result: Flattening, peaks: Peaks | None = None) -> tuple[Can
     for number in range(len(peaks.vertices)):
         free = _free_path(result, number, peaks)
         found += [] if free is None else [free]
-        if free is None or _extent(result.surface, free) < _REACH * _diagonal(result.surface):
-            found += _ways_inwards(result, number, peaks)
-    singles = _without_doubles(found)
+        if free is None or _cut_length(result.surface, free) < _REACH * _diagonal(result.surface):
+            found += _cuts_inwards(result, number, peaks)
+    singles = _without_duplicates(found)
     pairs = _pairs(result.surface, singles)
     twins = {name for pair in pairs for name in pair[1]}
     return (*(pair for pair, _ in pairs), *(replace(one, has_twin=one.name in twins) for one in singles))
@@ -135,7 +135,7 @@ def _diagonal(surface: Surface) -> float:
 
 
 def _border(result: Flattening) -> BoolArray:
-    """#V, whether a vertex of the uncut surface is on the border or on a crack; the tip of a dart is on none."""
+    """Return for each vertex of the uncut surface (#V) whether it is on the border or on a crack; the tip of a dart is on neither."""
     edges = border_edges(result.faces)
     flags = np.zeros(len(result.surface.vertices), dtype=bool)
     flags[result.vertex_origin[edges.ravel()]] = True
@@ -151,43 +151,57 @@ def _place_in_words(surface: Surface, vertex: int, landmarks: Mapping[str, int] 
 
 
 def _along_line(result: Flattening, name: str, line: IntArray, peaks: Peaks) -> list[Candidate]:
-    """The parts of a line from the border to the peaks near it, and the whole line, where nothing has been cut yet."""
+    """Return the parts of an uncut line from the border to the peaks near it, and the whole line."""
     surface = result.surface
-    size = _diagonal(surface)
     on_border = _border(result)
     if line[0] == line[-1] or np.count_nonzero(on_border[line[1:-1]]) > 0.5 * (len(line) - 2):
         return []
     points = surface.vertices[line]
     found: list[Candidate] = []
-    near = False
+    passes_peak = False
     for number, peak in enumerate(peaks.vertices):
         distance = np.linalg.norm(points - surface.vertices[peak], axis=1)
         station = int(np.argmin(distance))
-        if distance[station] > _REACH * size or on_border[line[station]]:
+        if distance[station] > _REACH * _diagonal(surface) or on_border[line[station]]:
             continue
-        near = True
-        for part, end in ((line[: station + 1], 0), (line[station:][::-1], -1)):
-            # Walking outwards from the peak, the first vertex of a border or a crack is where the cut begins.
-            outwards = np.flatnonzero(on_border[part[::-1]])
-            if not len(outwards):
-                continue
-            path = part[len(part) - 1 - int(outwards[0]) :]
-            if path_length(surface, [path]) > _SHORTEST * size and _is_free(result, path):
-                others = [other for k, other in enumerate(peaks.vertices) if k != number]
-                if others and min(_distance(surface, path, other) for other in others) < _REACH * size:
-                    # It would run through another peak to this one; the part up to that is a candidate of its own.
-                    continue
-                begins = _border_line(surface, name, int(path[0])) or ("its start", "its end")[end]
-                found.append(Candidate(name=f"{name} from {begins}", paths=(path,), peaks=(number,)))
-    if (
-        near
-        and on_border[line[0]]
-        and on_border[line[-1]]
-        and not on_border[line[1:-1]].any()
-        and _is_free(result, line)
-    ):
+        passes_peak = True
+        for part, end in ((line[: station + 1], "its start"), (line[station:][::-1], "its end")):
+            path = _path_to_peak(result, part, on_border, peaks, number)
+            if path is not None:
+                begin = _border_line(surface, name, int(path[0])) or end
+                found.append(Candidate(name=f"{name} from {begin}", paths=(path,), peaks=(number,)))
+    crosses = on_border[line[[0, -1]]].all() and not on_border[line[1:-1]].any()
+    if passes_peak and crosses and _is_free(result, line):
         found.append(Candidate(name=f"{name}, whole", paths=(line,)))
     return found
+
+
+def _path_to_peak(
+    result: Flattening, part: IntArray, on_border: BoolArray, peaks: Peaks, number: int
+) -> IntArray | None:
+    """Return the path from the border to a peak along a part of a line that ends there; None if there is no such cut.
+
+    Args:
+        result: the piece.
+        part: vertices of the line, the last one at the peak.
+        on_border: #V, whether a vertex is on the border or on a crack.
+        peaks: of the piece.
+        number: of the peak.
+    """
+    surface = result.surface
+    size = _diagonal(surface)
+    # The cut begins at the vertex of a border or a crack that is nearest to the peak.
+    outwards = np.flatnonzero(on_border[part[::-1]])
+    if not len(outwards):
+        return None
+    path = part[len(part) - 1 - int(outwards[0]) :]
+    if path_length(surface, [path]) <= _SHORTEST * size or not _is_free(result, path):
+        return None
+    others = [other for k, other in enumerate(peaks.vertices) if k != number]
+    if any(_distance(surface, path, other) < _REACH * size for other in others):
+        # It would run through another peak to this one; the part up to that is a candidate of its own.
+        return None
+    return path
 
 
 def _distance(surface: Surface, path: IntArray, vertex: int) -> float:
@@ -195,7 +209,7 @@ def _distance(surface: Surface, path: IntArray, vertex: int) -> float:
 
 
 def _border_line(surface: Surface, own: str, vertex: int) -> str | None:
-    """The name of another line that holds this vertex of the border."""
+    """Return the name of another line along the border that holds this vertex."""
     border = {int(v) for v in border_edges(surface.faces).ravel()}
     for name, line in surface.lines.items():
         if name != own and vertex in line and all(int(v) in border for v in line):
@@ -204,7 +218,7 @@ def _border_line(surface: Surface, own: str, vertex: int) -> str | None:
 
 
 def _is_free(result: Flattening, path: IntArray) -> bool:
-    """Whether a path has cloth on both sides all along and touches no earlier cut but at its ends."""
+    """Return whether a path has cloth on both sides and touches earlier cuts at its ends only."""
     taken = {int(v) for made in result.cuts for other in made.paths for v in other}
     edges, beside = edge_faces(result.surface.faces)
     inside = {(int(a), int(b)) for (a, b), faces in zip(edges, beside, strict=True) if faces[1] >= 0}
@@ -213,7 +227,7 @@ def _is_free(result: Flattening, path: IntArray) -> bool:
 
 
 def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | None:
-    """The path from the border to a peak that runs where the energy is (Wang, Smith and Yuen 2002).
+    """Return the path from the border to a peak that follows the energy (Wang, Smith and Yuen 2002); None if there is none.
 
     A stretch of edge costs its length, less where much energy lies along it. On triangles, whose edges lead nowhere in
     particular, the path is then drawn as straight as the surface allows.
@@ -225,7 +239,7 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     graph = EdgeGraph(cut_surface)
     density = peaks.map.vertex_density[result.vertex_origin]
     along = density[graph.edges].mean(axis=1) / max(float(density.max()), np.finfo(float).tiny)
-    matrix = graph.matrix(graph.length / (1.0 / _DEAR + (1.0 - 1.0 / _DEAR) * along))
+    matrix = graph.matrix(graph.length / (1.0 / _COST_RATIO + (1.0 - 1.0 / _COST_RATIO) * along))
     cost, before = dijkstra(matrix, indices=peak, return_predecessors=True)
     rim = np.unique(border_edges(cut_surface.faces))
     goal = int(rim[np.argmin(cost[rim])])
@@ -241,7 +255,7 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     surface = result.surface
     if len(path) < 2 or path_length(surface, [path]) < _SHORTEST * _diagonal(surface) or not _is_free(result, path):
         return None
-    name = f"free path {_made_before(result, 'free path') + number + 1}"
+    name = f"free path {_last_number(result, 'free path') + number + 1}"
     if surface.is_quad.all():
         return Candidate(name=name, paths=(path,), peaks=(number,))
     stops = _corners(surface.vertices[path], _STRAY * _diagonal(surface))
@@ -252,8 +266,8 @@ def _free_path(result: Flattening, number: int, peaks: Peaks) -> Candidate | Non
     return Candidate(name=name, drawn=(drawn,), peaks=(number,))
 
 
-def _ways_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candidate]:
-    """Straight cuts from the border near a peak towards where the piece is curved.
+def _cuts_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candidate]:
+    """Return straight cuts from the border near a peak towards the curved part of the piece.
 
     The cloth along a border is too long or too short because of the curvature behind it; that is what a cut has to reach.
     """
@@ -266,27 +280,27 @@ def _ways_inwards(result: Flattening, number: int, peaks: Peaks) -> list[Candida
     if any(_distance(surface, path, start) < _REACH * _diagonal(surface) for path in made):
         # It would leave a strip between itself and that cut.
         return []
-    hearts = _hearts(surface)
-    if not hearts:
+    curved = _curved_places(surface)
+    if not curved:
         return []
-    nearest = np.argmin(np.linalg.norm(surface.vertices[hearts] - surface.vertices[start], axis=1))
+    nearest = np.argmin(np.linalg.norm(surface.vertices[curved] - surface.vertices[start], axis=1))
     found = []
     for kind, share in _INWARDS.items():
         try:
-            way = polyline_path(surface, [start, hearts[nearest]])
+            way = polyline_path(surface, [start, curved[nearest]])
             point = points_at_lengths(way.points, share * way.length)
             tip = int(np.argmin(np.linalg.norm(surface.vertices - point, axis=1)))
             drawn = polyline_path(surface, [start, tip])
         except InputError:
             continue
         if drawn.length > _SHORTEST * _diagonal(surface):
-            name = f"{kind} {_made_before(result, 'inward') + number + 1}"
+            name = f"{kind} {_last_number(result, 'inward') + number + 1}"
             found.append(Candidate(name=name, drawn=(drawn,), peaks=(number,)))
     return found
 
 
-def _hearts(surface: Surface) -> list[int]:
-    """The peaks of curvature times the distance to the border, highest first."""
+def _curved_places(surface: Surface) -> list[int]:
+    """Return the vertices where curvature times the distance to the border peaks, highest first."""
     size = _diagonal(surface)
     tensor = curvature_tensors(surface)
     trace = np.trace(tensor, axis1=1, axis2=2)
@@ -303,7 +317,13 @@ def _hearts(surface: Surface) -> list[int]:
 
 
 def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]:
-    """The vertex where a positive value is highest, and others where it is nearly as high, so far apart [m]; highest first."""
+    """Return the vertices where a positive value peaks, highest first.
+
+    Args:
+        surface: with #V vertices.
+        height: #V, the value.
+        apart: least distance between two of them [m].
+    """
     chosen: list[int] = []
     for vertex in np.argsort(-height, kind="stable").tolist():
         if height[vertex] <= 0 or (chosen and height[vertex] < _NEARLY_AS_HIGH * height[chosen[0]]):
@@ -314,14 +334,14 @@ def _highest(surface: Surface, height: FloatArray, *, apart: float) -> list[int]
     return chosen
 
 
-def _made_before(result: Flattening, kind: str) -> int:
-    """The highest number that a line or cut of a kind bears."""
+def _last_number(result: Flattening, kind: str) -> int:
+    """Return the highest number in the names of lines and cuts of a kind; 0 if there is none."""
     names = " ".join([*result.surface.lines, *(made.name for made in result.cuts)])
     return max((int(found) for found in re.findall(rf"\b{kind} (\d+)", names)), default=0)
 
 
 def _corners(points: FloatArray, stray: float) -> list[int]:
-    """The points of a polyline that a straighter one needs to keep within a distance (Ramer 1972)."""
+    """Return the points of a polyline that a simpler one needs to stay within a distance of it (Ramer 1972)."""
     kept = {0, len(points) - 1}
     open_parts = [(0, len(points) - 1)]
     while open_parts:
@@ -338,11 +358,11 @@ def _corners(points: FloatArray, stray: float) -> list[int]:
     return sorted(kept)
 
 
-def _extent(surface: Surface, one: Candidate) -> float:
+def _cut_length(surface: Surface, one: Candidate) -> float:
     return path_length(surface, one.paths) + sum(path.length for path in one.drawn)
 
 
-def _without_doubles(candidates: list[Candidate]) -> list[Candidate]:
+def _without_duplicates(candidates: list[Candidate]) -> list[Candidate]:
     seen: set[tuple[int, ...]] = set()
     names: dict[str, int] = {}
     kept = []
@@ -359,14 +379,14 @@ def _without_doubles(candidates: list[Candidate]) -> list[Candidate]:
 
 
 def _pairs(surface: Surface, singles: list[Candidate]) -> list[tuple[Candidate, tuple[str, str]]]:
-    """Two cuts of one length that lead to two peaks and have no vertex in common, as one, with both names."""
+    """Return pairs of cuts of one length that lead to two peaks and share no vertex, each pair as one cut, with both names."""
     pairs = []
     for a, b in combinations(singles, 2):
         if not (a.peaks and b.peaks) or set(a.peaks) & set(b.peaks) or bool(a.drawn) != bool(b.drawn):
             continue
-        lengths = _extent(surface, a), _extent(surface, b)
+        lengths = _cut_length(surface, a), _cut_length(surface, b)
         shared = {int(v) for path in a.paths for v in path} & {int(v) for path in b.paths for v in path}
-        if shared or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths) or not _same_kind(surface, a, b):
+        if shared or abs(lengths[0] - lengths[1]) > _ALIKE * max(lengths) or not _mirror_each_other(surface, a, b):
             continue
         line = a.name.rpartition(" from ")[0]
         same = line and b.name.startswith(f"{line} from ")
@@ -380,8 +400,8 @@ def _pairs(surface: Surface, singles: list[Candidate]) -> list[tuple[Candidate, 
     return pairs
 
 
-def _same_kind(surface: Surface, a: Candidate, b: Candidate) -> bool:
-    """Whether two cuts mirror each other in a plane: distances between their ends are those of a mirrored pair."""
+def _mirror_each_other(surface: Surface, a: Candidate, b: Candidate) -> bool:
+    """Return whether two cuts mirror each other in a plane, by the distances between their ends."""
     ends = [(surface.vertices[one.paths[0][[0, -1]]] if one.paths else one.drawn[0].points[[0, -1]]) for one in (a, b)]
     across = np.linalg.norm(ends[0][0] - ends[1][1]) - np.linalg.norm(ends[0][1] - ends[1][0])
     return bool(abs(across) <= _ALIKE * _diagonal(surface))

@@ -1,4 +1,4 @@
-"""The ledger of cuts: what each candidate would release, per centimetre, before anybody takes the scissors."""
+"""The ledger of cuts: the model energy that each candidate would release, in all and per centimetre."""
 
 from __future__ import annotations
 
@@ -36,14 +36,14 @@ __all__ = [
 
 RankedBy = Literal["per_cm", "released"]
 
-# Enough to tell candidates apart: see `coarse_options`.
+# Coarse options, which are enough to rank candidates: tolerances looser by this factor, and few steps.
 _LOOSER = 10.0
 _COARSE_STEPS = 600
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class LedgerEntry:
-    """One candidate, tried.
+    """A candidate that has been tried.
 
     Attributes:
         candidate: the cut.
@@ -74,21 +74,21 @@ class LedgerEntry:
 
     @property
     def released(self) -> float:
-        """[J]."""
+        """The model energy released [J]."""
         return self.model_energy_before - self.model_energy_after
 
     @property
     def per_cm(self) -> float:
-        """Released per centimetre cut [J/cm]."""
+        """The model energy released per centimetre cut [J/cm]."""
         return self.released / max(100.0 * self.length, np.finfo(float).tiny)
 
     @property
     def overlaps(self) -> bool:
-        """Whether cloth is missing there: no dart could be sewn."""
+        """Whether the sides of the widest dart overlap, so that it could not be sewn."""
         return self.angle < 0
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data, SI units but for `released_j_per_cm`."""
+        """Return plain data in SI units, but for `released_j_per_cm`."""
         return {
             "name": self.candidate.name,
             "length_m": self.length,
@@ -125,7 +125,7 @@ class Ledger:
     notes: tuple[str, ...] = ()
 
     def as_dict(self) -> dict[str, Any]:
-        """Plain data."""
+        """Return plain data."""
         return {
             "piece": self.result.surface.name,
             "peaks": list(self.peaks.words),
@@ -136,7 +136,7 @@ class Ledger:
 
 
 def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
-    """Options for ranking: tolerances ten times looser, and few steps."""
+    """Return options for ranking: tolerances ten times looser, and few steps."""
     given = given_options(options)
     return replace(
         given,
@@ -227,7 +227,7 @@ def evaluate(result: Flattening, candidate: Candidate, *, relax: RelaxOptions) -
 
 
 def _widest(result: Flattening) -> tuple[float, float]:
-    """Opening [m] and angle [rad] of the last cut's widest crack; NaN for the angle of one that parts the cloth."""
+    """Return opening [m] and angle [rad] of the last cut's widest crack; the angle is NaN if the crack parts the cloth."""
     found = []
     for seam in result.cuts[-1].seams:
         kind = seam_kind(seam)
@@ -245,7 +245,7 @@ def _widest(result: Flattening) -> tuple[float, float]:
 
 @dataclass(frozen=True, kw_only=True)
 class AutoCut:
-    """When to go on cutting.
+    """The settings of automatic cutting.
 
     Attributes:
         max_cuts: at most so many; a mirrored pair counts as one.
@@ -260,14 +260,14 @@ class AutoCut:
     by: RankedBy = "released"
 
     def is_enough(self, result: Flattening) -> bool:
-        """Whether a piece needs no further cut."""
+        """Return whether a piece needs no further cut."""
         return (
             result.stages[-1].model_energy_j <= self.stop_below or worn_strain_level(result) <= self.stop_below_strain
         )
 
 
 def worn_strain_level(result: Flattening) -> float:
-    """The worn strain along warp or weft, taken positive, that 98 % of the area stays below."""
+    """Return the absolute worn strain along warp or weft that 98 % of the area stays below."""
     from warpflat.core.sums import weighted_percentile
 
     strain = np.abs(result.worn.strain[:, :2]).max(axis=1)

@@ -1,4 +1,4 @@
-"""The ledger as a picture: the candidates on the body, and what each would release per centimetre."""
+"""The picture of a ledger: the candidates on the body, and what each would release per centimetre."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ _MOST = 24
 
 
 def candidate_words(entry: LedgerEntry) -> tuple[str, str, str, str, str, str]:
-    """Released per centimetre and in all, what is left, length, opening and angle, for people."""
+    """Return as text: energy released per centimetre and in all, share left, length, opening, angle."""
     return (
         f"{1e3 * entry.per_cm:.2f} mJ",
         f"{1e3 * entry.released:.0f} mJ",

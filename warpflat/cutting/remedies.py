@@ -1,4 +1,4 @@
-"""Cuts that would help where a garment does not fit, each tried on its piece."""
+"""Remedies: cuts that would help where a garment does not fit, each tried on its piece."""
 
 from __future__ import annotations
 
@@ -25,15 +25,15 @@ __all__ = ["advise", "remedies"]
 _NEARBY = 0.03
 
 
-# The share that is beyond the limit settles long before the energy does.
+# Tolerances of a trial are looser by this factor: the share beyond the limit settles long before the energy.
 _TRIAL_TOLERANCE = 20.0
 
 
 _MOST_TRIALS = 8
 
 
-# So many are told.
-_TOLD = 3
+# So many remedies are kept.
+_KEPT = 3
 
 
 # Nobody sews a dart shorter than this [m].
@@ -51,29 +51,31 @@ def advise(result: Flattening) -> Flattening:
 
 
 def remedies(result: Flattening, fit: WornFit, *, trial: bool = True) -> list[Remedy]:
-    """Darts and seams for the worst places: along lines that pass by, and straight from the border.
+    """Find darts and seams for the worst places: along lines that pass by, and straight from the border.
 
-    None for a piece that fits unsewn. Cuts of a sewn piece are tried on it as it lay before, and compared with that: what sewing adds
-    or takes is not the cut's.
+    A piece that fits unsewn gets none. Cuts of a sewn piece are tried on the unsewn piece and compared with it.
 
     Args:
         result: a flattened piece.
         fit: how it sits.
         trial: make each cut, relax, and keep those that help, best first; else all of them, nearest first.
     """
-    alone = result.unsewn or result
-    if fit.fits or alone.fit.fits:
+    unsewn = result.unsewn or result
+    if fit.fits or unsewn.fit.fits:
         return []
-    found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _TOLD))
+    found = list(islice(_remedies_for(result, fit), _MOST_TRIALS if trial else _KEPT))
     if not trial:
         return found
-    tried = [_tried(alone, remedy) for remedy in found]
-    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * alone.fit.outside]
-    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:_TOLD]
+    tried = [_try(unsewn, remedy) for remedy in found]
+    helpful = [r for r in tried if r.outside is not None and r.outside < 0.9 * unsewn.fit.outside]
+    return sorted(helpful, key=lambda r: float(r.outside or 0.0))[:_KEPT]
 
 
 def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
-    """For the largest places, each once; made as they are asked for, since a path over a large mesh takes a while."""
+    """Yield remedies for the largest misfits, each path once.
+
+    They are made one by one, since a path over a large mesh takes a while.
+    """
     found: list[Remedy] = []
     for misfit in fit.misfits[:4]:
         for remedy in _candidates(result, misfit):
@@ -85,13 +87,24 @@ def _remedies_for(result: Flattening, fit: WornFit) -> Iterator[Remedy]:
 
 def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
     from warpflat.surface.connectivity import border_of
-    from warpflat.surface.paths.lines import line_between
 
-    surface = result.surface
+    border = border_of(result.surface)
     worst = int(result.vertex_origin[misfit.vertex])
-    border = border_of(surface)
-    points = surface.vertices
-    for name, line in surface.lines.items():
+    yield from _candidates_along_lines(result, border, worst)
+    if worst in border:
+        # A short cut at the border relieves nothing: it has to reach behind the region.
+        points = result.surface.vertices
+        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
+        if len(inside) == 0:
+            return
+        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
+    yield from _candidates_from_border(result, border, worst)
+
+
+def _candidates_along_lines(result: Flattening, border: IntArray, worst: int) -> Iterator[Remedy]:
+    """Yield darts and seams along the feature lines that pass near the vertex `worst`."""
+    points = result.surface.vertices
+    for name, line in result.surface.lines.items():
         row = np.asarray(line)
         if len(row) < 2 or np.isin(row, border).all():
             continue
@@ -103,15 +116,15 @@ def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
             yield _remedy(result, dart, f"a dart along {name}")
         if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
             yield _remedy(result, row, f"a seam along {name}")
-    if worst in border:
-        # At the border itself a short cut relieves nothing: it has to reach behind the region.
-        inside = np.setdiff1d(result.vertex_origin[result.faces[misfit.faces].ravel()], border)
-        if len(inside) == 0:
-            return
-        worst = int(inside[np.argmax(np.linalg.norm(points[inside] - points[worst], axis=1))])
-    for start in _border_feet(points, border, worst):
+
+
+def _candidates_from_border(result: Flattening, border: IntArray, worst: int) -> Iterator[Remedy]:
+    """Yield darts from the border to the vertex `worst`."""
+    from warpflat.surface.paths.lines import line_between
+
+    for start in _border_feet(result.surface.vertices, border, worst):
         try:
-            path = line_between(surface, int(start), worst)
+            path = line_between(result.surface, int(start), worst)
         except InputError:
             continue
         # A shortest path may run along the border first.
@@ -121,7 +134,7 @@ def _candidates(result: Flattening, misfit: Misfit) -> Iterator[Remedy]:
 
 
 def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
-    """The border's vertex nearest to the place, and the nearest in a direction at right angles to that or further off."""
+    """Return the border vertex nearest to `worst`, and the nearest one in a direction more than 72 degrees from that."""
     away = points[border] - points[worst]
     distance = np.linalg.norm(away, axis=1)
     first = int(np.argmin(distance))
@@ -142,7 +155,7 @@ def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy
     )
 
 
-def _tried(result: Flattening, remedy: Remedy) -> Remedy:
+def _try(result: Flattening, remedy: Remedy) -> Remedy:
     from warpflat.cutting.cut_piece import cut
     from warpflat.cutting.cut_plan import CutPlan
 

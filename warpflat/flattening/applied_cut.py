@@ -1,4 +1,4 @@
-"""What a cut has become on the pattern: a dart, a fish-eye dart, or the edges of two pieces, and its measures."""
+"""Cuts that have been made: darts, fish-eye darts or the edges of two pieces, and their measures."""
 
 from __future__ import annotations
 
@@ -25,10 +25,10 @@ class AppliedCut:
     """A cut that has been made.
 
     Attributes:
-        name: of the cut.
-        paths: along which it was made, vertices of the uncut surface.
-        seams: what it left: `path` in the uncut surface's numbering, `left` and `right` in the pattern's.
-        length: of cloth cut [m].
+        name: name of the cut.
+        paths: vertices of the uncut surface along which it was made.
+        seams: its two sides: `path` in the numbering of the uncut surface, `left` and `right` in that of the pattern.
+        length: length of the cut on the surface [m].
         tip_back: how far the tips of its darts are drawn back [m].
     """
 
@@ -40,18 +40,18 @@ class AppliedCut:
 
 
 def seam_kind(seam: Seam) -> str:
-    """ "dart" (one tip), "fish-eye" (two), or "parting" (none: it runs from border to border or closes)."""
+    """Return the kind of a seam: "dart" (one tip), "fish-eye" (two), or "parting" (none, from border to border or closed)."""
     tips = int(seam.left[0] == seam.right[0]) + int(seam.left[-1] == seam.right[-1])
     return ("parting", "dart", "fish-eye")[tips]
 
 
 def measure_cut(surface: Surface, positions: FloatArray, cut: AppliedCut) -> dict[str, Any]:
-    """The cut's entry in `metrics.json`: lengths [m], angles in degrees, a dart or gap per seam.
+    """Build a cut's entry in `metrics.json`: lengths [m], angles [degrees], a dart or gap per seam.
 
     Args:
         surface: the cut surface.
         positions: #P by 2, the pattern [m].
-        cut: made on it.
+        cut: a cut of that surface.
     """
     loops = border_loops(surface.faces)
     return {
@@ -97,7 +97,7 @@ def _measure_seam(
 
 
 def _drawn(positions: FloatArray, seam: Seam, kind: str, tip_back: float, loops: list[IntArray]) -> dict[str, Any]:
-    """The dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run; else why it is not."""
+    """Measure the dart as it is drawn: its tip moved back, straight legs made equal, curved ones as they run."""
     try:
         if kind == "fish-eye":
             eye = shape_fish_eye(positions, seam.left, seam.right, tip_back=tip_back)
@@ -126,7 +126,7 @@ def _drawn(positions: FloatArray, seam: Seam, kind: str, tip_back: float, loops:
 
 
 def _curved(left: FloatArray, right: FloatArray) -> dict[str, Any]:
-    """A dart along its curved legs, both from the border to the tip."""
+    """Measure a dart along its curved legs, both from the border to the tip."""
     tip = left[-1]
     to_left, to_right = left[0] - tip, right[0] - tip
     lengths = [polyline_length(leg) for leg in (left, right)]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -16,32 +14,28 @@ from warpflat.surface.paths.band import line_along_band
 from warpflat.surface.paths.lines import line_between, line_from_indices, line_on_plane
 from warpflat.surface.triangles import triangulate
 
-if TYPE_CHECKING:
-    pass
-
 __all__ = ["choose_and_name_datum", "choose_datum", "datum_extent"]
 
-# A datum that climbs by less than this share of its length is as level as its plane.
+# A datum is level if it leaves its plane by less than this share of its length.
 _LEVEL = 1e-6
 
 
-# A line beside it is along the same section if its ends are as far apart, to this share.
+# A parallel line follows the same section if its ends are as far apart, to this share.
 _AS_LONG = 0.05
 
 
-# A piece is about as wide as long from this share of its spreads (squares of lengths), and neither axis tells a direction from that.
+# A piece is about as wide as long from this ratio of its variances,
 _AS_WIDE = 0.64
-
-
+# and neither axis is a direction of its own from this ratio.
 _ALIKE = 0.95
 
 
-# A piece hangs by the vertical where one of its axes leans by no more than that from it (cosine): a bodice leans by 6.
+# An axis that leans no more than this from the vertical gives way to it [cosine].
 _HANGS = np.cos(np.radians(10.0))
 
 
 def choose_datum(surface: Surface) -> IntArray:
-    """The line along the piece's long axis through its middle, as vertex indices along edges.
+    """Return the line along the piece's long axis through its middle, as vertex indices along edges.
 
     The long axis is the first principal axis of the surface. Where length and width are within a fifth of each other it is the
     one of the two that is nearer to the vertical (+y), and the vertical itself where that leans by no more than 10 degrees from
@@ -53,7 +47,7 @@ def choose_datum(surface: Surface) -> IntArray:
 
 
 def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
-    """`choose_datum`, and in words along what the line was laid."""
+    """Return the line of `choose_datum`, and a description of it."""
     triangles, _ = triangulate(surface.faces)
     p = surface.vertices[triangles]
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
@@ -65,7 +59,7 @@ def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
     spread = np.einsum("i,k,ikx,iky->xy", area, share, at, at)
     values, axes = np.linalg.eigh(spread / area.sum())
     facing = normal.sum(axis=0)
-    long_axis, told = _long_axis(values, axes, facing)
+    long_axis, words = _long_axis(values, axes, facing)
     long_axis = long_axis * _upwards(long_axis, long_axis)
     across = np.cross(long_axis, facing)
     if np.linalg.norm(across) < 1e-9 * max(float(np.linalg.norm(facing)), 1e-300) or not np.any(facing):
@@ -78,14 +72,20 @@ def choose_and_name_datum(surface: Surface) -> tuple[IntArray, str]:
         along = (surface.vertices - centre) @ long_axis
         line = line_between(surface, int(along.argmin()), int(along.argmax()))
     band = line_along_band(surface, line)
-    line, told = (line, told) if band is None else (band, "along the middle of the band, from end to end")
+    line, words = (line, words) if band is None else (band, "along the middle of the band, from end to end")
     rising = surface.vertices[line[-1]] - surface.vertices[line[0]]
     upwards = _upwards(rising, long_axis if band is None else rising)
-    return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32), told
+    return np.ascontiguousarray(line if upwards > 0 else line[::-1], dtype=np.int32), words
 
 
 def _long_axis(values: FloatArray, axes: FloatArray, facing: FloatArray) -> tuple[FloatArray, str]:
-    """The axis along which a piece is laid, and what it is: of its spreads (ascending), principal axes (columns) and summed normal."""
+    """Return the axis along which a piece is laid, and a description of it.
+
+    Args:
+        values: variances along the principal axes, ascending [m2].
+        axes: 3 by 3, the principal axes as columns.
+        facing: sum of the face normals.
+    """
     up = np.array([0.0, 1.0, 0.0]) - facing * facing[1] / max(float(facing @ facing), 1e-300)
     size = float(np.linalg.norm(up))
     if values[1] <= _AS_WIDE * values[2] or size <= 0.5:
@@ -101,13 +101,13 @@ def _long_axis(values: FloatArray, axes: FloatArray, facing: FloatArray) -> tupl
 
 
 def _upwards(direction: FloatArray, leading: FloatArray) -> int:
-    """1 for a direction that rises along +y, or, where it is level, along the axis that `leading` is nearest to; else -1."""
+    """Return 1 for a direction that rises along +y (a level one: along the axis nearest to `leading`), else -1."""
     axis = 1 if abs(direction[1]) > 1e-6 * np.linalg.norm(direction) else int(np.abs(leading).argmax())
     return 1 if direction[axis] >= 0 else -1
 
 
 def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntArray:
-    """The line along the section by a plane, or, where its ends are far less level than its, by one through a vertex beside an end.
+    """Return the line along the section by a plane, or by a parallel one beside it whose line has far more level ends.
 
     The grain is the chord of the ends, and where the section lies halfway between two columns, each ends on either of them.
 
@@ -137,7 +137,7 @@ def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntA
         if len(other) < 2:
             continue
         its_reach, its_slope = reach_and_slope(other)
-        # Rounded, so that rounding does not choose: of two as level and as near, the right one.
+        # Rounded, so that rounding errors do not choose: of two lines as level and as near, the right one is taken.
         key = round(its_slope, 6), round(abs(shift) / reach, 6), -shift
         if abs(its_reach / reach - 1.0) < _AS_LONG and key < best[0]:
             best = key, other
@@ -145,7 +145,7 @@ def _level_line(surface: Surface, point: FloatArray, normal: FloatArray) -> IntA
 
 
 def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntArray, str, list[str]]:
-    """The datum as vertex indices, its name, and a note where it was chosen."""
+    """Return the datum as vertex indices, its name, and a note if it was chosen here."""
     if datum is None:
         line, along = choose_and_name_datum(surface)
         return line, "datum", [f"datum chosen: {along}, {datum_extent(surface, line)}"]
@@ -168,7 +168,7 @@ def resolve_datum(surface: Surface, datum: str | ArrayLike | None) -> tuple[IntA
 
 
 def datum_extent(surface: Surface, line: IntArray) -> str:
-    """How long a datum is (vertex indices of the line), and its ends as they were read."""
+    """Return the length of a datum and its ends, as text; vertices are numbered as they were read."""
     length = polyline_length(surface.vertices[line])
     ends = ", ".join(f"vertex {int(surface.input_index[v])}" for v in (line[0], line[-1]))
     return f"{100 * length:.1f} cm ({ends})"

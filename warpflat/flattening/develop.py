@@ -69,7 +69,7 @@ class Development:
 
 
 def develop(surface: Surface, datum: IntArray) -> Development:
-    """First layout of the surface from its datum line.
+    """Develop a surface from its datum line.
 
     Args:
         surface: one piece.
@@ -133,7 +133,7 @@ def _starts(
 
 
 def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
-    """A layout, and on a large piece the same as it goes between the vertices of coarser and coarser meshes.
+    """Yield a layout, and for a large piece smoother ones that interpolate it from coarser and coarser meshes.
 
     From neighbour to neighbour stations waver, by a larger share of an edge the finer the mesh is; that may fold many small faces.
     """
@@ -150,7 +150,7 @@ def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
 
 
 def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] | None:
-    """The surface with border vertices at one place made one, and for each vertex its number there.
+    """Return the surface with border vertices at one place merged, and for each vertex its number there.
 
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
     that do not belong together.
@@ -186,7 +186,7 @@ def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, Int
 
 
 def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
-    """The cells that are mirrored or as good as that."""
+    """Return the cells that are mirrored or nearly collapsed."""
     if (cells.least_shares(positions) > _LEAST_AREA).all():
         return np.empty(0, dtype=np.int64)
     corner, _, weight = corner_triangles(cells.faces)
@@ -194,7 +194,7 @@ def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
 
 
 def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
-    """Whether the faces go around some inner vertex more than once, or around a border vertex by more than a full turn.
+    """Return whether the faces wind more than once around an inner vertex, or by more than a full turn around a border vertex.
 
     Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
     """
@@ -219,7 +219,7 @@ def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> 
 
 
 def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
-    """A piece that lies in a plane already, as it lies there: #V by 2 [m], the datum's chord upwards; None if it does not."""
+    """Return the layout (#V by 2 [m]) of a piece that is flat already, the datum's chord upwards; None if it is not flat."""
     # Most do not, and a few of their vertices tell: by golden sections of their number, since every so many are one row or column.
     some = surface.vertices[(np.arange(_FEW_VERTICES) * _GOLDEN % 1.0 * len(surface.vertices)).astype(int)]
     away = some - some.mean(axis=0)
@@ -241,7 +241,7 @@ def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
 
 
 def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
-    """Pieces of bricks: the datum straight at its arc lengths, and each profile run out to both sides, parallel.
+    """Lay out a piece of bricks: the datum straight at its arc lengths, and each profile to both sides, parallel.
 
     The profiles are the grid lines of a quad mesh that cross the datum; a vertex lies at its arc length along its profile,
     beside the place of the datum where that starts.
@@ -270,7 +270,7 @@ def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
 
 
 def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | None:
-    """The same of a rectangular grid whose datum is one of its columns or rows, else None."""
+    """Lay out the profiles of a rectangular grid whose datum is one of its columns or rows; None for another mesh."""
     for lines, mirrored in ((grid, False), (grid.T, True)):
         column = np.flatnonzero(lines[0] == datum[0])
         upwards = len(column) == 1
@@ -292,7 +292,7 @@ def _beside(surface: Surface, grid: IntArray, datum: IntArray) -> FloatArray | N
 
 
 def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
-    """#L by #K by #N: K lines of a quad mesh (`start`), and the grid lines to the left of each, -1 where the grid has ended.
+    """Return K lines of a quad mesh and the grid lines to the left of each: #L by #K by #N, -1 where the grid has ended.
 
     No more lines than there are vertices for: where profiles meet again, or go around a tube, they would have no end.
     """
@@ -335,13 +335,13 @@ def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
 
 
 def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
-    """Any mesh: x is the signed geodesic distance from the datum, y the arc length of the nearest datum point. #V by 2 [m]."""
+    """Lay out any mesh (#V by 2 [m]): x is the signed geodesic distance from the datum, y the arc length of the nearest datum point."""
     positions = np.column_stack(signed_distance_and_station(surface, datum))
     return positions if np.isfinite(positions).all() else None
 
 
 def _upright(positions: FloatArray, datum: IntArray) -> FloatArray:
-    """The layout turned so that the datum's chord points up, its first point at the origin."""
+    """Turn a layout so that the datum's chord points up, and shift its first point to the origin."""
     chord = positions[datum[-1]] - positions[datum[0]]
     length = float(np.hypot(*chord))
     c, s = (chord[1] / length, chord[0] / length) if length > 0 else (1.0, 0.0)

@@ -1,4 +1,4 @@
-"""Edits of a pattern: another fabric, a surface that has moved, a cut; relaxed on from where the piece lies.
+"""Edits of a pattern: another fabric, a moved surface or a cut. The piece is relaxed further from its layout.
 
 An edit takes a fraction of what `flatten` takes: the piece is not developed again, what its faces tell is known already, and it lies near
 its new minimum, or is carried there from its coarser levels.
@@ -179,7 +179,7 @@ def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
 
 
 def _as_read(before: Surface, vertices: FloatArray) -> FloatArray:
-    """#I by 3, the vertices as they were read, moved: what was read several times at one place, as in an STL, stays at one."""
+    """Return the moved vertices as they were read (#I by 3); those read several times at one place, as in an STL, stay together."""
     as_read = before.input_vertices.copy()
     if len(as_read) > len(vertices):
         place = weld_map(before.input_vertices)
@@ -202,7 +202,7 @@ def relax_cut(
     options: RelaxOptions,
     callback: Callable[[Progress], None] | None = None,
 ) -> Flattening:
-    """Go on from a layout of a piece whose topology has changed; `warpflat.cutting.cut_piece.cut` makes such.
+    """Relax a piece whose topology has changed, as `warpflat.cutting.cut_piece.cut` changes it, further from a layout.
 
     Args:
         result: of the piece before.

@@ -1,4 +1,4 @@
-"""How a pattern sits, drawn: strain, tension and pressure on the flat pieces, a page per piece or a sheet per garment."""
+"""Pictures of the fit: strain, tension and pressure on the flat pieces, a page per piece or a sheet per garment."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.core.sums import weighted_percentile
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_png import save_png
-from warpflat.flattening.fit_report import RANGES, help_words, pressure_words, strain_words
+from warpflat.flattening.fit_report import RANGES, pressure_words, remedy_words, strain_words
 from warpflat.model.fit import MAPS, WornFit
 from warpflat.surface.half_edges import border_edges
 
@@ -30,19 +30,20 @@ if TYPE_CHECKING:
 __all__ = ["write_wear_picture", "write_wear_sheet"]
 
 
-# Below these a map would show rounding.
+# The least range of a scale: below it a map would show rounding.
 _LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
-# What is compared at a glance has one scale.
+# Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
-# The fabric's limit is one for its threads.
+# The fabric's strain limit applies to its threads.
 _LIMITED = _ALIKE[0]
 _BEYOND = "#00a000"
 _MMHG = 133.322  # [Pa]
 
-_COLUMN = 2.5  # width of a column, and a piece's greatest height [in]
-_TALLEST = 4.2
+# Of a garment's sheet: a piece's greatest width and height, the labels' width, and the margins [in].
+_COLUMN, _TALLEST = 2.5, 4.2
 _LABEL = 2.5
-_LETTERS = 36
+_TOP, _BOTTOM = 0.95, 1.0
+_LETTERS = 36  # in a line of a label
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -87,7 +88,7 @@ def _scales(fits: Sequence[WornFit], groups: Sequence[Sequence[str]]) -> dict[st
 
 @all_letters()
 def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None:
-    """Strains, tensions and pressure on the pattern, six maps with their scales; what lies beyond the limit is outlined.
+    """Draw strains, tensions and pressure on the pattern in six maps; what lies beyond the fabric's limit is outlined.
 
     Args:
         path: the file, ``*.png``.
@@ -127,7 +128,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
 
 @all_letters()
 def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str) -> None:
-    """All pieces of a garment as worn: a row per piece, a column per map, all at one scale of length and of colour.
+    """Draw all pieces of a garment as worn: a row per piece, a column per map, one scale of length and of colour.
 
     Args:
         path: the file, ``*.png``.
@@ -142,41 +143,102 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
 
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    spans = np.array([np.ptp(result.positions, axis=0) for result in results])
-    inches = min(_COLUMN / max(float(spans[:, 0].max()), 1e-9), _TALLEST / max(float(spans[:, 1].max()), 1e-9))
-    column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
-    rows = [
-        max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.3
-        for span, result in zip(spans[:, 1], results, strict=True)
-    ]
-    top, bottom = 0.95, 1.0
-    size = (_LABEL + len(MAPS) * column + 0.2, top + sum(rows) + bottom)
-    figure = Figure(figsize=size, dpi=110, facecolor="white")
+    sheet = _Sheet.of(results)
+    figure = Figure(figsize=sheet.size, dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     fits = [result.fit for result in results]
     scales = _scales(fits, _ALIKE)
     limit = max(fit.limit for fit in fits)
-
-    def place(x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
-        """A box given in inches from the upper left corner."""
-        return (x / size[0], 1.0 - (y + height) / size[1], width / size[0], height / size[1])
-
-    y = top
+    top = _TOP
     drawn: dict[str, PolyCollection] = {}
-    called = titles([result.surface.name for result in results], is_drawn)
-    for result, height in zip(results, rows, strict=True):
-        _write_row_label(figure, result, called[result.surface.name], 0.15 / size[0], 1.0 - (y + 0.15) / size[1])
-        middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
-        for number, name in enumerate(MAPS):
-            axis = figure.add_axes(place(_LABEL + number * column, y, column, height))
-            drawn[name] = _draw_map(axis, result, name, scales[name])
-            axis.set_xlim(middle[0] - 0.5 * column / inches, middle[0] + 0.5 * column / inches)
-            axis.set_ylim(middle[1] - 0.5 * height / inches, middle[1] + 0.5 * height / inches)
-        y += height
+    shown_names = titles([result.surface.name for result in results], is_drawn)
+    for result, height in zip(results, sheet.rows, strict=True):
+        _write_row_label(figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15))
+        drawn = _draw_row(figure, sheet, result, top, height, scales)
+        top += height
+    _draw_scales(figure, sheet, top, drawn, scales, limit)
+    unfit = [result.surface.name for result in results if not result.fit.fits]
+    verdict = "fits" if not unfit else f"does not fit: {', '.join(unfit)}"
+    fabrics = ", ".join(dict.fromkeys(result.fabric.name for result in results))
+    figure.text(*sheet.point(0.15, 0.32), f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
+    figure.text(
+        *sheet.point(0.15, 0.52),
+        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack",
+        fontsize=9,
+        color="#404040",
+    )
+    with atomic_path(path) as temporary:
+        save_png(temporary, figure, {"Software": "warpflat"})
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Sheet:
+    """The layout of a garment's sheet [in].
+
+    Attributes:
+        inches: per metre of cloth.
+        column: width of a column.
+        rows: heights of the rows.
+    """
+
+    inches: float
+    column: float
+    rows: tuple[float, ...]
+
+    @classmethod
+    def of(cls, results: Sequence[Flattening]) -> _Sheet:
+        """Lay out a sheet for these pieces."""
+        spans = np.array([np.ptp(result.positions, axis=0) for result in results])
+        width, height = (max(float(spans[:, axis].max()), 1e-9) for axis in (0, 1))
+        inches = min(_COLUMN / width, _TALLEST / height)
+        rows = [
+            max(float(span) * inches, 1.35 if result.fit.fits else 2.5) + 0.3
+            for span, result in zip(spans[:, 1], results, strict=True)
+        ]
+        column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
+        return cls(inches=inches, column=column, rows=tuple(rows))
+
+    @property
+    def size(self) -> tuple[float, float]:
+        """Width and height of the sheet."""
+        return _LABEL + len(MAPS) * self.column + 0.2, _TOP + sum(self.rows) + _BOTTOM
+
+    def point(self, x: float, y: float) -> tuple[float, float]:
+        """Return a point of the figure, given from its upper left corner, as shares of its size."""
+        return x / self.size[0], 1.0 - y / self.size[1]
+
+    def box(self, x: float, y: float, width: float, height: float) -> tuple[float, float, float, float]:
+        """Return a box of the figure, given from its upper left corner, as shares of its size."""
+        return (x / self.size[0], 1.0 - (y + height) / self.size[1], width / self.size[0], height / self.size[1])
+
+
+def _draw_row(
+    figure: Figure, sheet: _Sheet, result: Flattening, top: float, height: float, scales: dict[str, _Scale]
+) -> dict[str, PolyCollection]:
+    """Draw all maps of a piece side by side."""
+    drawn = {}
+    middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
+    for number, name in enumerate(MAPS):
+        axis = figure.add_axes(sheet.box(_LABEL + number * sheet.column, top, sheet.column, height))
+        drawn[name] = _draw_map(axis, result, name, scales[name])
+        axis.set_xlim(middle[0] - 0.5 * sheet.column / sheet.inches, middle[0] + 0.5 * sheet.column / sheet.inches)
+        axis.set_ylim(middle[1] - 0.5 * height / sheet.inches, middle[1] + 0.5 * height / sheet.inches)
+    return drawn
+
+
+def _draw_scales(
+    figure: Figure,
+    sheet: _Sheet,
+    top: float,
+    drawn: dict[str, PolyCollection],
+    scales: dict[str, _Scale],
+    limit: float,
+) -> None:
+    """Draw the title of every column, and below the rows its colour scale."""
     for number, (name, (label, _, unit)) in enumerate(MAPS.items()):
-        x = _LABEL + number * column
-        figure.text((x + 0.5 * column) / size[0], 1.0 - 0.75 / size[1], label, ha="center", fontsize=10)
-        axis = figure.add_axes(place(x + 0.2, y + 0.25, column - 0.4, 0.13))
+        x = _LABEL + number * sheet.column
+        figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
+        axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
         bar = figure.colorbar(drawn[name], cax=axis, orientation="horizontal", extend=scales[name].extend)
         bar.ax.tick_params(labelsize=8)
         bar.ax.locator_params(nbins=5)
@@ -186,19 +248,6 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
             above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
             above.tick_params(labelsize=7)
             above.set_xlabel("mmHg", fontsize=8)
-    unfit = [result.surface.name for result in results if not result.fit.fits]
-    verdict = "fits" if not unfit else f"does not fit: {', '.join(unfit)}"
-    fabrics = ", ".join(dict.fromkeys(result.fabric.name for result in results))
-    figure.text(0.15 / size[0], 1.0 - 0.32 / size[1], f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
-    figure.text(
-        0.15 / size[0],
-        1.0 - 0.52 / size[1],
-        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack",
-        fontsize=9,
-        color="#404040",
-    )
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
 
 
 def _to_mmhg(pascals: Any) -> Any:
@@ -238,7 +287,7 @@ def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y
     if not fit.fits:
         lines.append("")
         lines += [f"worst: {misfit.words.split(';')[0]}" for misfit in fit.misfits[:1]]
-        lines += [help_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
+        lines += [remedy_words(remedy.as_dict(), sewn=result.unsewn is not None) for remedy in result.remedies[:1]]
     figure.text(x, y, title, fontsize=11, weight="bold", va="top")
     y -= 0.22 / float(figure.get_size_inches()[1])
     text = "\n".join(fill(line, _LETTERS, subsequent_indent="  ") for line in lines)
@@ -274,7 +323,7 @@ def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> PolyC
 
 
 def _mark_limit(bar: Any, name: str, limit: float, scale: _Scale) -> None:
-    """Where the fabric's limit lies on the scale of a thread's strain."""
+    """Mark the fabric's limit on the scale of a thread's strain."""
     if name not in _LIMITED:
         return
     for sign in (-1.0, 1.0):

@@ -1,4 +1,4 @@
-"""How a garment sits, for people: what would help where it does not fit, the maps, and the lines on the console."""
+"""Reports on the fit: the entry `wear` of `metrics.json`, and the lines on the console."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ __all__ = [
     "Remedy",
     "fit_lines",
     "garment_wear",
-    "help_words",
     "pressure_words",
+    "remedy_words",
     "strain_words",
     "wear_measures",
 ]
 
 
-#: What ranges of strain and pressure are told of.
+#: The meaning of ranges of strain and pressure.
 RANGES = "5 to 95 % of the cloth [all of it]"
 
 
@@ -43,7 +43,7 @@ class Remedy:
     outside: float | None = None
 
     def as_dict(self) -> dict[str, Any]:
-        """The remedy as an entry of `would_help` in `metrics.json`."""
+        """Return the remedy as an entry of `would_help` in `metrics.json`."""
         return {"cut": self.words, "length_m": self.length, "outside_after": self.outside}
 
 
@@ -66,7 +66,7 @@ def wear_measures(
 
 
 def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """How a garment of several pieces sits, from their entries in `metrics.json`; `fits` if every piece does.
+    """Build the entry `wear` of a garment from the entries of its pieces in `metrics.json`.
 
     Args:
         pieces: by name, with `wear` and `area_m2`.
@@ -82,9 +82,14 @@ def garment_wear(pieces: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
     }
 
 
-def help_words(remedy: Mapping[str, Any], outside: float | None = None, *, sewn: bool = False) -> str:
-    """A remedy as in `metrics.json`, in words; with the share beyond the limit before it, if that is given. Of a piece that is `sewn`, both
-    are told to be without that."""
+def remedy_words(remedy: Mapping[str, Any], outside: float | None = None, *, sewn: bool = False) -> str:
+    """Return a remedy as a line of text.
+
+    Args:
+        remedy: as in `metrics.json`.
+        outside: share of the cloth beyond the limit without it, if that is to be shown.
+        sewn: whether the piece is sewn; both shares are those of the unsewn piece.
+    """
     after = remedy["outside_after"]
     if after is None:
         return f"may help: {remedy['cut']}"
@@ -100,7 +105,7 @@ def _no_cut_words(outside: float, *, sewn: bool) -> str:
 
 
 def strain_words(wear: Mapping[str, Any]) -> list[str]:
-    """For warp and weft of an entry `wear`, as `RANGES` says: "weft -0.6 to +8.6 % [-2.7 to +20.3]"."""
+    """Return the ranges of strain of an entry `wear`, such as "weft -0.6 to +8.6 % [-2.7 to +20.3]" (see `RANGES`)."""
     found = []
     for thread in ("warp", "weft"):
         low, least, most, high = (100 * wear[f"strain_{thread}"][at] for at in ("min", "p05", "p95", "max"))
@@ -109,7 +114,7 @@ def strain_words(wear: Mapping[str, Any]) -> list[str]:
 
 
 def pressure_words(wear: Mapping[str, Any]) -> str:
-    """The same of the pressure; nothing where the cloth does not press at all."""
+    """Return the range of the pressure of an entry `wear` as text; nothing if the cloth does not press."""
     pressure = wear["pressure"]
     if pressure["max"] < 1.0:
         return ""
@@ -117,23 +122,23 @@ def pressure_words(wear: Mapping[str, Any]) -> str:
 
 
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
-    """What the console says of each piece's fit: one line, and one for each place and remedy where it does not."""
+    """Return the console's lines on the fit: one per piece, and one for each place and remedy where a piece does not fit."""
     lines = []
     for name, piece in metrics["pieces"].items():
         wear = piece.get("wear")
         if wear is None:
             continue
         verdict = f"{name}: fits: {'yes' if wear['fits'] else 'no'}"
-        told = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
+        ranges = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
         if pressure := pressure_words(wear):
-            told += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
-        lines.append(f"{verdict} ({told})")
+            ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
+        lines.append(f"{verdict} ({ranges})")
         if wear["fits"]:
             continue
         lines += [f"  where not: {words}" for words in wear["where_not"]]
         sewn = "outside_unsewn" in wear
         before = wear["outside_unsewn"] if sewn else wear["outside"]
-        lines += [f"  {help_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
+        lines += [f"  {remedy_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
         if not wear["would_help"]:
             lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
     if lines:

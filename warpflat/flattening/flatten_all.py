@@ -1,4 +1,4 @@
-"""`flatten_all`: many surfaces of one fabric, relaxed side by side in one set of launches."""
+"""`flatten_all`: many surfaces of one fabric are relaxed side by side in one set of launches."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def flatten_all(
         )
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
 
-    def started(number: int, surface: Surface | str | Path) -> DevelopedPiece:
+    def develop(number: int, surface: Surface | str | Path) -> DevelopedPiece:
         own = as_surface(surface, units)
         try:
             return develop_piece(own, datums[number], settings, None if callback is None else partial(callback, number))
@@ -76,4 +76,4 @@ def flatten_all(
             named = repr(own.name) in str(error)
             raise InputError(str(error) if named else f"piece {own.name!r} (surface {number}): {error}") from None
 
-    return relax_developed([started(number, surface) for number, surface in enumerate(surfaces)])
+    return relax_developed([develop(number, surface) for number, surface in enumerate(surfaces)])

@@ -1,4 +1,4 @@
-"""`flatten`: one surface, one fabric, one relaxed pattern."""
+"""`flatten`: one surface becomes one relaxed pattern."""
 
 from __future__ import annotations
 
@@ -70,9 +70,9 @@ def flatten(
     surface = as_surface(surface, units)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
-    started = develop_piece(surface, datum, settings, callback)
-    _refuse_unused_stretch(started)
-    return relax_developed([started])[0]
+    developed = develop_piece(surface, datum, settings, callback)
+    _refuse_unused_stretch(developed)
+    return relax_developed([developed])[0]
 
 
 def _refuse_unused_stretch(piece: DevelopedPiece) -> None:

@@ -15,7 +15,7 @@ __all__ = ["harmonic_layout"]
 
 
 def harmonic_layout(surface: Surface) -> FloatArray:
-    """Layout that cannot fold: the border on a circle, every other vertex a convex mean of its neighbours (Floater 1997).
+    """Lay out a piece without folds: the border on a circle, every other vertex a convex mean of its neighbours (Floater 1997).
 
     Mean value weights (Floater 2003), which are positive on any triangles. Holes are closed by a vertex each while the
     map is computed. Scaled to the surface's area. #V by 2 [m].
@@ -76,7 +76,7 @@ def refuse_tubes(surface: Surface) -> None:
 
 
 def _border_angles(surface: Surface) -> FloatArray:
-    """#V, the sum of the angles of the triangles at each vertex [rad]."""
+    """Return the sum of the triangles' angles at each vertex (#V) [rad]."""
     triangles, _ = triangulate(surface.faces)
     total = np.zeros(len(surface.vertices))
     for k in range(3):

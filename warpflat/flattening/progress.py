@@ -1,4 +1,4 @@
-"""Where a run stands, and the lines of its history."""
+"""The progress of a relaxation, and the stages of its history."""
 
 from __future__ import annotations
 
@@ -42,12 +42,12 @@ class Stage:
     residual: float | None
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`."""
+        """Return the entry of `stages` in `metrics.json`."""
         return dict(self.__dict__)
 
 
 class Progress:
-    """Where a run stands; what a callback gets after every step, and after every cycle of levels.
+    """The progress of a relaxation, which a callback gets after every step and after every multigrid cycle.
 
     Attributes:
         stage: "develop", before the first step, then "relax"; "cut:NAME" and "close:NAME" where darts open and close, "fabric:NAME" and
@@ -63,7 +63,7 @@ class Progress:
     def __init__(
         self, stage: str, state: Relaxation, *, energies: Energies, residual: float, max_steps: int, piece: int = 0
     ) -> None:
-        """Hold on to the running state, of which it is this piece; nothing is copied before it is asked for."""
+        """Refer to a piece of the running relaxation; its layout is copied when it is asked for."""
         self.stage = stage
         self.step = state.steps
         self.work_units = state.work_units
@@ -76,15 +76,15 @@ class Progress:
 
     @property
     def surface(self) -> Surface:
-        """The surface with the present topology: after a cut its vertices are doubled."""
+        """The surface in its present topology: after a cut its vertices are doubled."""
         return self._network.surface
 
     def positions(self) -> FloatArray:
-        """#V by 2, the layout [m], a copy."""
+        """Return a copy of the layout, #V by 2 [m]."""
         return self._state.positions()[self._state.vertex_ranges[self._piece]]
 
     def face_energy_density(self) -> FloatArray:
-        """#F, strain energy per flat area [J/m2]."""
+        """Return the strain energy per flat area of each face, #F [J/m2]."""
         return worn_strain(self._network, self.positions()).energy_density
 
     @property

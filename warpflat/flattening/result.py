@@ -39,22 +39,22 @@ _MEASURED = ("vertex_origin", "_errors", "worn", "fit", "stretched_faces", "layo
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Flattening:
-    """A relaxed pattern and what is known of it.
+    """A relaxed pattern, with its measures and its history.
 
     Attributes:
-        surface: the piece in space, uncut; with the cuts made it is `network.surface`.
+        surface: the piece in space, uncut; `network.surface` is the cut one.
         fabric: the cloth.
-        datum: vertex indices of the line from which it was developed; the grain.
-        datum_name: its name, or how it was chosen.
+        datum: vertex indices of the line from which the piece was developed, which is its grain.
+        datum_name: name of that line.
         positions: #P by 2, the pattern [m], warp along +y (turned by `grain_angle` degrees).
         stages: development and relaxation, with their energies.
         history: #K by 4, step, model energy [J], guard energy [J], residual, at every convergence check.
-        notes: what was mended or chosen on the way, one sentence each.
+        notes: what was repaired or chosen, one sentence each.
         cuts: what `warpflat.cut` has cut since the first relaxation.
-        wear: how it is meant to be worn, if that was asked for.
-        options: of its last relaxation.
+        wear: how the piece is to be worn, if that was asked for.
+        options: options of the last relaxation.
         unsewn: the piece as it lay before it was sewn or given fullness; None if it was not.
-        remedies: cuts that may help where it does not fit, once `warpflat.advise` has looked for them.
+        remedies: cuts that may help where the piece does not fit, found by `warpflat.advise`.
     """
 
     surface: Surface
@@ -76,12 +76,12 @@ class Flattening:
 
     @property
     def faces(self) -> IntArray:
-        """#F by 4, the surface's faces in the pattern's numbering: cuts double vertices."""
+        """#F by 4, the surface's faces in the pattern's numbering, in which cuts have doubled vertices."""
         return self.network.surface.faces
 
     @cached_property
     def vertex_origin(self) -> IntArray:
-        """#P, for each vertex of the pattern its vertex on the surface."""
+        """#P, for each vertex of the pattern the vertex of the surface."""
         origin = np.arange(len(self.positions), dtype=np.int32)
         used = self.faces >= 0
         origin[self.faces[used]] = self.surface.faces[used]
@@ -108,7 +108,7 @@ class Flattening:
 
     @cached_property
     def fit(self) -> WornFit:
-        """How it sits when worn: strain, tension and pressure, against the fabric's limit."""
+        """The fit when worn: strain, tension and pressure, and what lies beyond the fabric's limit."""
         return assess_fit(self.network, self.positions)
 
     @property
@@ -118,7 +118,7 @@ class Flattening:
 
     @cached_property
     def stretched_faces(self) -> StretchedFaces | None:
-        """The faces that are more than twice as large as on the body, if they matter and no fullness was asked for."""
+        """The faces that are more than twice as large as on the body; None if they hardly count or if fullness was asked for."""
         if any(stage.name == "fullness" for stage in self.stages):
             return None
         return find_stretched_faces(self.network, self.positions)
@@ -186,7 +186,7 @@ class Flattening:
         return advised
 
     def metrics(self) -> dict[str, Any]:
-        """All of `metrics.json`."""
+        """Build all of `metrics.json`."""
         return run_metrics({self.surface.name: self.measures}, self.network.device)
 
     def save(self, folder: str | Path, *, picture: bool = True, frames: bool = True) -> list[str]:
@@ -223,11 +223,11 @@ class Flattening:
         return file.name
 
     def picture_piece(self) -> PicturePiece:
-        """Its row in a picture."""
+        """Return the piece's row in a picture."""
         return _picture_piece(self)
 
     def captions(self) -> dict[str, str]:
-        """The key measures as short texts."""
+        """Return the key measures as short texts."""
         m = self.layout_measures
         captions = {
             "fabric": self.fabric.name,
@@ -287,38 +287,48 @@ def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, f
 
 
 def _picture_piece(result: Flattening) -> PicturePiece:
-    """The piece's row in a picture; what was cut is shown as a crack, and named on the surface."""
+    """Return the piece's row in a picture."""
     from warpflat.export.picture import PicturePiece
 
-    own, cut = result.surface.lines, result.network.surface.lines
-    grain = result.datum_name
-    datum = {} if grain in own else {grain: result.datum}
-    cut_through = {int(v) for applied in result.cuts for path in applied.paths for v in path}
-    in_space: dict[str, Any] = {name: line for name, line in own.items() if not cut_through.issuperset(line.tolist())}
-    in_space |= {f"{applied.name} (cut)": list(applied.paths) for applied in result.cuts}
-    in_plane: dict[str, Any] = {
-        name: line for name, line in cut.items() if not result.cuts or not _runs_along_cut(name, own)
-    }
-    if grain not in in_plane and not datum:
-        # A cut has parted the datum: its parts are one line still.
-        parts = [name for name in in_plane if name.startswith(f"{grain}.")]
-        in_plane[grain] = [in_plane.pop(name) for name in parts] or result.datum
+    datum = {} if result.datum_name in result.surface.lines else {result.datum_name: result.datum}
     return PicturePiece(
         name=result.surface.name,
         surface=result.surface,
         faces=result.faces,
         positions=result.positions,
         face_energy_density=result.face_energy_density,
-        lines={**in_plane, **datum},
-        surface_lines={**in_space, **datum},
+        lines={**_lines_in_plane(result), **datum},
+        surface_lines={**_lines_in_space(result), **datum},
         datum=result.datum_name,
         grain_angle=result.grain_angle,
         captions=result.captions(),
     )
 
 
+def _lines_in_space(result: Flattening) -> dict[str, Any]:
+    """Return the lines that are drawn on the surface: those that are not cut, and the cuts."""
+    cut = {int(v) for made in result.cuts for path in made.paths for v in path}
+    lines = {name: line for name, line in result.surface.lines.items() if not cut.issuperset(line.tolist())}
+    return {**lines, **{f"{made.name} (cut)": list(made.paths) for made in result.cuts}}
+
+
+def _lines_in_plane(result: Flattening) -> dict[str, Any]:
+    """Return the lines that are drawn in the pattern; cuts show as cracks there."""
+    own, grain = result.surface.lines, result.datum_name
+    lines: dict[str, Any] = {
+        name: line
+        for name, line in result.network.surface.lines.items()
+        if not result.cuts or not _runs_along_cut(name, own)
+    }
+    if grain in own and grain not in lines:
+        # A cut has parted the datum: its parts are drawn as one line.
+        parts = [name for name in lines if name.startswith(f"{grain}.")]
+        lines[grain] = [lines.pop(name) for name in parts] or result.datum
+    return lines
+
+
 def _runs_along_cut(name: str, own: Mapping[str, Any]) -> bool:
-    """Whether a line of the cut surface is one side of a crack: the outline shows it already."""
+    """Return whether a line of the cut surface is one side of a crack, which the outline shows already."""
     return name not in own and (".left" in name or ".right" in name)
 
 

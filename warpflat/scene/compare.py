@@ -1,4 +1,4 @@
-"""The same garment in several fabrics: how far the patterns differ, in figures, a picture and a true-size drawing."""
+"""A scene is run in several fabrics, and the patterns are compared: in a table, a picture and a true-size drawing."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def compare_fabrics(
     on_progress: Callable[[str, Progress], None] | None = None,
     device: str | None = None,
 ) -> Comparison:
-    """Run a scene in each fabric, all else alike: its cuts, seams and constraints are kept in each of them.
+    """Run a scene in each of several fabrics, with the same cuts, seams and constraints.
 
     Args:
         scene: a surface with its cuts, all of which are made, or a garment on a mannequin; its own fabric does not count.
@@ -52,7 +52,7 @@ def compare_fabrics(
         if fabric.name in dressed:
             raise InputError(f"fabric {name!r} is given twice ({fabric.name}); compare different ones")
         dressed[fabric.name] = one
-    # Cuts are the scene's, found once, and all of them made, so that all patterns have the same points.
+    # Cuts are found once, and all of them are made, so that all patterns have the same points.
     sequence = None
     if scene.settings.mannequin is None:
         sequence = replace(scene_cuts(scene, device=device), auto=None)
@@ -60,11 +60,11 @@ def compare_fabrics(
     sewing: dict[str, Mapping[str, Any]] = {}
     for name, one in dressed.items():
 
-        def told(progress: Progress, name: str = name) -> None:
+        def report(progress: Progress, name: str = name) -> None:
             if on_progress is not None:
                 on_progress(name, progress)
 
-        results[name], sewing[name] = _run(one, sequence, told, device)
+        results[name], sewing[name] = _run(one, sequence, report, device)
     first = next(iter(results.values()))
     layouts = {
         name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
@@ -74,25 +74,25 @@ def compare_fabrics(
 
 
 def _run(
-    scene: Scene, sequence: CutSequence | None, told: Callable[[Progress], None], device: str | None
+    scene: Scene, sequence: CutSequence | None, report: Callable[[Progress], None], device: str | None
 ) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
-    """The pieces as a run of the scene gives them, and how they were sewn."""
+    """Run the scene without writing files; return its pieces and the entries of `metrics.json` on their sewing."""
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
     from warpflat.scene.run_garment import plan_garment
 
     if sequence is None:
-        garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: told(progress))
+        garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: report(progress))
         how = garment.summary()
         return {name: advise(piece) for name, piece in garment.pieces.items()}, {
             key: how[key] for key in how if key != "pieces"
         }
-    result, sewn = flatten_scene(scene, sequence, callback=told, device=device)
+    result, sewn = flatten_scene(scene, sequence, callback=report, device=device)
     return {piece.surface.name: advise(piece) for piece in separate(result)}, {} if sewn is None else sewn.metrics()
 
 
 def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
-    """The layout turned and shifted to lie as near as it can to the target (Kabsch 1976)."""
+    """Turn and shift a layout (#V by 2 [m]) to lie as near as it can to a target layout (Kabsch 1976)."""
     centre, aim = layout.mean(axis=0), target.mean(axis=0)
     u, _, v = np.linalg.svd((layout - centre).T @ (target - aim))
     turn = u @ np.diag([1.0, float(np.sign(np.linalg.det(u @ v)))]) @ v
@@ -120,30 +120,46 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
 
 
 def comparison_table(comparison: Comparison) -> str:
-    """Area, border lengths, energies, worst strain and distances, a column per fabric, a block per piece."""
+    """Return area, border lengths, energies, strains and distances as text: a block per piece, a column per fabric."""
     blocks = []
     for piece in comparison.pieces:
-        rows: list[tuple[str, list[str]]] = []
-        measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
-        borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
-        rows.append(("area [cm2]", [f"{1e4 * m['area_m2']:.1f}" for m in measures]))
-        for name in borders[0]:
-            rows.append((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]))
-        rows.append(("strain energy [mJ]", [f"{1e3 * m['strain_energy_j']:.4g}" for m in measures]))
-        rows.append(("model energy [mJ]", [f"{1e3 * m['model_energy_j']:.4g}" for m in measures]))
-        rows.append(("length error [%]", [f"{100 * m['length_error']:.2f}" for m in measures]))
-        for thread in ("warp", "weft"):
-            worst = [m["wear"][f"strain_{thread}"] for m in measures]
-            rows.append((f"strain {thread} [%]", [f"{100 * w['min']:+.1f} to {100 * w['max']:+.1f}" for w in worst]))
-        rows.append(("beyond limit [%]", [f"{100 * m['wear']['outside']:.1f}" for m in measures]))
-        rows.append(("fits", ["yes" if m["wear"]["fits"] else "no" for m in measures]))
-        rows.append(("converged", ["yes" if m["converged"] else "NO" for m in measures]))
-        apart = comparison.distances(piece)
-        for point in next(iter(apart.values())):
-            rows.append((f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in apart.values())]))
+        rows = [*_measure_rows(comparison, piece), *_distance_rows(comparison, piece)]
         blocks.append(_columns(piece, comparison.fabrics, rows))
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
+
+
+def _measure_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[str]]]:
+    measures = [comparison.results[fabric][piece].measures for fabric in comparison.fabrics]
+    borders = [comparison.borders(fabric, piece) for fabric in comparison.fabrics]
+
+    def row(name: str, cell: Callable[[Any], str]) -> tuple[str, list[str]]:
+        return name, [cell(m) for m in measures]
+
+    def strains(thread: str) -> Callable[[Any], str]:
+        def cell(m: Any) -> str:
+            strain = m["wear"][f"strain_{thread}"]
+            return f"{100 * strain['min']:+.1f} to {100 * strain['max']:+.1f}"
+
+        return cell
+
+    return [
+        row("area [cm2]", lambda m: f"{1e4 * m['area_m2']:.1f}"),
+        *((f"{name} [mm]", [f"{1e3 * lengths[name]:.1f}" for lengths in borders]) for name in borders[0]),
+        row("strain energy [mJ]", lambda m: f"{1e3 * m['strain_energy_j']:.4g}"),
+        row("model energy [mJ]", lambda m: f"{1e3 * m['model_energy_j']:.4g}"),
+        row("length error [%]", lambda m: f"{100 * m['length_error']:.2f}"),
+        row("strain warp [%]", strains("warp")),
+        row("strain weft [%]", strains("weft")),
+        row("beyond limit [%]", lambda m: f"{100 * m['wear']['outside']:.1f}"),
+        row("fits", lambda m: "yes" if m["wear"]["fits"] else "no"),
+        row("converged", lambda m: "yes" if m["converged"] else "NO"),
+    ]
+
+
+def _distance_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[str]]]:
+    distances = list(comparison.distances(piece).values())
+    return [(f"{point} [mm]", ["-", *(f"{1e3 * d[point]:.1f}" for d in distances)]) for point in distances[0]]
 
 
 def _columns(title: str, fabrics: Sequence[str], rows: Sequence[tuple[str, Sequence[str]]]) -> str:

@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 __all__ = ["write_overlay_picture", "write_overlay_svg"]
 
 
-# Okabe and Ito's colours, which are told apart without red-green vision; and dashes, for print in grey.
+# Okabe and Ito's colours, which can be distinguished without red-green vision; and dashes, for print in grey.
 _STYLES: tuple[tuple[str, tuple[float, ...]], ...] = (
     ("#000000", ()),
     ("#d55e00", (6, 2)),
@@ -38,7 +38,7 @@ def _style(number: int) -> tuple[str, tuple[float, ...]]:
 
 
 def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> None:
-    """Outlines in true size, one unit is one millimetre: a group per piece, in it a path per fabric.
+    """Write the outlines in true size (a unit is a millimetre), in a group per piece with a path per fabric.
 
     Raises:
         InputError: the file cannot be written.
@@ -82,7 +82,7 @@ def write_overlay_svg(path: str | os.PathLike[str], comparison: Comparison) -> N
 
 @all_letters()
 def write_overlay_picture(path: str | os.PathLike[str], comparison: Comparison) -> None:
-    """Each piece with its outlines laid upon each other, and close-ups of where they are furthest apart.
+    """Draw each piece with its outlines laid upon each other, and close-ups of where they are furthest apart.
 
     Raises:
         InputError: the file cannot be written.
@@ -145,8 +145,8 @@ def _draw_outlines(axis: Axes, comparison: Comparison, piece: str, *, width: flo
 def _finish_whole(axis: Axes, comparison: Comparison, piece: str) -> None:
     axis.set_axis_off()
     most = {fabric: 1e3 * d["outline, most"] for fabric, d in comparison.distances(piece).items()}
-    told = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
-    axis.set_title(f"{piece}: outline apart by at most {told}", fontsize=11, loc="left")
+    words = ", ".join(f"{fabric} {mm:.1f} mm" for fabric, mm in most.items())
+    axis.set_title(f"{piece}: outline apart by at most {words}", fontsize=11, loc="left")
     low, high = axis.get_xlim()[0], axis.get_ylim()[0]
     length = 0.1 if axis.get_xlim()[1] - low > 0.25 else 0.02
     axis.plot([low, low + length], [high, high], color="black", linewidth=2)
@@ -156,7 +156,7 @@ def _finish_whole(axis: Axes, comparison: Comparison, piece: str) -> None:
 
 
 def _furthest_apart(comparison: Comparison, piece: str) -> list[tuple[str, FloatArray, float]]:
-    """Named points by their largest distance, those of no name left out: label, place [m], distance [m]."""
+    """Return the named points that are furthest apart: label, place [m], distance [m]."""
     layouts = [comparison.layouts[fabric][piece] for fabric in comparison.fabrics]
     points = comparison.points(piece)
     if not points:

@@ -46,7 +46,7 @@ class Comparison:
         return list(self.results[self.fabrics[0]])
 
     def points(self, piece: str) -> dict[str, int]:
-        """Named points of a piece, vertices of its pattern: where its lines end on the outline; joint ends are one."""
+        """Return the named points of a piece, as vertices of its pattern: the ends of its lines on the outline."""
         surface = self.results[self.fabrics[0]][piece].network.surface
         border = set(np.concatenate(border_loops(surface.faces)).tolist())
         names: dict[int, list[str]] = {}
@@ -59,7 +59,7 @@ class Comparison:
         return {" / ".join(label): vertex for vertex, label in names.items()}
 
     def distances(self, piece: str) -> dict[str, dict[str, float]]:
-        """By fabric, how far each named point lies from that of the first fabric, and the outline's most [m]."""
+        """Return by fabric how far each named point lies from that of the first fabric, and the outline's distances [m]."""
         first = self.layouts[self.fabrics[0]][piece]
         border = np.concatenate(border_loops(self.results[self.fabrics[0]][piece].faces))
         found = {}
@@ -71,7 +71,7 @@ class Comparison:
         return found
 
     def borders(self, fabric: str, piece: str) -> dict[str, float]:
-        """Lengths of the lines on the outline, and of the whole of it [m]."""
+        """Return the lengths of the lines on the outline, and of the whole outline [m]."""
         result = self.results[fabric][piece]
         loops = border_loops(result.faces)
         edges = {
@@ -85,7 +85,7 @@ class Comparison:
         return lengths
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `compare.json`."""
+        """Return all of `compare.json`."""
         return {
             "schema": 1,
             "warpflat": __version__,
@@ -104,5 +104,5 @@ class Comparison:
 
 
 def outline(result: Flattening, layout: FloatArray) -> list[FloatArray]:
-    """The closed border curves of a piece in a layout, each #B by 2 [m]."""
+    """Return the closed border curves of a piece in a layout, each #B by 2 [m]."""
     return [layout[np.append(loop, loop[0])] for loop in border_loops(result.faces)]

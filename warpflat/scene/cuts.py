@@ -22,12 +22,12 @@ __all__ = ["CutSequence", "cuts_of_entry", "plan_automatic_cuts", "plan_cuts"]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class CutSequence:
-    """What is to be cut, worked into the surface so that no face changes on the way.
+    """The cuts of a scene, in their order, and the surface with their paths along its edges.
 
     Attributes:
         surface: with every path along its edges.
-        plans: the cuts in their order.
-        auto: when those found automatically are enough; they begin at plan `first_auto`.
+        plans: the cuts.
+        auto: the settings of automatic cutting; the cuts that it has found begin at plan `first_auto`.
         notes: what was chosen, one sentence each.
     """
 
@@ -39,16 +39,16 @@ class CutSequence:
 
     @property
     def counts(self) -> range:
-        """How many of the cuts may be made in the end."""
+        """The numbers of cuts that may be made in the end."""
         return range(len(self.plans) if self.auto is None else self.first_auto, len(self.plans) + 1)
 
     def is_needed(self, result: Flattening, number: int) -> bool:
-        """Whether the cut of that number is made on the piece as it is by then."""
+        """Return whether the cut of a number (from 0) is made on the piece with all cuts before it."""
         return self.auto is None or number < self.first_auto or not self.auto.is_enough(result)
 
 
 def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
-    """The surface with the paths of all cuts worked into its edges, and the cuts.
+    """Work the paths of all cuts into the edges of a surface.
 
     Raises:
         InputError: a line that does not exist, a path that leaves the surface or crosses itself; begins with the table.
@@ -80,7 +80,7 @@ def plan_cuts(surface: Surface, tables: list[CutTable]) -> CutSequence:
 
 
 def _check_tip_back(surface: Surface, path: IntArray, tip_back: float) -> None:
-    """See that something is left of the dart, or of the fish-eye with two tips inside, that the path opens into."""
+    """Check that drawing back the tips leaves something of the dart or the fish-eye dart."""
     from warpflat.surface.connectivity import border_loops
     from warpflat.surface.cut.dart_legs import check_tip_back
     from warpflat.surface.paths.edge_paths import path_length
@@ -116,7 +116,7 @@ def plan_automatic_cuts(
     flatten: Callable[[Surface, RelaxOptions], Flattening],
     relax: RelaxOptions,
 ) -> tuple[CutSequence, tuple[Ledger, ...]]:
-    """Look for the best cuts, coarsely; which of them are needed is decided once each has been relaxed fully.
+    """Find the best cuts with coarse relaxations; full ones decide later which of them are needed.
 
     Args:
         sequence: what is cut before.
@@ -155,7 +155,7 @@ def plan_automatic_cuts(
 def flatten_and_cut(
     sequence: CutSequence, *, flatten: Callable[[Surface, RelaxOptions], Flattening], relax: RelaxOptions
 ) -> Flattening:
-    """The piece after all cuts of a sequence."""
+    """Flatten a piece and make all cuts of a sequence."""
     from warpflat.cutting.cut_piece import cut
 
     result = flatten(sequence.surface, relax)
@@ -165,7 +165,7 @@ def flatten_and_cut(
 
 
 def cuts_of_entry(ledger: Ledger, number: int) -> CutSequence:
-    """The cuts that a ledger's piece has, and its candidate of that number, from 1.
+    """Return the cuts of a ledger's piece, and after them the candidate of a number (from 1).
 
     Raises:
         InputError: there is no such number.

@@ -30,15 +30,15 @@ __all__ = ["FrameRecorder", "FrameSchedule", "path_in_pattern"]
 
 
 class Schedule(Protocol):
-    """Which steps become frames."""
+    """The choice of steps that become frames."""
 
     def is_due(self, step: int, max_steps: int) -> bool:
-        """Whether this one does."""
+        """Return whether this step becomes a frame."""
         ...
 
 
 class FrameRecorder:
-    """Writes frames of one piece while it runs; a callback of `flatten` and of `cut`."""
+    """Writes the frames of one piece; a callback of `flatten` and of `cut`."""
 
     def __init__(self, writer: FrameWriter | None, surface: Surface, new_schedule: Callable[[], Schedule]) -> None:
         """
@@ -57,24 +57,24 @@ class FrameRecorder:
             writer.add_piece(surface.name, surface)
 
     def __call__(self, progress: Progress) -> None:
-        """A frame if one is due."""
+        """Write a frame if one is due."""
         if self._writer is None or not self._schedule.is_due(progress.step, progress.max_steps):
             return
         cut_surface = progress.surface
-        opened = cut_surface.faces is not self._faces
+        was_cut = cut_surface.faces is not self._faces
         self._faces = cut_surface.faces
         self._writer.write(
             self._surface.name,
             positions=progress.positions(),
             face_energy_density=progress.face_energy_density(),
-            faces=cut_surface.faces if opened else None,
-            lines=cut_surface.lines if opened else None,
-            cuts=self._cut_lines() if opened else None,
+            faces=cut_surface.faces if was_cut else None,
+            lines=cut_surface.lines if was_cut else None,
+            cuts=self._cut_lines() if was_cut else None,
             measures={"step": progress.step, "model_energy_j": progress.model_energy},
         )
 
     def record_result(self, result: Flattening) -> None:
-        """The frame of a finished result, with its measures."""
+        """Write the frame of a finished result, with its measures."""
         if self._writer is None:
             return
         self._writer.write(
@@ -85,7 +85,7 @@ class FrameRecorder:
         )
 
     def record_cut_line(self, result: Flattening, plan: CutPlan) -> None:
-        """The frame in which the line of the next cut is drawn on the piece; the next stage begins."""
+        """Write the frame in which the line of the next cut is drawn on the piece, and begin the next stage."""
         self._plans.append(plan)
         self._schedule = self._new_schedule()
         if self._writer is None:
@@ -106,7 +106,7 @@ class FrameRecorder:
 
 
 def path_in_pattern(faces: IntArray, pattern_faces: IntArray, path: IntArray) -> list[IntArray]:
-    """A path on the uncut surface as it appears in the pattern: both sides where it is cut, one line where it is not.
+    """Return a path of the uncut surface in the pattern: both sides where it is cut, one line where it is not.
 
     Args:
         faces: #F by 4, uncut.
@@ -135,7 +135,7 @@ def path_in_pattern(faces: IntArray, pattern_faces: IntArray, path: IntArray) ->
 
 
 class FrameSchedule:
-    """Which steps become frames: every so many, or about a given number that thins out towards the end."""
+    """The schedule of a stage's frames: at a fixed interval of steps, or about a given number, closer together at first."""
 
     def __init__(self, output: OutputTable) -> None:
         self._every = output.frame_every
@@ -148,9 +148,9 @@ class FrameSchedule:
         return self._number > 0
 
     def is_due(self, step: int, max_steps: int) -> bool:
-        """Whether the look at this step, of at most `max_steps`, becomes a frame; the first one always does.
+        """Return whether this step, of at most `max_steps`, becomes a frame; the first one always does.
 
-        Looks may be several steps apart: one is due when a frame was due at or before it.
+        Calls may be several steps apart: a frame is due if one was due at this step or before.
         """
         if step < self._next:
             return False

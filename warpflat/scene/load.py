@@ -56,7 +56,7 @@ class Scene:
 
 
 def load_scene(path: str | Path) -> Scene:
-    """The scene of a TOML file.
+    """Load the scene of a TOML file.
 
     Raises:
         InputError: unreadable, not TOML, an unknown key (names the nearest), a value of the wrong kind
@@ -73,7 +73,7 @@ def load_scene(path: str | Path) -> Scene:
 
 
 def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) -> Scene:
-    """The scene of data laid out like a scene file.
+    """Make a scene from data laid out like a scene file.
 
     Args:
         data: nested tables.
@@ -92,7 +92,7 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
 
 
 def scene_fabric(scene: Scene) -> Fabric:
-    """The scene's fabric.
+    """Return the scene's fabric.
 
     Raises:
         InputError: an unknown name (names the nearest), or impossible values.
@@ -108,7 +108,7 @@ def scene_fabric(scene: Scene) -> Fabric:
 
 
 def scene_wear(scene: Scene) -> Wear | None:
-    """How the scene's garment is meant to be worn, if it says so.
+    """Return how the scene's garment is to be worn, if the scene says so.
 
     Raises:
         InputError: a value out of its bounds.
@@ -122,7 +122,7 @@ def scene_wear(scene: Scene) -> Wear | None:
 
 
 def scene_relax_options(scene: Scene) -> RelaxOptions:
-    """The scene's settings of the relaxation; what it does not set keeps its default.
+    """Return the scene's options of the relaxation, with defaults for those that it does not set.
 
     Raises:
         InputError: a value out of its bounds.
@@ -135,7 +135,7 @@ def scene_relax_options(scene: Scene) -> RelaxOptions:
 
 
 def expand_variables(text: str) -> str:
-    """The text with ${NAME} and $NAME replaced from the environment.
+    """Replace ${NAME} and $NAME in a text from the environment.
 
     Raises:
         InputError: a variable that is not set.
@@ -153,9 +153,9 @@ def expand_variables(text: str) -> str:
 
 @contextmanager
 def errors_named(where: str) -> Iterator[None]:
-    """Begin the messages of mistakes inside with `where`, once: what is called there may have said so itself."""
+    """Begin the messages of InputErrors in the block with `where`, unless they do so already."""
     try:
         yield
     except InputError as error:
-        told = str(error)
-        raise InputError(told if told.startswith(f"{where}: ") else f"{where}: {told}") from None
+        message = str(error)
+        raise InputError(message if message.startswith(f"{where}: ") else f"{where}: {message}") from None

@@ -14,7 +14,7 @@ __all__ = ["pattern_options"]
 
 
 def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternOptions:
-    """What the tables `pattern` and `marker` of a scene ask for.
+    """Return the pattern options of a scene's tables `pattern` and `marker`.
 
     Raises:
         InputError: a gap that is wide against the cloth.

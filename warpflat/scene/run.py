@@ -1,4 +1,4 @@
-"""Scene files: what a run is made of, as data, and the one function that runs it."""
+"""A scene is run: its surface is flattened, cut and sewn, and all files are written."""
 
 from __future__ import annotations
 
@@ -90,7 +90,7 @@ def _run_surface(
     from warpflat.scene.seams import scene_surface_seams
 
     settings = scene.settings
-    scene_relax_options(scene)  # a mistake is told before anything is made
+    scene_relax_options(scene)  # a mistake is reported before anything is made
     with errors_named(scene.where):
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
@@ -122,7 +122,7 @@ def _run_surface(
 
 
 def files_of_run(scene: Scene) -> list[str]:
-    """The files that a run will write, as far as they are known before it: not those with the name of a form's or a cut's piece."""
+    """Return the files that a run will write, as far as they are known; those of a form's pieces or of parts of a cut are not."""
     settings, name = scene.settings, scene.name
     output, formats, garment = settings.output, settings.pattern.formats, settings.mannequin is not None
     worn = output.picture and settings.wear is not None
@@ -149,12 +149,12 @@ def flatten_scene(
     callback: Callable[[Progress], None] | None = None,
     device: str | None = None,
 ) -> tuple[Flattening, SewnSurface | None]:
-    """The scene's surface flattened, cut and sewn, as its constraints hold it; and how it was sewn, if it was.
+    """Flatten, cut and sew the scene's surface; return the piece, and how it was sewn, if it was.
 
     Args:
         scene: with its fabric and settings.
         sequence: what is cut, of :func:`scene_cuts`.
-        recorder: takes the last frame of every stage.
+        recorder: writes the last frame of every stage.
         callback: called after each step.
         device: Warp device, before the scene's own.
 
@@ -186,7 +186,7 @@ def flatten_scene(
 
 
 def _check_edges(scene: Scene, sequence: CutSequence, rules: EdgeRules) -> None:
-    """See that the pattern's kinds and allowances are of edges, whichever of the automatic cuts will be made.
+    """Check that the pattern's kinds and allowances name edges, whichever of the automatic cuts are made.
 
     Raises:
         InputError: a name that no piece can have, or a cut that cannot be made.
@@ -229,7 +229,7 @@ def _flatten(
 
 
 def scene_cuts(scene: Scene, *, device: str | None = None) -> CutSequence:
-    """The scene's surface with the paths of its cuts worked in, and the cuts; looks for those of `auto_cut`.
+    """Plan the cuts of a scene and work their paths into its surface; those of `auto_cut` are looked for.
 
     Raises:
         InputError: the surface, a line or a cut is wrong.
@@ -251,7 +251,7 @@ def scene_cuts(scene: Scene, *, device: str | None = None) -> CutSequence:
 
 
 def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", device: str | None = None) -> Ledger:
-    """Candidates for the next cut of the scene's piece, after those that the scene makes, each tried and ranked; unsewn, as a note says.
+    """Try and rank candidates for the next cut of the scene's piece, after its own cuts and without its seams and constraints.
 
     Raises:
         InputError: as :func:`scene_cuts`, or there is no candidate.

@@ -20,7 +20,7 @@ from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.frames import FrameSchedule
+from warpflat.scene.frames import FrameRecorder, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
@@ -30,7 +30,7 @@ __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
 
 
 def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
-    """The scene's mannequin, or another one, and the pieces of its form.
+    """Build the pieces of the scene's form on its mannequin, or on another one; return both.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
@@ -52,15 +52,15 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GarmentPlan:
-    """A scene's garment, checked, before anything of it is flattened.
+    """A scene's garment, checked and not yet flattened.
 
     Attributes:
-        scene: whose it is.
+        scene: the scene.
         mannequin, form: the body, and the pieces on it.
-        drawing: what is written of its pattern.
-        wishes: ease and gathers of its seams.
-        constraints: on its edges and lines.
-        settings: what else :func:`warpflat.garment.garment.flatten_form` takes.
+        drawing: options of the pattern files.
+        wishes: ease and gathers of seams.
+        constraints: on edges and lines.
+        settings: further arguments of :func:`warpflat.garment.garment.flatten_form`.
     """
 
     scene: Scene
@@ -72,7 +72,7 @@ class GarmentPlan:
     settings: Mapping[str, Any]
 
     def flatten(self, *, callback: Callable[[str, Progress], None] | None = None) -> Garment:
-        """Flatten and sew it.
+        """Flatten and sew the garment.
 
         Raises:
             InputError: as :func:`warpflat.garment.garment.flatten_form`.
@@ -89,7 +89,7 @@ class GarmentPlan:
 
 
 def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
-    """What a scene asks of its garment.
+    """Check what a scene asks of its garment.
 
     Args:
         scene: with a form on a mannequin.
@@ -144,52 +144,67 @@ def run_garment(
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     from warpflat.core.atomic_files import expect_files
     from warpflat.cutting.remedies import advise
-    from warpflat.export.letters import note_on_names
+
+    plan = plan_garment(scene, device=device)
+    expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
+    others = _other_sizes(scene)
+    garment = _flatten_with_frames(plan, out, on_progress=on_progress)
+    report_activity("measuring how it fits")
+    garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
+    report = on_progress or (lambda progress: None)
+    graded = {
+        size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
+        for size, (body, form) in others.items()
+    }
+    return _write_garment(plan, garment, graded, out)
+
+
+def _flatten_with_frames(
+    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], None] | None = None
+) -> Garment:
+    """Flatten and sew the garment, and write `frames.usdc` if the scene wants frames."""
     from warpflat.export.usd import FrameWriter
 
-    settings = scene.settings
-    plan = plan_garment(scene, device=device)
-    form, drawing = plan.form, plan.drawing
-    expect_files(out, [f"{name}.obj" for name in form.pieces])
-    others = _other_sizes(scene)
-    schedules = {name: FrameSchedule(settings.output) for name in form.pieces}
-    wanted = next(iter(schedules.values())).wanted
-    require_memory_for_run(sum(len(piece.surface.vertices) for piece in form.pieces.values()), frames=wanted)
+    output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
+    wanted = FrameSchedule(output).wanted
+    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=wanted)
     with ExitStack() as stack:
-        writer: FrameWriter | None = None
-        if wanted:
-            writer = stack.enter_context(FrameWriter(out / "frames.usdc"))
-            for name, piece in form.pieces.items():
-                writer.add_piece(name, piece.surface)
+        writer = stack.enter_context(FrameWriter(out / "frames.usdc")) if wanted else None
+        recorders = {
+            name: FrameRecorder(writer, piece.surface, lambda: FrameSchedule(output))
+            for name, piece in plan.form.pieces.items()
+        }
 
         def each_step(name: str, progress: Progress) -> None:
-            if writer is not None and schedules[name].is_due(progress.step, progress.max_steps):
-                writer.write(
-                    name,
-                    positions=progress.positions(),
-                    face_energy_density=progress.face_energy_density(),
-                    measures={"step": progress.step, "model_energy_j": progress.model_energy},
-                )
+            recorders[name](progress)
             if on_progress is not None:
                 on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
-        report_activity("measuring how it fits")
-        garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
-        told = on_progress or (lambda progress: None)
-        graded = {
-            size: replace(plan, mannequin=body, form=other).flatten(callback=lambda _, progress: told(progress))
-            for size, (body, other) in others.items()
-        }
-        if writer is not None:
-            _last_frames(writer, garment)
+        for name, piece in garment.pieces.items():
+            recorders[name].record_result(piece)
+    return garment
+
+
+def _write_garment(plan: GarmentPlan, garment: Garment, graded: Mapping[str, Garment], out: Path) -> SceneResult:
+    """Write all files of a garment but its frames, and remove what earlier runs have left.
+
+    Args:
+        plan: what was asked for.
+        garment: in the mannequin's own size.
+        graded: the garment in the other sizes of the pattern.
+        out: an existing folder.
+    """
+    from warpflat.export.letters import note_on_names
+
+    scene, settings = plan.scene, plan.scene.settings
     files = [*garment.write_files(out, picture=settings.output.picture), "metrics.json"]
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_sheet
 
         files.append("wear.png")
         write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
-    if wanted:
+    if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
     own = settings.mannequin.size_name if settings.mannequin is not None else ""
     sizes = {**graded, own: garment}
@@ -197,34 +212,34 @@ def run_garment(
         {size: sizes[size] for size in _in_order(sizes, settings.pattern.sizes)},
         out,
         name=scene.name,
-        options=drawing,
+        options=plan.drawing,
         sample_size=own,
     )
-    metrics, settled = remove_stale(
+    metrics, manifest_notes = remove_stale(
         out,
-        {**garment.metrics(), **_of_sizes(graded), **pattern.metrics},
+        {**garment.metrics(), **_metrics_of_sizes(graded), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
     )
-    unnamed = note_on_names(garment.pieces) if settings.output.picture else ()
-    notes = (*garment.notes, *pattern.notes, *unnamed, *settled)
+    name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
+    notes = (*garment.notes, *pattern.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
 
 
-def _of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:
-    """The entry `sizes` of `metrics.json`: of each besides the mannequin's own, whether its pattern is good."""
+def _metrics_of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:
+    """Return the entry `sizes` of `metrics.json`: a summary of each size besides the mannequin's own."""
     return {"sizes": {size: garment.summary() for size, garment in graded.items()}} if graded else {}
 
 
 def _in_order(sizes: Iterable[str], wanted: Sequence[str]) -> list[str]:
-    """As the scene lists them; where it leaves out the mannequin's own, by their numbers."""
+    """Return the sizes in the scene's order, or by their numbers if the scene leaves out the mannequin's own."""
     if set(sizes) == set(wanted):
         return list(dict.fromkeys(wanted))
     return sorted(sizes, key=lambda size: (int("".join(filter(str.isdigit, size)) or 0), size))
 
 
 def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
-    """The bodies and forms of the sizes that the pattern has besides the mannequin's own."""
+    """Return the bodies and forms of the sizes that the pattern has besides the mannequin's own."""
     table = scene.settings.mannequin
     found = {}
     for size in scene.settings.pattern.sizes:
@@ -234,13 +249,3 @@ def _other_sizes(scene: Scene) -> dict[str, tuple[Mannequin, FormResult]]:
                     scene, mannequin_from_table(table.model_copy(update={"size": size}), path_of=Path)
                 )
     return found
-
-
-def _last_frames(writer: Any, garment: Garment) -> None:
-    for name, piece in garment.pieces.items():
-        writer.write(
-            name,
-            positions=piece.positions,
-            face_energy_density=piece.face_energy_density,
-            measures={"step": piece.stages[-1].steps, **piece.layout_measures},
-        )

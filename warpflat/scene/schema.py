@@ -1,32 +1,28 @@
-"""The tables of a scene file that say what is flattened and what is written."""
+"""The tables of a scene file, as pydantic models."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal
+import dataclasses
+from typing import TYPE_CHECKING, Annotated, Any, Literal, get_type_hints
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import (
+    AfterValidator,
+    BeforeValidator,
+    ConfigDict,
+    Discriminator,
+    Field,
+    Tag,
+    create_model,
+    model_validator,
+)
 
+from warpflat.core.errors import is_number
 from warpflat.core.file_names import plain_name
+from warpflat.core.text import shown
 from warpflat.core.toml_file import Table
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
-from warpflat.solver.options import RelaxOptions
-
-if TYPE_CHECKING:
-    pass
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from warpflat.solver.options import RelaxOptions
-
-import dataclasses
-from typing import TYPE_CHECKING, get_type_hints
-
-from pydantic import BeforeValidator, ConfigDict, create_model
-
-from warpflat.core.errors import is_number
-from warpflat.core.text import shown
 from warpflat.solver.options import RelaxOptions
 
 __all__ = [
@@ -52,7 +48,7 @@ __all__ = [
     "text_or_table",
 ]
 
-# The square of a much larger one is no number any more.
+# The square of a much larger coordinate overflows.
 Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
 Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
 Vertex = Annotated[int, Field(ge=0)]
@@ -227,15 +223,15 @@ class PatternTable(Table):
     """The pattern files: `NAME.dxf`, `NAME.svg`, `pattern.pdf`, `pattern.json`."""
 
     formats: list[Literal["dxf", "svg", "pdf", "json"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
-    """Which of them; an empty list writes none."""
+    """Formats that are written; an empty list writes none."""
     dialect: Literal["aama", "astm"] = "aama"
     paper: Literal["A4", "Letter", "A0"] = "A4"
     allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
     hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
     kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)
-    """By edge, "front.neck", or "neck" for every piece that has one."""
+    """What an edge is, by its name: "front.neck", or "neck" for every piece that has one."""
     allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
-    """Likewise."""
+    """Allowances by edge, named as in `kinds` [mm]."""
     tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
     """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
     sizes: list[str] = Field(default_factory=list)
@@ -305,36 +301,54 @@ class SceneTable(Table):
     marker: MarkerTable | None = None
 
     @model_validator(mode="after")
-    def _one_source(self) -> SceneTable:
+    def _consistent(self) -> SceneTable:
         if (self.surface is None) == (self.mannequin is None):
             raise ValueError("a scene needs either a [surface] table or a [mannequin] table with a form")
         if (self.mannequin is None) != (self.form is None):
             raise ValueError('a mannequin and a form go together: [mannequin] size = "EU 38" and form = "basic_block"')
-        if self.mannequin is not None and (self.lines or self.datum):
-            raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.mannequin is not None and (self.cuts or self.auto_cut):
-            raise ValueError("cuts and auto_cut belong to a [surface]")
-        if self.surface is not None and self.half:
+        if self.mannequin is None:
+            self._check_surface()
+        else:
+            self._check_garment()
+        self._check_sizes()
+        return self
+
+    def _check_surface(self) -> None:
+        """Refuse what belongs to the form on a mannequin."""
+        if self.half:
             raise ValueError(
-                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] kinds = { left = \"fold\" }"
+                "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
+                'kinds = { left = "fold" }'
             )
         for number, seam in enumerate(self.seams):
-            if self.mannequin is None and seam.sides is None:
+            if seam.sides is None:
                 raise ValueError(
-                    f'seams[{number}]: on a [surface] give the two lines that are sewn, sides = ["left", "right"]; both sides '
-                    "of its cuts are equally long anyway"
+                    f"seams[{number}]: on a [surface] give the two lines that are sewn, "
+                    'sides = ["left", "right"]; both sides of its cuts are equally long anyway'
                 )
-            if self.mannequin is not None and seam.sides is not None:
+
+    def _check_garment(self) -> None:
+        """Refuse what belongs to a surface."""
+        if self.lines or self.datum:
+            raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
+        if self.cuts or self.auto_cut:
+            raise ValueError("cuts and auto_cut belong to a [surface]")
+        for number, seam in enumerate(self.seams):
+            if seam.sides is not None:
                 raise ValueError(
                     f"seams[{number}]: sides belong to a [surface]; those of a form's seams are known: leave them out"
                 )
-        if self.pattern.sizes and (self.mannequin is None or self.mannequin.size is None):
+
+    def _check_sizes(self) -> None:
+        """Refuse sizes of a pattern that no size table can give."""
+        if not self.pattern.sizes:
+            return
+        if self.mannequin is None or self.mannequin.size is None:
             raise ValueError('pattern.sizes needs a [mannequin] with a size, as size = "EU 38"')
-        if self.pattern.sizes and self.mannequin is not None and self.mannequin.measurements:
+        if self.mannequin.measurements:
             raise ValueError(
                 "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
             )
-        return self
 
 
 Share = Annotated[float, Field(ge=0.0, le=1.0)]

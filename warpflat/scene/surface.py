@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import TYPE_CHECKING
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.scene.load import Scene, errors_named, expand_variables
 from warpflat.scene.schema import (
     BorderTable,
     LineTable,
@@ -17,15 +17,11 @@ from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.border import SIDES, line_on_border
 from warpflat.surface.paths.lines import line_between, line_from_curve, line_from_indices, line_on_plane, with_lines
 
-if TYPE_CHECKING:
-    pass
-from warpflat.scene.load import Scene, errors_named, expand_variables
-
 __all__ = ["scene_surface"]
 
 
 def scene_surface(scene: Scene) -> Surface:
-    """The scene's surface with its feature lines.
+    """Read or make the scene's surface, with its feature lines.
 
     Raises:
         InputError: the file or shape is wrong, an environment variable is not set, or a line is not on the surface.

@@ -1,4 +1,4 @@
-"""What a scene's run leaves in its folder, and which of its steps become frames."""
+"""The files of a scene's run are written here."""
 
 from __future__ import annotations
 
@@ -18,12 +18,12 @@ __all__ = ["SceneResult", "write_surface"]
 
 @dataclass(frozen=True, kw_only=True)
 class SceneResult:
-    """What a run did.
+    """The result of a run.
 
     Attributes:
         metrics: as `metrics.json`.
         files: names of the files that were written.
-        notes: what was mended or chosen on the way, one sentence each.
+        notes: what was repaired or chosen, one sentence each.
     """
 
     metrics: dict[str, Any]
@@ -45,14 +45,14 @@ def write_surface(
     """Write all files of a flattened surface but its frames, and remove what earlier runs have left.
 
     Args:
-        scene: whose surface it is.
-        pieces: those into which cuts have parted it.
-        folder: exists.
-        drawing: what is written of the pattern.
-        seams: those of the surface's border that were named.
+        scene: the scene.
+        pieces: the pieces into which cuts have parted its surface.
+        folder: an existing one.
+        drawing: options of the pattern files.
+        seams: named seams of the surface's border.
         more: entries of `metrics.json` besides the pieces.
-        frames: whether the folder has got `frames.usdc`.
-        notes: what was mended or chosen until now.
+        frames: whether `frames.usdc` has been written.
+        notes: what was repaired or chosen until now.
 
     Raises:
         InputError: the folder cannot be written.
@@ -77,12 +77,12 @@ def write_surface(
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
     entries = {piece.surface.name: piece.measures for piece in pieces}
-    metrics, settled = remove_stale(
+    metrics, manifest_notes = remove_stale(
         folder,
         {**run_metrics(entries, pieces[0].network.device, more), **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
     )
-    unnamed = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
-    told = (*notes, *pattern.notes, *unnamed, *settled)
-    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=told)
+    name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
+    notes = (*notes, *pattern.notes, *name_notes, *manifest_notes)
+    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
