@@ -10,7 +10,7 @@ import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
 from small_networks import CLOTH
-from test_kernel_surface_cells import SURFACES, norm
+from test_kernel_unfold import SURFACES, norm
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 
 from warpflat.core.launch import launch_each
