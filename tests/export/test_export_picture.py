@@ -83,7 +83,7 @@ def test_a_name_that_no_font_can_write_is_a_number_in_pictures(tmp_path: Path) -
 
 def test_fonts_for_other_scripts_are_used_where_they_are_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     assert "DejaVu Serif" not in matplotlib.rcParams["font.family"]
-    monkeypatch.setattr("warpflat.export.letters._FOR_OTHER_SCRIPTS", ("Not Installed", "DejaVu Serif"))
+    monkeypatch.setattr("warpflat.export.letters._FONTS_OF_OTHER_SCRIPTS", ("Not Installed", "DejaVu Serif"))
     with all_letters():
         assert matplotlib.rcParams["font.family"] == [*matplotlib.rcParamsDefault["font.family"], "DejaVu Serif"]
 
