@@ -225,7 +225,7 @@ def _no_links(*_: object, **__: object) -> None:
 KILLED = """
 import os, signal, sys
 from pathlib import Path
-from warpflat.export.atomic import atomic_path, output_folder, remove_file
+from warpflat.core.atomic_files import atomic_path, output_folder, remove_file
 folder, number, links = Path(sys.argv[1]), int(sys.argv[2]), sys.argv[3] == "True"
 replace = os.replace
 def fatal(source, target):

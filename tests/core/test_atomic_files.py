@@ -51,7 +51,7 @@ def test_failure_leaves_what_was_there(tmp_path: Path) -> None:
 
 KILLED = """
 import os, signal, sys
-from warpflat.export import atomic_path
+from warpflat.core.atomic_files import atomic_path
 with atomic_path(sys.argv[1]) as temporary:
     temporary.write_text("half")
     os.kill(os.getpid(), signal.SIGKILL)

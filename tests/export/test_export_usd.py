@@ -336,7 +336,7 @@ STREAM = """
 import sys
 import numpy as np
 from export_meshes import dome
-from warpflat.export import FrameWriter
+from warpflat.export.usd import FrameWriter
 
 def anonymous():
     with open("/proc/self/status") as status:
