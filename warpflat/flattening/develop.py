@@ -32,22 +32,22 @@ from warpflat.surface.vectors import norm, points_at
 __all__ = ["Development", "develop", "flat_layout", "geodesic_layout", "profile_layout"]
 
 
-# A piece is flat if it strays no further from its plane, to this share of its size: single precision leaves that much.
+# A piece is flat if it leaves its plane by no more than this share of its size, the rounding of single precision.
 _FLAT = 1e-5
 _FEW_VERTICES = 100
-# Rows of a grid that are worth a thread of their own.
+# A thread takes at least this many rows of a grid.
 _FEW_ROWS = 64
 _GOLDEN = 0.6180339887498949
-# A cell pressed to less than this share of its area is as good as mirrored: it would hold the whole relaxation up.
+# A cell of less than this share of its area counts as mirrored, since it would slow the whole relaxation down.
 _LEAST_AREA = 0.01
-# Up to this share of the faces may be mirrored for a development to be mended rather than given up.
+# A development is repaired rather than given up if at most this share of its faces is mirrored.
 _FEW = 0.1
-# Up to so many, or this share, turned back do not matter to the directions of the whole.
+# Repairing at most this many faces, or this share of them, does not change the directions of the whole.
 _MENDED = 5
 _MENDED_SHARE = 1e-3
-# Layouts with more mirrored cells than this share are turned back only after smoother ones have been tried.
+# A layout with a larger share of mirrored cells is repaired only after smoother ones have been tried.
 _SOON_TURNED_BACK = 5e-3
-# Pieces of more vertices than this are smoothed by coarser meshes before they are given up.
+# The layout of a piece with more vertices than this is also smoothed by coarser meshes.
 _LARGE = 5000
 
 
