@@ -131,7 +131,7 @@ import numpy as np
 from warpflat import compiling
 from warpflat.kernels.reduce import subtract
 from warpflat.launching import launch_each
-compiling._USUAL = ("sums", "springs")
+compiling._USUAL = ("reduce", "springs")
 way = np.ones((3, 2))
 launch_each(subtract, 3, [np.full((3, 2), 5.0), np.full((3, 2), 3.0)], [way])
 sys.exit(int(way[0, 0]))

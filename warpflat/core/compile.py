@@ -22,20 +22,20 @@ __all__ = ["compile_usual", "start_warp", "writing_kernels"]
 
 # Modules that nearly every run needs, those that take longest first; what it writes in the end, too.
 _USUAL = (
-    "lattice",
+    "grid_lists",
     "coarsen",
     "cells",
     "stiffness",
     "geodesic",
     "strain",
     "implicit",
-    "surface_cells",
+    "unfold",
     "curvature",
-    "cubics",
-    "thread_lines",
+    "cubic_interpolation",
+    "line_solve",
     "raster",
-    "transfer",
-    "sums",
+    "prolongation",
+    "reduce",
     "springs",
 )
 # Each thread reads Warp's own headers first, which takes a second: more would not gain by it.

@@ -175,7 +175,7 @@ def sew(
     start = np.concatenate([_straightened(piece, folds.get(name)) for name, piece in pieces.items()])
     network = whole.network()
     if folds:
-        network.guide(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
+        network.keep_vertical(np.concatenate([whole.numbers(name, ids) for name, ids in folds.items()]))
     if len(ties):
         thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
         median = float(np.median(network.spring_arrays.listed_stiffness))
@@ -243,7 +243,7 @@ def _relax_in_rounds(
         steps = _ROUND + len(amiss) // _LONGER * _ROUND // 4
         state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
         outcome, misses = relax(state), _misses(state)
-        amiss.append(ties.amiss(misses))
+        amiss.append(ties.violation(misses))
         furthest = np.abs(np.where(ties.soft > 0, 0.0, misses)).max(initial=0.0)
         doing(f"sewing, step {state.steps}, {1e3 * furthest:.2g} mm amiss")
         done = outcome.converged and len(amiss) > 1 and max(amiss[-2:]) <= 1.0
@@ -271,11 +271,11 @@ def _held(
     if seams is None:
         return []
     pull = seams.stiffness.numpy() * (seams.offset.numpy() + misses)
-    price = ties.sums(0.5 * pull * _misses(state, alone))
+    price = ties.group_sums(0.5 * pull * _misses(state, alone))
     largest = np.zeros(len(kinds))
     np.maximum.at(largest, ties.group, np.where(ties.soft > 0, 0.0, np.abs(misses)))
     summed = np.isfinite(ties.sum_tolerance)
-    amiss = np.where(summed, np.abs(ties.sums(misses)), largest)
+    amiss = np.where(summed, np.abs(ties.group_sums(misses)), largest)
     return [
         Held(name=name, kind=kind, price=float(price[number]), amiss=float(amiss[number]))
         for number, (name, kind) in enumerate(kinds)
@@ -335,4 +335,4 @@ def _misses(state: Relaxation, positions: FloatArray | None = None) -> FloatArra
     """#P, c of each tie [m], in the present layout or another one."""
     network = state.network
     at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
-    return network.seam_misses(at)
+    return network.seam_residuals(at)

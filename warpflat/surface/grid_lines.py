@@ -18,7 +18,7 @@ __all__ = ["LineArrays", "join_lines", "lines_of"]
 
 @dataclass(frozen=True, kw_only=True)
 class LineArrays:
-    """As `kernels.thread_lines.ThreadLines` has them: `offset` #L+1, `vertex` 2 #V, and how many of the lines are `rows`."""
+    """As `kernels.line_solve.ThreadLines` has them: `offset` #L+1, `vertex` 2 #V, and how many of the lines are `rows`."""
 
     offset: IntArray
     vertex: IntArray

@@ -140,7 +140,7 @@ class Levels:
                     fine.state, [each.coarsening for each in coarse_levels], coarse.state
                 )
             self.all.append(coarse)
-        if finest.network.goes_along_lines:
+        if finest.network.uses_line_relaxation:
             for level in self.all:
                 _use_lines(level)
         self.update_matrices()
