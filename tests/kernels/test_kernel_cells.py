@@ -65,7 +65,7 @@ def held(network: SpringNetwork) -> SpringNetwork:
     )
     wave[2::3] = 0.0
     wave[~network.surface.is_quad] = 0.0
-    return replace(network, spring_arrays=replace(network.spring_arrays, wave=wave))
+    return replace(network, spring_arrays=replace(network.spring_arrays, hourglass=wave))
 
 
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
