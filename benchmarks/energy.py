@@ -38,11 +38,11 @@ class LayoutEnergy:
         here = csr_matrix((ones, (rows, corner[:, 0])), shape)
         self._sides = [csr_matrix((ones, (rows, corner[:, k])), shape) - here for k in (1, 2)]
         self._edges, self._weight = cells.edges, cells.weight
-        self._shear = None if springs.lack is None else springs.lack[cells.face]
-        wave = np.zeros((0, 4)) if springs.wave is None else springs.wave
-        held = np.flatnonzero(wave.any(axis=1))
+        self._shear = None if springs.shear_deficit is None else springs.shear_deficit[cells.face]
+        hourglass = np.zeros((0, 4)) if springs.hourglass is None else springs.hourglass
+        held = np.flatnonzero(hourglass.any(axis=1))
         at = (np.repeat(np.arange(len(held)), 4), cells.faces[held].ravel())
-        self._waves = csr_matrix((wave[held].ravel(), at), (len(held), self.count))
+        self._hourglass = csr_matrix((hourglass[held].ravel(), at), (len(held), self.count))
         warp, weft = grain_axes(network.grain_angle)
         # One piece has one onset for all its cells.
         onset_warp, onset_weft = network.cells.onset.numpy()[0].tolist()
@@ -71,7 +71,9 @@ class LayoutEnergy:
 
     def laplacian(self) -> csr_matrix:
         """#V by #V, of the stiffnesses of springs and against waves [N/m]."""
-        return (self._along.T @ self._along.multiply(self.stiffness[:, None]) + self._waves.T @ self._waves).tocsr()
+        return (
+            self._along.T @ self._along.multiply(self.stiffness[:, None]) + self._hourglass.T @ self._hourglass
+        ).tocsr()
 
     def _lengths(self, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
         d = self._along @ positions
@@ -79,7 +81,7 @@ class LayoutEnergy:
 
     def _evaluate(self, positions: FloatArray, *, gradient: bool) -> tuple[float, FloatArray]:
         d, length = self._lengths(positions)
-        waves = self._waves @ positions
+        waves = self._hourglass @ positions
         energy = 0.5 * float(self.stiffness @ (length - self.rest_length) ** 2) + 0.5 * float(np.square(waves).sum())
         slope = np.zeros_like(positions)
         a, b = (side @ positions for side in self._sides)
@@ -88,7 +90,7 @@ class LayoutEnergy:
             return math.inf, slope
         if gradient:
             scale = self.stiffness * (1.0 - self.rest_length / np.maximum(length, 1e-300))
-            slope += self._along.T @ (scale[:, None] * d) + self._waves.T @ waves
+            slope += self._along.T @ (scale[:, None] * d) + self._hourglass.T @ waves
         # Columns of D^-1 times a thread e: how much of the edges 0-1 and 0-2 runs along it.
         density = np.zeros(len(det))
         pulls = []

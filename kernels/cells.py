@@ -22,15 +22,16 @@ class Cells:
 
     face: #F, vertices, anticlockwise in the plane; -1 for the fourth of a triangle.
     first: #F, the first of each face's cells.
-    laid: #C, the cell laid flat as on the surface, with corner 0 at the origin and corner 1 along x: x of corner 1, x and y of
-        corner 2 [m].
+    laid: #C, the cell laid flat as on the surface, with corner 0 at the origin and corner 1 along x: x of corner 1, then
+        x and y of corner 2 [m].
     offset: #V+1, where each vertex's entries in `slot` begin.
     slot: 4 times the face plus the corner, for every face around a vertex.
-    slack: #F, along warp and weft, 1 over the stretch at which the cloth is meant to be worn; 1 where none is meant.
+    slack: #F, along warp and weft, 1 over the intended stretch of the worn cloth; 1 where none is intended.
     onset: #F, worn stretch along warp and weft at which the guard begins to act.
-    shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad lack there [N/m];
-        zero of any other face.
-    wave: #F, weights of a quad's corners, by which it is held against waves (`stiffness.weigh_waves`) [(N/m)^1/2]; zero of most.
+    shear: #F, a direction in the plane times the fourth root of the shear stiffness that the springs of a long quad
+        lack there [N/m]; zero for any other face.
+    hourglass: #F, weights of a quad's corners in its hourglass mode (`stiffness.weigh_hourglass`) [(N/m)^1/2];
+        zero for most.
     """
 
     face: wp.array(dtype=wp.vec4i)
@@ -41,12 +42,12 @@ class Cells:
     slack: wp.array(dtype=wp.vec2d)
     onset: wp.array(dtype=wp.vec2d)
     shear: wp.array(dtype=wp.vec2d)
-    wave: wp.array(dtype=wp.vec4d)
+    hourglass: wp.array(dtype=wp.vec4d)
 
 
 @wp.struct
 class ThreadGuard:
-    """What keeps threads straight and faces unfolded (`warpflat.model.network` says why).
+    """The energy that keeps threads straight and faces unfolded (see `warpflat.model.network`).
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].
@@ -60,7 +61,7 @@ class ThreadGuard:
 
 @wp.func
 def count_cells(face: wp.vec4i):
-    """How many cells a face has: a triangle one, a quad four."""
+    """Return the number of cells of a face: one for a triangle, four for a quad."""
     if face[3] < 0:
         return 1
     return 4
@@ -68,7 +69,7 @@ def count_cells(face: wp.vec4i):
 
 @wp.func
 def cell_weight(face: wp.vec4i):
-    """Share of a cell's area that counts: a quad's four corner triangles cover it twice."""
+    """Return the share of a cell's area that counts: a quad's four corner triangles cover it twice."""
     if face[3] < 0:
         return wp.float64(1.0)
     return wp.float64(0.5)
@@ -76,7 +77,7 @@ def cell_weight(face: wp.vec4i):
 
 @wp.func
 def cell_places(face: wp.vec4i, k: int):
-    """Which of the face's corners its cell k has: a triangle's are its own; of a quad, the one before corner k, k, and the one after."""
+    """Return the face's corners in its cell k: a triangle's own, or a quad's corner k between its neighbours."""
     if face[3] < 0:
         return wp.vec3i(0, 1, 2)
     return wp.vec3i((k + 3) & 3, k, (k + 1) & 3)
@@ -84,7 +85,7 @@ def cell_places(face: wp.vec4i, k: int):
 
 @wp.func
 def corner_at(face: wp.vec4i, k: int):
-    """The vertex at the face's corner k, 0 to 3, without asking a vector for a component that is known only when the kernel runs."""
+    """Return the vertex at the face's corner k, 0 to 3, without a vector index that is known only at run time."""
     below = wp.where((k & 1) != 0, face[1], face[0])
     above = wp.where((k & 1) != 0, face[3], face[2])
     return natural(wp.where((k & 2) != 0, above, below))
@@ -92,32 +93,32 @@ def corner_at(face: wp.vec4i, k: int):
 
 @wp.func
 def cell_corner(face: wp.vec4i, k: int):
-    """The vertices of the face's cell k."""
+    """Return the vertices of the face's cell k."""
     at = cell_places(face, k)
     return wp.vec3i(corner_at(face, at[0]), corner_at(face, at[1]), corner_at(face, at[2]))
 
 
 @wp.func
 def laid_edges(laid: wp.vec3d):
-    """The edges of a laid cell from corner 0 to corners 1 and 2, as columns [m]."""
+    """Return the edges of a laid cell from corner 0 to corners 1 and 2, as columns [m]."""
     return wp.mat22d(laid[0], laid[1], wp.float64(0.0), laid[2])
 
 
 @wp.func
 def on_body(laid: wp.vec3d, share: wp.vec2d):
-    """`laid_edges` times a vector."""
+    """Return `laid_edges` times a vector."""
     return wp.vec2d(laid[0] * share[0] + laid[1] * share[1], laid[2] * share[1])
 
 
 @wp.func
 def across(D: wp.mat22d, v: wp.vec2d):
-    """The adjugate of D times a vector: det(D) D^-1 v."""
+    """Return the adjugate of D times a vector: det(D) D^-1 v."""
     return wp.vec2d(D[1, 1] * v[0] - D[0, 1] * v[1], D[0, 0] * v[1] - D[1, 0] * v[0])
 
 
 @wp.func
 def longest_square(D: wp.mat22d):
-    """Square of the longest side of a cell with these edges [m2]."""
+    """Return the square of the longest side of a cell with these edges [m2]."""
     a = wp.vec2d(D[0, 0], D[1, 0])
     b = wp.vec2d(D[0, 1], D[1, 1])
     return wp.max(wp.dot(a, a), wp.max(wp.dot(b, b), wp.dot(b - a, b - a)))
@@ -125,7 +126,7 @@ def longest_square(D: wp.mat22d):
 
 @wp.func
 def edge_matrix(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d):
-    """The edges of a cell with these corners from the first one, as columns [m]."""
+    """Return the edges of a cell with these corners from the first one, as columns [m]."""
     a = p1 - p0
     b = p2 - p0
     return wp.mat22d(a[0], b[0], a[1], b[1])
@@ -133,7 +134,7 @@ def edge_matrix(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d):
 
 @wp.func
 def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
-    """The cell's edges from corner 0 to corners 1 and 2 in the plane, as columns [m]."""
+    """Return the cell's edges from corner 0 to corners 1 and 2 in the plane, as columns [m]."""
     p0 = position[natural(corner[0])]
     p1 = position[natural(corner[1])]
     p2 = position[natural(corner[2])]
@@ -142,17 +143,17 @@ def flat_edges(position: wp.array(dtype=wp.vec2d), corner: wp.vec3i):
 
 @wp.func
 def is_beyond(worn: wp.vec2d, unit: wp.float64, stretch: wp.float64):
-    """Whether the stretch of a worn thread, a vector of length `unit` mapped to `worn`, is more than this."""
+    """Return whether a worn thread, a vector of length `unit` mapped to `worn`, is stretched more than `stretch`."""
     length = (wp.float64(1.0) + stretch) * unit
     return length < wp.float64(0.0) or wp.dot(worn, worn) > length * length
 
 
 @wp.func
 def early_share(det: wp.float64, longest2: wp.float64):
-    """The share of the onset from which on a cell's stiffness counts.
+    """Return the share of the onset from which on a cell's stiffness counts.
 
-    A half, and always in slender cells: a step can take these from far below the onset to far beyond it, and with the springs'
-    stiffness alone they would swing to and fro for ever.
+    It is a half; in slender cells the stiffness always counts. A step can take these from far below the onset to far
+    beyond it, and with the springs' stiffness alone they would oscillate for ever.
     """
     if det < SLENDER * longest2:
         return -wp.float64(wp.inf)
@@ -160,8 +161,10 @@ def early_share(det: wp.float64, longest2: wp.float64):
 
 
 @wp.func
-def look_at(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, onset: wp.vec2d):
-    """The square of a cell's least height [m2], 0 once it is mirrored, and 1 where the guard acts in it or is about to."""
+def check_cell(
+    p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, onset: wp.vec2d
+):
+    """Return the square of a cell's least height [m2], 0 if mirrored, and 1 where the guard acts or is about to."""
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     height2 = wp.float64(0.0)
@@ -178,7 +181,7 @@ def look_at(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.v
 
 
 @wp.func
-def look_at_face(
+def check_face(
     position: wp.array(dtype=wp.vec2d),
     face: wp.vec4i,
     laid: wp.array(dtype=wp.vec3d),
@@ -187,20 +190,20 @@ def look_at_face(
     weft: wp.vec2d,
     onset: wp.vec2d,
 ):
-    """The same of all cells of a face, the least and any; `begin`: the first of them."""
+    """Return the least height and the largest flag of `check_cell` over the cells of a face; `begin`: the first."""
     p0 = position[natural(face[0])]
     p1 = position[natural(face[1])]
     p2 = position[natural(face[2])]
     height2 = wp.float64(0.0)
     near = int(0)
     if face[3] < 0:
-        height2, near = look_at(p0, p1, p2, laid[begin], warp, weft, onset)
+        height2, near = check_cell(p0, p1, p2, laid[begin], warp, weft, onset)
     else:
         p3 = position[natural(face[3])]
-        h0, near0 = look_at(p3, p0, p1, laid[begin], warp, weft, onset)
-        h1, near1 = look_at(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset)
-        h2, near2 = look_at(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset)
-        h3, near3 = look_at(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset)
+        h0, near0 = check_cell(p3, p0, p1, laid[begin], warp, weft, onset)
+        h1, near1 = check_cell(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset)
+        h2, near2 = check_cell(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset)
+        h3, near3 = check_cell(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset)
         height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
         near = near0 | near1 | near2 | near3
     return height2, near
@@ -208,13 +211,13 @@ def look_at_face(
 
 @wp.func
 def excess_stretch(worn: wp.vec2d, onset: wp.float64):
-    """How far the stretch of a worn thread, a unit vector mapped to `worn`, lies beyond the onset."""
+    """Return the stretch beyond the onset of a worn thread, a unit vector mapped to `worn`; 0 below it."""
     return wp.max(wp.length(worn) - wp.float64(1.0) - onset, wp.float64(0.0))
 
 
 @wp.func
 def thread_stress(worn: wp.vec2d, thread: wp.vec2d, stiffness: wp.float64, onset: wp.float64):
-    """d(psi)/dF of psi = 1/2 K max(|F e| - 1 - onset, 0)^2."""
+    """Return d(psi)/dF of psi = 1/2 K max(|F e| - 1 - onset, 0)^2."""
     length = wp.length(worn)
     excess = wp.max(length - wp.float64(1.0) - onset, wp.float64(0.0))
     return wp.outer(worn, thread) * (stiffness * excess / wp.max(length, wp.float64(1.0e-300)))
@@ -222,8 +225,10 @@ def thread_stress(worn: wp.vec2d, thread: wp.vec2d, stiffness: wp.float64, onset
 
 @wp.func
 def thread_curvature(worn: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset: wp.float64):
-    """The gradient of psi's stretch by a corner's place is -(F^T F e / |F e|) (grad w . e) for the barycentric weight w:
-    returns K |F^T F e|^2 / |F e|^2, or 0 where the thread is not about to be guarded."""
+    """Return K |F^T F e|^2 / |F e|^2, or 0 where the guard is not about to act on the thread.
+
+    The gradient of psi's stretch by a corner's place is -(F^T F e / |F e|) (grad w . e) for the barycentric weight w.
+    """
     length = wp.length(worn)
     if length - wp.float64(1.0) - onset <= wp.float64(0.0):
         return wp.float64(0.0)
@@ -233,7 +238,7 @@ def thread_curvature(worn: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset:
 
 @wp.func
 def sheared(shear: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, slack: wp.vec2d):
-    """`Cells.shear` on the cloth as it is meant to be worn; warp, weft: unit vectors times the slack."""
+    """Return `Cells.shear` on the cloth at its intended stretch; warp, weft: unit vectors times the slack."""
     along = wp.dot(shear, warp) / slack[0]
     over = wp.dot(shear, weft) / slack[1]
     return warp * along + weft * over
@@ -241,6 +246,7 @@ def sheared(shear: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, slack: wp.vec2d):
 
 @wp.func
 def turned_left(v: wp.vec2d):
+    """Return the vector turned to the left by a right angle."""
     return wp.vec2d(-v[1], v[0])
 
 
@@ -251,8 +257,8 @@ def evaluate_guard(
     cells: Cells,
     guard: ThreadGuard,
     time_step: wp.float64,
-    pace: wp.array(dtype=wp.vec3d),
-    watch: int,
+    coefficients: wp.array(dtype=wp.vec3d),
+    check_all: int,
     first: int,
     # outputs
     acting: wp.array(dtype=wp.int8),
@@ -261,38 +267,43 @@ def evaluate_guard(
     viscosity: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
 ):
-    """Forces of the thread guard: minus the gradient of a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft], and of what long
-    quads lack in shear, a 1/2 (F s . F s')^2, with s' at right angles to s = `Cells.shear`, and of waves, 1/2 |sum of wave_k p_k|^2.
+    """Compute the forces of the thread guard, minus the gradient of its energy.
 
-    a is the flat area of the cell. The energy grows without bound as the cell collapses. Its viscosity, the share of the
-    guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a cell
-    that moves as a whole is not held back.
+    The energy of a cell is a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft].
 
-    position: #V [m]. velocity: #V [m/s]. pace: as `implicit` has it; without viscosity none is written. watch: 1 to look at all faces; with
-    0 those in which the guard did not act are passed over.
-    acting: #F, 1 where the guard acts in a cell or is about to, and of long quads; elsewhere the last three are not written.
-    clearance: #F, the least height of its cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the faces'
-    corners [N]; a triangle's fourth is not used.
+    Added are the energies of the shear deficit of long quads, a 1/2 (F s . F s')^2 with s' at right angles to s =
+    `Cells.shear`, and of hourglass modes, 1/2 |sum of hourglass_k p_k|^2.
+
+    a is the flat area of the cell. The energy grows without bound as the cell collapses. Its viscosity, the share of
+    the guard in h H v of eq. (6), is taken as -h k (v - v_cell), with v_cell the mean velocity by stiffness, so that a
+    cell that moves as a whole is not held back.
+
+    position: #V [m]. velocity: #V [m/s]. coefficients: as `implicit` has it; without viscosity none is written.
+    check_all: 1 to look at all faces; with 0 those in which the guard did not act are passed over.
+    acting: #F, 1 where the guard acts in a cell or is about to, and of long quads; elsewhere the last three are not
+    written.
+    clearance: #F, the least height of its cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at
+    the faces' corners [N]; a triangle's fourth is not used.
     stiffness k: 4 #F, bound on the energy's second derivative by the corner's place [N/m].
     """
     f = natural(wp.tid() + first)
-    if watch == 0 and acting[f] == wp.int8(0):
+    if check_all == 0 and acting[f] == wp.int8(0):
         return
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     begin = natural(cells.first[f])
-    height2, any_near = look_at_face(position, face, cells.laid, begin, warp, weft, onset)
+    height2, any_near = check_face(position, face, cells.laid, begin, warp, weft, onset)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
-    wave = cells.wave[f]
+    wave = cells.hourglass[f]
     is_held = wp.dot(wave, wave) > wp.float64(0.0)
     is_strained = any_near != 0 or lacks_shear
     acts = is_strained or is_held
     acting[f] = wp.int8(wp.where(acts, 1, 0))
     clearance[f] = wp.sqrt(height2)
     if acts:
-        viscous = pace[0][0] != wp.float64(0.0)
+        viscous = coefficients[0][0] != wp.float64(0.0)
         weight = cell_weight(face)
         s = sheared(cells.shear[f], warp, weft, cells.slack[f])
         t = sheared(turned_left(cells.shear[f]), warp, weft, cells.slack[f])
@@ -313,7 +324,7 @@ def evaluate_guard(
             q0 = position[i0]
             q1 = position[i1]
             q2 = position[i2]
-            cell_height2, near = look_at(q0, q1, q2, laid, warp, weft, onset)
+            cell_height2, near = check_cell(q0, q1, q2, laid, warp, weft, onset)
             if near != 0 or (lacks_shear and cell_height2 > wp.float64(0.0)):
                 D = edge_matrix(q0, q1, q2)
                 det = wp.determinant(D)
@@ -390,9 +401,12 @@ def evaluate_guard(
 def guard_bound(
     w: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q_warp: wp.float64, q_weft: wp.float64, density: wp.float64
 ):
-    """Per area, twice the Gauss-Newton part of the second derivative by the corner's place, and the part that the change
-    of the area adds: at least the second derivative of a corner that moves alone, and, since the three corners of a cell
-    move at once, enough for the step to be stable (eigenvalues of the step's matrix below 2; measured 1.57)."""
+    """Return a bound, per area, on the second derivative of the guard's energy by a corner's place.
+
+    It is twice the Gauss-Newton part of the second derivative, plus the part due to the change of the area: at least the
+    second derivative of a corner that moves alone, and, since the three corners of a cell move at once, enough for the
+    step to be stable (eigenvalues of the step's matrix below 2).
+    """
     along_warp = wp.dot(w, warp)
     along_weft = wp.dot(w, weft)
     return wp.float64(2.0) * (
@@ -402,7 +416,9 @@ def guard_bound(
 
 @wp.func
 def shear_bound(w: wp.vec2d, s: wp.vec2d, t: wp.vec2d, back_s: wp.vec2d, back_t: wp.vec2d, bent: wp.float64):
-    """The same of 1/2 (F s . F t)^2. Its second derivative along a unit vector u by the place of the corner, with that of the area, is
+    """Return the bound of `guard_bound` for 1/2 (F s . F t)^2.
+
+    Its second derivative along a unit vector u by the place of the corner, with that of the area, is
     (u . g)^2 + 2 (F s . F t) (w . s) (w . t) |F u|^2 with g = (w . s) F^T F t + (w . t) F^T F s.
 
     back_s, back_t: F^T F s, F^T F t. bent: |F s . F t| times the square of F's norm.
@@ -426,7 +442,7 @@ def guard_energy(
     t: wp.vec2d,
     guard: ThreadGuard,
 ):
-    """Of a cell [J], infinite if it is collapsed or mirrored; s, t: as `evaluate_guard` has them."""
+    """Return the guard's energy of a cell [J], infinite if collapsed or mirrored; s, t: as in `evaluate_guard`."""
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     if det <= wp.float64(0.0):
@@ -453,8 +469,10 @@ def compute_guard_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """Energy of the thread guard per face, of what long quads lack in shear, and of waves. position: #V [m]. energy: #F [J], infinite
-    where a cell is collapsed or mirrored."""
+    """Compute the energy of the thread guard per face, with that of shear deficits and hourglass modes.
+
+    position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored.
+    """
     f = natural(wp.tid() + first)
     face = cells.face[f]
     warp = guard.warp * cells.slack[f][0]
@@ -479,7 +497,7 @@ def compute_guard_energy(
             + guard_energy(p1, p2, p3, cells.laid[natural(begin + 2)], warp, weft, onset, s, t, guard)
             + guard_energy(p2, p3, p0, cells.laid[natural(begin + 3)], warp, weft, onset, s, t, guard)
         )
-        wave = cells.wave[f]
+        wave = cells.hourglass[f]
         if wp.dot(wave, wave) > wp.float64(0.0):
             amplitude = wave[0] * p0 + wave[1] * p1 + wave[2] * p2 + wave[3] * p3
             energy[f] += wp.float64(0.5) * wp.dot(amplitude, amplitude)
@@ -487,7 +505,7 @@ def compute_guard_energy(
 
 @wp.func
 def area_share(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d):
-    """A cell's signed area in the plane over that on the body."""
+    """Return a cell's signed area in the plane over that on the body."""
     return wp.determinant(edge_matrix(p0, p1, p2)) / wp.max(laid[0] * laid[2], wp.float64(1.0e-300))
 
 
@@ -501,8 +519,10 @@ def find_least_shares(
     # outputs
     share: wp.array(dtype=wp.float64),
 ):
-    """Signed area in the plane over that on the body, the least of the cells of each face. position: #V [m]. face, cell, laid: as
-    `Cells` has them. share: #F, 0 or less where a cell is collapsed or mirrored."""
+    """Compute the least signed area in the plane over that on the body of the cells of each face.
+
+    position: #V [m]. face, cell, laid: as in `Cells`. share: #F, 0 or less where a cell is collapsed or mirrored.
+    """
     f = natural(wp.tid() + first)
     corners = face[f]
     begin = natural(cell[f])

@@ -1,4 +1,4 @@
-"""A coarser mesh by collapsing edges: each vertex finds the neighbour into which it may vanish, and where it then lies."""
+"""Coarsening of a triangle mesh by edge collapses, and the interpolation from the coarser mesh."""
 
 import warp as wp
 
@@ -6,21 +6,23 @@ from .indices import natural
 
 wp.set_module_options({"enable_backward": False})
 
-# Quality is 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a turned one. This times a
-# parallelogram's area over half the sum.
+# Quality is 4 sqrt(3) area / sum of squared sides: 1 for an equilateral triangle, below 0 for a mirrored one. This
+# times a parallelogram's area over half the sum.
 _EQUILATERAL = wp.constant(wp.float64(1.7320508075688772))
-# Least quality of a new triangle in the plane, and least cosine of the turn of a border at a vertex that may vanish.
+# Least quality of a new triangle in the plane, and least cosine of the border's turn at a vertex that may collapse.
 LEAST_FLAT_QUALITY = wp.constant(wp.float64(0.05))
 LEAST_STRAIGHT = wp.constant(wp.float64(0.7))
 
 
 @wp.struct
 class Ring:
-    """The neighbours around each vertex, anticlockwise: two that follow each other form a triangle with it, and so do the last and
-    the first. At the border the last is -1, which stands for what is outside.
+    """The neighbours around each vertex, anticlockwise.
+
+    Two that follow each other form a triangle with it, and so do the last and the first. At the border the last is -1,
+    for the outside.
 
     vertices: #V, on the body [m]. layout: #V, in the plane [m], or none.
-    offset: #V+1, where each vertex's place in `neighbor` begins. degree: #V, how much of its place is used.
+    offset: #V+1, where each vertex's place in `neighbor` begins. degree: #V, number of entries used.
     neighbor: #N, vertices.
     """
 
@@ -42,7 +44,10 @@ def sort_corners(
     degree: wp.array(dtype=wp.int32),
     side: wp.array(dtype=wp.vec2i),
 ):
-    """For one thread. side: #N, from `offset` on, the other two vertices of each triangle at a vertex; degree: #V, how many, 0 before."""
+    """List the triangles around each vertex; for one thread.
+
+    side: #N, from `offset` on, the other two vertices of each triangle. degree: #V, their number, 0 before.
+    """
     for t in range(triangles.shape[0]):
         for k in range(3):
             v = triangles[t][k]
@@ -60,8 +65,11 @@ def order_rings(
     degree: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
 ):
-    """offset, degree, neighbor: as in `Ring`; of `sort_corners`' triangles at each vertex, which begin at `first_side` and whose number is
-    in `degree` before. A degree of -1 where they are more than one fan."""
+    """Order the triangles around each vertex to a ring; the degree becomes -1 where they are more than one fan.
+
+    offset, degree, neighbor: as in `Ring`. side: the triangles of `sort_corners`, which begin at `first_side` and whose
+    number is in `degree` before.
+    """
     v = natural(wp.tid() + first)
     begin = first_side[v]
     end = begin + degree[v]
@@ -109,7 +117,7 @@ def order_rings(
 
 @wp.func
 def at(ring: Ring, v: int, i: int):
-    """The i-th entry of a vertex's ring, from 0 up to twice its length."""
+    """Return the i-th entry of a vertex's ring, from 0 up to twice its length."""
     d = ring.degree[v]
     if i >= d:
         i -= d
@@ -118,7 +126,7 @@ def at(ring: Ring, v: int, i: int):
 
 @wp.func
 def normal_at(v: int, ring: Ring):
-    """Mean normal of the triangles around a vertex, by area."""
+    """Return the mean normal of the triangles around a vertex, by area."""
     n = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     here = ring.vertices[v]
     end = ring.offset[v] + ring.degree[v]
@@ -139,7 +147,10 @@ def normal_at(v: int, ring: Ring):
 
 @wp.func
 def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
-    """Least quality of the triangles that are left where v vanishes into its j-th neighbour, seen along the normal; 2 where none is."""
+    """Return the least quality of the triangles left when v collapses into its j-th neighbour, seen along the normal.
+
+    It is 2 if none is left.
+    """
     u = ring.vertices[at(ring, v, j)]
     worst = wp.float64(2.0)
     a = at(ring, v, j + 1)
@@ -165,8 +176,8 @@ def worst_after(v: int, j: int, normal: wp.vec3d, ring: Ring):
 
 
 @wp.func
-def stays_upright(v: int, j: int, ring: Ring):
-    """Whether no triangle that is left where v vanishes into its j-th neighbour is mirrored, or nearly so, in the plane."""
+def mirrors_none(v: int, j: int, ring: Ring):
+    """Return whether no triangle is (nearly) mirrored in the plane when v collapses into its j-th neighbour."""
     if ring.layout.shape[0] == 0:
         return True
     u = ring.layout[at(ring, v, j)]
@@ -186,8 +197,11 @@ def stays_upright(v: int, j: int, ring: Ring):
 
 
 @wp.func
-def stays_mesh(v: int, j: int, ring: Ring):
-    """Whether v may vanish into its j-th neighbour: they share no neighbours but those of their triangles, and the ring has room."""
+def keeps_topology(v: int, j: int, ring: Ring):
+    """Return whether v may collapse into its j-th neighbour.
+
+    They must share no neighbours but those of their triangles, and the ring must have room.
+    """
     u = at(ring, v, j)
     d = ring.degree[v]
     begin = ring.offset[u]
@@ -208,11 +222,11 @@ def stays_mesh(v: int, j: int, ring: Ring):
 
 @wp.func
 def find_target(v: int, ring: Ring, least: wp.float64):
-    """Where in its ring is the neighbour into which a vertex vanishes with the best triangles left, and the quality of the worst of these,
-    which is above `least`; -1 where it has to stay.
+    """Return the place in the ring of the neighbour with the best triangles left, and the worst quality of these.
 
-    A vertex of the border vanishes along the border, where that is nearly straight. So corners stay, and the two sides of a crack,
-    whose vertices are different ones at the same place, stay apart. No two vertices are joined that are joined already.
+    The quality is above `least`; the place is -1 if the vertex must stay. A border vertex collapses along the border,
+    where that is nearly straight. So corners stay, and the two sides of a crack, which have different vertices at the
+    same place, stay apart.
     """
     d = ring.degree[v]
     step = int(1)
@@ -224,7 +238,7 @@ def find_target(v: int, ring: Ring, least: wp.float64):
         if d == 3 or wp.dot(back, on) < LEAST_STRAIGHT:
             d = 0
     normal = normal_at(v, ring)
-    # The best one, and where it will not do the next best, until none is left.
+    # The best one, and if it is not allowed the next best, until none is left.
     bar = wp.float64(1.5)
     best = wp.float64(least)
     best_j = int(0)
@@ -239,7 +253,7 @@ def find_target(v: int, ring: Ring, least: wp.float64):
                 best_j = j
             j += step
         bar = best
-        if best_j < 0 or (stays_mesh(v, best_j, ring) and stays_upright(v, best_j, ring)):
+        if best_j < 0 or (keeps_topology(v, best_j, ring) and mirrors_none(v, best_j, ring)):
             break
     return best_j, best
 
@@ -248,8 +262,8 @@ def find_target(v: int, ring: Ring, least: wp.float64):
 
 
 @wp.func
-def find(v: int, w: int, ring: Ring):
-    """Where in a vertex's place its neighbour w is."""
+def find_entry(v: int, w: int, ring: Ring):
+    """Return the entry of the neighbour w in the ring of v."""
     e = ring.offset[v]
     while ring.neighbor[e] != w:
         e += 1
@@ -258,7 +272,7 @@ def find(v: int, w: int, ring: Ring):
 
 @wp.func
 def shift(ring: Ring, v: int, begin: int, by: int):
-    """Move the rest of a vertex's ring from `begin` on."""
+    """Move the rest of a vertex's ring from `begin` on by some entries."""
     end = ring.offset[v] + ring.degree[v]
     if by > 0:
         for k in range(end - begin):
@@ -270,11 +284,11 @@ def shift(ring: Ring, v: int, begin: int, by: int):
 
 
 @wp.func
-def vanish(v: int, j: int, ring: Ring):
-    """Let a vertex vanish into its j-th neighbour; its own ring stays what it was."""
+def collapse_into(v: int, j: int, ring: Ring):
+    """Collapse a vertex into its j-th neighbour; its own ring is kept."""
     d = ring.degree[v]
     u = at(ring, v, j)
-    here = find(u, v, ring)
+    here = find_entry(u, v, ring)
     shift(ring, u, here + 1, d - 4)
     for i in range(j + 1, j + d):
         a = at(ring, v, i)
@@ -282,7 +296,7 @@ def vanish(v: int, j: int, ring: Ring):
         if inner:
             ring.neighbor[here + i - j - 2] = a
         if a >= 0:
-            e = find(a, v, ring)
+            e = find_entry(a, v, ring)
             if inner:
                 ring.neighbor[e] = u
             else:
@@ -303,13 +317,14 @@ def collapse(
     beside: wp.array(dtype=wp.int32),
     gone: wp.array(dtype=wp.int32),
 ):
-    """For one thread: vertices vanish one by one in passes, in each of them never two neighbours, those first that leave triangles of
-    `good` quality, then those that leave any above the `least`. It ends with a pass after which no more than `enough` remain, or that took
-    few away, or after as many as there may be at `most`.
+    """Collapse vertices one by one in passes, never two neighbours in the same pass; for one thread.
 
-    passes: 1, how many there have been. remain: 1, how many vertices are left. target: #V, where in its ring is the neighbour into which
-    each vertex vanishes, as `find_target` says. beside: #V, the last pass in which a neighbour of each vanished, 0 before. gone: #V, the
-    pass in which it did itself, 0 before.
+    First those collapse that leave triangles of `good` quality, then those above the `least`. It ends with a pass after
+    which no more than `enough` remain, or which collapsed few, or after `most` passes.
+
+    passes: 1, number of passes. remain: 1, number of vertices left. target: #V, the place of the neighbour into which
+    each vertex collapses, as in `find_target`. beside: #V, the last pass in which a neighbour collapsed, 0 before.
+    gone: #V, the pass in which the vertex itself collapsed, 0 before.
     """
     lost = int(remain[0])
     while remain[0] > enough and 50 * lost >= remain[0] and passes[0] < most:
@@ -324,8 +339,8 @@ def collapse(
                         j, left = find_target(v, ring, least)
                         target[v] = j
                         goes = left > good
-                    if goes and target[v] >= 0 and stays_mesh(v, target[v], ring):
-                        vanish(v, target[v], ring)
+                    if goes and target[v] >= 0 and keeps_topology(v, target[v], ring):
+                        collapse_into(v, target[v], ring)
                         gone[v] = number
                         remain[0] = remain[0] - 1
                         for e in range(ring.offset[v], ring.offset[v] + ring.degree[v]):
@@ -336,7 +351,7 @@ def collapse(
 
 
 @wp.kernel
-def place(
+def locate(
     ring: Ring,
     gone: wp.array(dtype=wp.int32),
     target: wp.array(dtype=wp.int32),
@@ -345,7 +360,7 @@ def place(
     parent: wp.array(dtype=wp.vec3i),
     weight: wp.array(dtype=wp.vec3d),
 ):
-    """Where a vanished vertex lay in the triangles that were left: three vertices and its barycentric weights, none negative."""
+    """Locate a collapsed vertex in the triangles left: three vertices and its barycentric weights, none negative."""
     v = natural(wp.tid() + first)
     if gone[v] == 0:
         return
@@ -393,11 +408,13 @@ def compose_rows(
     column: wp.array(dtype=wp.int32),
     value: wp.array(dtype=wp.float64),
 ):
-    """For one thread: how much of what is kept is in each vertex, in the end. Those that went last come first, since parents stay longer.
+    """Compose the weights of each vertex from those of the kept ones; for one thread.
 
-    gone, parent, weight: #V, as `collapse` and `place` have them; passes: how many there were. row: #V, the row of each vertex, those that
-    are kept first, in their order. offset: #V+1, where rows begin; the last stays 0 if there was not room for all. column, value: vertices
-    kept, by their numbers, and their weights.
+    Vertices that collapsed last come first, since parents stay longer.
+
+    gone, parent, weight: #V, as `collapse` and `locate` have them; passes: their number. row: #V, the row of each
+    vertex, those that are kept first, in their order. offset: #V+1, where rows begin; the last stays 0 if there was not
+    room for all. column, value: vertices kept, by their numbers, and their weights.
     """
     rows = int(0)
     end = int(0)

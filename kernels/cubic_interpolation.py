@@ -1,4 +1,4 @@
-"""Between vertices that a coarser lattice keeps: weights of the cubic through the four nearest along a row or a column."""
+"""Cubic interpolation along rows and columns, through the four nearest vertices that a coarser lattice keeps."""
 
 import warp as wp
 
@@ -12,7 +12,7 @@ NEAREST = wp.constant(wp.float64(1.0e-9))
 
 @wp.struct
 class Nodes:
-    """The three nearest kept vertices on one side: how many there are, which, and how far away [m]."""
+    """The up to three nearest kept vertices on one side: their number, indices and distances [m]."""
 
     count: int
     vertex: wp.vec3i
@@ -20,13 +20,13 @@ class Nodes:
 
 
 @wp.func
-def look_along(
+def find_nodes(
     v: int,
     vertices: wp.array(dtype=wp.vec3d),
     following: wp.array(dtype=wp.int32),
     kept: wp.array(dtype=wp.int32),
 ):
-    """The kept vertices that follow on v, as far as the row runs without a break."""
+    """Return the kept vertices that follow v, as far as the row runs without a break."""
     nodes = Nodes()
     at = int(v)
     away = wp.float64(0.0)
@@ -34,7 +34,7 @@ def look_along(
         further = following[at]
         if further < 0:
             break
-        # Vertices at one place are told apart, however badly: weights stay numbers.
+        # Vertices at one place count as apart, so that weights stay finite.
         away += wp.max(wp.length(vertices[further] - vertices[at]), NEAREST)
         at = further
         if kept[at] != 0:
@@ -55,18 +55,19 @@ def weigh_cubics(
     column: wp.array(dtype=wp.vec4i),
     weight: wp.array(dtype=wp.vec4d),
 ):
-    """Of each vertex those kept ones that it lies between, two before it and two after it, near an end more of the other side, and
-    their weights in the polynomial through them.
+    """Find the kept vertices around each vertex, and their weights in the polynomial through them.
 
-    vertices: #V [m]. before, after: #V, its neighbours along the row, -1 at the ends. kept: #V, 1 or 0; the ends are. column, weight: #V; a
-    kept vertex has itself.
+    Two lie before it and two after it, near an end more on the other side.
+
+    vertices: #V [m]. before, after: #V, its neighbours along the row, -1 at the ends. kept: #V, 1 or 0; the ends are.
+    column, weight: #V; a kept vertex has itself.
     """
     v = wp.tid() + first
     column[v] = wp.vec4i(v, v, v, v)
     weight[v] = wp.vec4d(wp.float64(1.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if kept[v] == 0:
-        back = look_along(v, vertices, before, kept)
-        ahead = look_along(v, vertices, after, kept)
+        back = find_nodes(v, vertices, before, kept)
+        ahead = find_nodes(v, vertices, after, kept)
         takes_back = wp.min(back.count, 2)
         takes_ahead = wp.min(ahead.count, 4 - takes_back)
         if takes_ahead < 2:
@@ -102,7 +103,7 @@ def interpolate_along(
     # outputs
     result: wp.array(dtype=wp.vec2d),
 ):
-    """result_i: the sum of the values in the columns of row i, by its weights. values, result: #V [m]."""
+    """Compute the weighted sum of four values for each vertex. values, result: #V [m]."""
     i = wp.tid() + first
     c = column[i]
     w = weight[i]
@@ -119,7 +120,7 @@ def interpolate_along_rows(
     # outputs
     result: wp.array(dtype=wp.vec2d),
 ):
-    """Of each vertex of a grid the sum of some values of its row, those of its column by its weights.
+    """Compute for each vertex of a grid a weighted sum of values of its row, with the weights of its column.
 
     values: #R by #K [m]. grid: #R by #C, numbers of the vertices. column, weight: #C by 4 or fewer. result: #V [m].
     """
@@ -146,10 +147,10 @@ def sample_grid(
     # outputs
     sampled: wp.array3d(dtype=wp.float64),
 ):
-    """Values between the rows and columns of a grid: of each place those of the rows and columns around it by their weights.
+    """Sample values between the rows and columns of a grid, by the weights of the rows and columns around each place.
 
-    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer. column, column_weight: #N
-    by 4 or fewer. sampled: #M by #N by #D.
+    values: #V by #D, three or fewer. grid: #R by #C, numbers of the vertices. row, row_weight: #M by 4 or fewer.
+    column, column_weight: #N by 4 or fewer. sampled: #M by #N by #D.
     """
     p = natural(wp.tid() + first)
     i = p / sampled.shape[1]

@@ -1,5 +1,4 @@
-"""Curvature at the vertices of a surface: a paraboloid fitted to the neighbours of each; and along the threads of a cloth that is worn
-on it."""
+"""Curvature of a surface by paraboloids fitted around the vertices, and along the threads of cloth worn on it."""
 
 import warp as wp
 
@@ -16,7 +15,7 @@ FLAT = wp.constant(wp.float64(1.0e-9))
 
 @wp.func
 def tangent_to(normal: wp.vec3d):
-    """A unit vector square to a normal."""
+    """Return a unit vector at right angles to a normal."""
     least = int(0)
     for k in range(1, 3):
         if wp.abs(normal[k]) < wp.abs(normal[least]):
@@ -28,7 +27,7 @@ def tangent_to(normal: wp.vec3d):
 
 @wp.func
 def solve_scaled(matrix: mat55d, right: vec5d):
-    """The unknowns of a normal equation, scaled first so that metres do not matter (Cholesky)."""
+    """Solve a normal equation by Cholesky's method, scaled first so that units do not matter."""
     scale = vec5d()
     for i in range(5):
         scale[i] = wp.sqrt(wp.max(matrix[i, i], wp.float64(1.0e-300)))
@@ -70,13 +69,13 @@ def fit_curvature(
     # outputs
     tensor: wp.array(dtype=wp.mat33d),
 ):
-    """The second fundamental form at each vertex from `begin` on, as a tensor in space [1/m].
+    """Fit the second fundamental form at each vertex from `begin` on, as a tensor in space [1/m].
 
-    A neighbour at d from the vertex lies 1/2 |d|^2 k(direction) below the tangent plane; normal and k are fitted in turns, per length, so
-    that near neighbours count as much as far ones.
+    A neighbour at d from the vertex lies 1/2 |d|^2 k(direction) below the tangent plane; normal and k are fitted in
+    turns, per length, so that near neighbours count as much as far ones.
 
-    vertices: #V [m]. offset: where the neighbours of each vertex from `begin` on begin; neighbours at its own place do not count, and a
-    vertex with fewer than five counts as flat. normals: #V, unit, a first guess. tensor: #V.
+    vertices: #V [m]. offset: where the neighbours of each vertex from `begin` on begin; neighbours at its own place do
+    not count, and a vertex with fewer than five counts as flat. normals: #V, unit, a first guess. tensor: #V.
     """
     i = wp.tid() + first
     v = i + begin
@@ -115,7 +114,7 @@ def fit_curvature(
 
 @wp.func
 def worn_along(deformation: wp.mat22d, thread: wp.vec2d, x: wp.vec3d, y: wp.vec3d):
-    """The direction in space of a thread's in the pattern; x, y: axes of the cell in space."""
+    """Return the direction in space of a thread of the pattern; x, y: axes of the cell in space."""
     worn = wp.normalize(deformation * thread)
     return worn[0] * x + worn[1] * y
 
@@ -133,12 +132,11 @@ def bend_threads(
     # outputs
     along: wp.array(dtype=wp.vec4d),
 ):
-    """How the body bends along the threads of each cell: along the warp, along the weft, the twist between them, and the sum of its
-    principal curvatures [1/m].
+    """Compute the body's curvature along warp and weft, their twist, and the sum of its principal curvatures [1/m].
 
-    positions: #V, the pattern [m]. vertices: #V, the body [m]. corner, laid: #C, as `cells.Cells` has them. tensor: #V, as
-    `fit_curvature` has it. warp, weft: unit, directions in the pattern. along: #C; the first three are 0 where a cell has no area in the
-    pattern.
+    positions: #V, the pattern [m]. vertices: #V, the body [m]. corner, laid: #C, as `cells.Cells` has them. tensor: #V,
+    as `fit_curvature` has it. warp, weft: unit, directions in the pattern. along: #C; the first three are 0 where a
+    cell has no area in the pattern.
     """
     c = wp.tid() + first
     face = corner[c]

@@ -1,15 +1,15 @@
-"""Shortest ways on a mesh to the vertices where they end: the best way out of each vertex, and what ways carry along.
+"""Shortest paths on a mesh: the first leg of each vertex's path, and values carried along the paths.
 
-`find_ways` and `carry_along` are one thread each, which goes through the vertices in an order; every vertex uses what those before it
-have just got. `go_around` says which vertices lie on which side of a line. Rounded without fused products, so that mirror images of each
-other get the same lengths.
+`find_ways` and `carry_along` run in one thread each, which goes through the vertices in order; every vertex uses the
+new results of those before it. `go_around` finds the vertices on either side of a line. Products are not fused, so that
+mirror images get the same lengths.
 """
 
 import warp as wp
 
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
-# So many vertices in a row are counted together.
+# Vertices in a row that are counted together.
 CROWD = wp.constant(64)
 _PI = wp.constant(wp.float64(3.141592653589793))
 
@@ -24,9 +24,10 @@ def see_sides(
     ends: wp.array(dtype=wp.vec2i),
     seen: wp.array(dtype=wp.vec3d),
 ):
-    """How corners of triangles see the side opposite to them, from the next corner to the one after that.
+    """Measure the sides opposite to corners of triangles, from the next corner to the one after that.
 
-    vertices: #V [m]. triangles: #T by 3. slot: #R, 3 times the triangle plus the corner. ends: #R, the side's vertices a and b.
+    vertices: #V [m]. triangles: #T by 3. slot: #R, 3 times the triangle plus the corner. ends: #R, the side's vertices
+    a and b.
     seen: #R, the length of the side, where the foot of the corner's height on it lies, and the height [m].
     """
     r = wp.tid() + first
@@ -46,7 +47,7 @@ def see_sides(
 
 @wp.func
 def slope_along(length: wp.float64, da: wp.float64, db: wp.float64):
-    """Of the distance along a side, less steep than a way along it."""
+    """Return the slope of the distance along a side, less steep than a path along it."""
     steepest = wp.float64(1.0) - wp.float64(1.0e-15)
     if length == wp.float64(0.0):
         return wp.float64(0.0)
@@ -55,7 +56,7 @@ def slope_along(length: wp.float64, da: wp.float64, db: wp.float64):
 
 @wp.func
 def length_over(seen: wp.vec3d, da: wp.float64, db: wp.float64):
-    """Length of the shortest way from a corner over the side a-b, which it sees as `see_sides` says."""
+    """Return the length of the shortest path from a corner over the opposite side a-b, measured by `see_sides`."""
     s = slope_along(seen[0], da, db)
     r = wp.sqrt(wp.float64(1.0) - s * s)
     place = seen[1] * r - s * seen[2]  # times r
@@ -69,8 +70,11 @@ def length_over(seen: wp.vec3d, da: wp.float64, db: wp.float64):
 
 @wp.func
 def may_lead(seen: wp.vec3d, i: int, here: wp.float64, other: wp.float64, near: wp.float64):
-    """Whether a way from the i-th end of the side that a corner sees, over the side between the corner, which is `here` far, and the other
-    end, may be shorter than `near`: it is no shorter than the distance that it leads to and the height."""
+    """Return whether a path from the i-th end of the opposite side of a corner may be shorter than `near`.
+
+    It leads over the side between the corner, at distance `here`, and the other end; it is no shorter than the distance
+    that it leads to plus the height.
+    """
     along = seen[1]
     if i == 0:
         along = seen[0] - seen[1]
@@ -81,7 +85,7 @@ def may_lead(seen: wp.vec3d, i: int, here: wp.float64, other: wp.float64, near: 
 
 @wp.func
 def place_on_side(seen: wp.vec3d, da: wp.float64, db: wp.float64):
-    """Where that way passes the side, as a share of it from a, and the leg to there."""
+    """Return where that path crosses the side, as a share of it from a, and the length of the leg to there."""
     s = slope_along(seen[0], da, db)
     place = wp.clamp(seen[1] - s * seen[2] / wp.sqrt(wp.float64(1.0) - s * s), wp.float64(0.0), seen[0])
     off = place - seen[1]
@@ -108,17 +112,19 @@ def find_ways(
     leg: wp.array(dtype=wp.float64),
     shortened: wp.array(dtype=wp.int32),
 ):
-    """The best way out of each waiting vertex given the distances; one whose way is now shorter lets those of its neighbours wait whose
-    ways may so become shorter, too.
+    """Find the best first leg of each waiting vertex given the distances.
 
-    Vertices are numbered about as far as they are. One that lies at most `reach` numbers back looks again at once, any other in
-    the next launch.
+    A vertex whose path is now shorter lets those of its neighbours wait whose paths may then become shorter, too.
 
-    offset: #V+1, where each vertex's entries in `ends` and `seen` begin, which are those of `see_sides`. tolerance: [m], less
-    is not shorter. distance: #V [m], upper bounds before and after, 0 or more; lowered. waiting: #V, 1 where a way is to be
-    found, 2 where ways end. crowd: #V / CROWD, rounded up, how many of so many vertices in a row wait: where none does, all are passed
-    over at once. first, second: #V, the side over which the way out of a vertex leads; share: #V, how much of that
-    lies before the place where the way passes; leg: #V, how far the place is [m]; all of those that were waiting.
+    Vertices are numbered about as far as they are. One that lies at most `reach` numbers back looks again at once, any
+    other in the next launch.
+
+    offset: #V+1, where each vertex's entries in `ends` and `seen` begin, which are those of `see_sides`. tolerance:
+    [m], less is not shorter. distance: #V [m], upper bounds before and after, 0 or more; lowered. waiting: #V, 1 where
+    a way is to be found, 2 where ways end. crowd: #V / CROWD, rounded up, how many of so many vertices in a row wait:
+    where none does, all are passed over at once. first, second: #V, the side over which the way out of a vertex leads;
+    share: #V, how much of that lies before the place where the way passes; leg: #V, how far the place is [m]; all of
+    those that were waiting.
     shortened: 1, how many ways have become shorter is added to it.
     """
     v = int(0)
@@ -175,7 +181,7 @@ def carry_along(
     value: wp.array2d(dtype=wp.float64),
     change: wp.array(dtype=wp.float64),
 ):
-    """Each vertex gets what there is where its way leads, plus `grows` times the leg.
+    """Give each vertex the values where its first leg ends, plus `grows` times the leg.
 
     first, second, share, leg: #V, the ways, as `find_ways` gives them. order: #V. fixed: #V, 1 where the value stays.
     value: #V by #K. change: #K, the largest change of each column, if that is more than what it holds.
@@ -205,13 +211,15 @@ def go_around(
     lies: wp.array(dtype=wp.vec3d),
     count: wp.array(dtype=wp.int32),
 ):
-    """For one thread: around each vertex of a line, from the ones before and after it on the line, either way, up to the border, the line
-    or half a turn. Where the ring is closed, angles are scaled to a full turn.
+    """Visit the vertices around each vertex of a line, from its neighbours on the line both ways; for one thread.
 
-    path: #P, vertices. on_path: #V, 1 for these. offset: #P+1, where each one's triangles begin. sides: #R, their other vertices
-    anticlockwise; angle: #R, between these [rad]; away: #R, how far they are [m].
-    visited: #N, vertices. at: #N, around which of the line. lies: #N, 1 to the right of the line and -1 to the left, the angle passed
-    [rad], how far it is [m]. count: 1, N.
+    A visit ends at the border, at the line or after half a turn. Where the ring is closed, angles are scaled to a full
+    turn.
+
+    path: #P, vertices. on_path: #V, 1 for these. offset: #P+1, where each one's triangles begin. sides: #R, their other
+    vertices anticlockwise; angle: #R, between these [rad]; away: #R, how far they are [m].
+    visited: #N, vertices. at: #N, around which of the line. lies: #N, 1 to the right of the line and -1 to the left,
+    the angle passed [rad], how far it is [m]. count: 1, N.
     """
     last = path.shape[0] - 1
     number = int(0)

@@ -1,4 +1,4 @@
-"""Quads numbered by rows and columns: a walk from face to face, what lies around each vertex of a grid, and its rows laid out."""
+"""Quads by rows and columns: numbering of faces, lists around the vertices of a grid, and its rows laid flat."""
 
 import warp as wp
 
@@ -15,12 +15,12 @@ def number_faces(
     place: wp.array(dtype=wp.vec3i),
     queue: wp.array(dtype=wp.int32),
 ):
-    """Row and column of each quad, seen from the first one, and by how many quarters its sides are turned against the first one's.
+    """Find row and column of each quad from the first one on, and the quarter turns of its sides against the first.
 
-    One thread, which goes from face to face over their sides, the nearest first.
+    For one thread, which goes from face to face over their sides, breadth first.
 
-    twin: 4 #F, of each side (four times the face, plus 0 below, 1 right, 2 above, 3 left, as the first one lies) the one on its other side,
-    -1 on the border. place: #F, -1 in the last where no way leads. queue: #F, room to work in.
+    twin: 4 #F, for each side (four times the face, plus 0 below, 1 right, 2 above, 3 left, as the first one lies) the one
+    opposite, -1 on the border. place: #F, -1 in the last component where no path leads. queue: #F, scratch.
     """
     for f in range(place.shape[0]):
         place[f] = wp.vec3i(0, 0, -1)
@@ -55,19 +55,19 @@ def number_faces(
 
 @wp.func
 def lines_before(i: int, most: int):
-    """How many entries the lines before line i have, where each has `most`, and the first and the last one less."""
+    """Return the number of entries of the lines before line i; each has `most`, the first and the last one less."""
     return most * i - wp.min(i, 1)
 
 
 @wp.func
 def lines_here(i: int, count: int, most: int):
-    """How many line i has, of so many."""
+    """Return the number of entries of line i of `count`."""
     return lines_before(i + 1, most) - lines_before(i, most) - wp.where(i == count - 1, 1, 0)
 
 
 @wp.func
 def entries_before(i: int, j: int, rows: int, columns: int, most: int):
-    """How many entries the vertices before that in row i and column j have, each those of its row times those of its column."""
+    """Return the number of entries before the vertex in row i and column j, products of those of row and column."""
     return lines_before(i, most) * (most * columns - 2) + lines_here(i, rows, most) * lines_before(j, most)
 
 
@@ -81,10 +81,10 @@ def list_corners(
     offset: wp.array(dtype=wp.int32),
     corner: wp.array(dtype=wp.int32),
 ):
-    """The faces' corners around each vertex of a grid that is numbered row by row: 4 times the face plus the corner.
+    """List the faces' corners around each vertex of a grid numbered row by row, as 4 times the face plus the corner.
 
-    slot_of: a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin; the last is not
-    written.
+    slot_of: a face's corner below left, below right, above left, above right. offset: #V+1, where each vertex's begin;
+    the last is not written.
     """
     v = natural(wp.tid() + first)
     i = v / columns
@@ -103,18 +103,19 @@ def list_corners(
 
 @wp.func
 def is_on_grid(rows: int, columns: int, row: int, column: int):
+    """Return whether a row and a column are on the grid."""
     return row >= 0 and row < rows and column >= 0 and column < columns
 
 
 @wp.func
 def face_between(columns: int, i: int, j: int, up: int, right: int):
-    """The face with the vertex in row i and column j and the one a row up or down (1, -1) and a column to the right or left."""
+    """Return the face of the vertex in row i and column j that lies up or down (1, -1), and right or left."""
     return natural((i + wp.min(up, 0)) * (columns - 1) + j + wp.min(right, 0))
 
 
 @wp.func
 def which_diagonal(rising: int, up: int, right: int):
-    """0 for the diagonal of a face's corners 0-2, 1 for that of 1-3."""
+    """Return 0 for the diagonal of a face's corners 0-2, 1 for that of 1-3."""
     which = rising
     if up != right:
         which = 1 - rising
@@ -123,9 +124,10 @@ def which_diagonal(rising: int, up: int, right: int):
 
 @wp.func
 def spring_to(rows: int, columns: int, rising: int, i: int, j: int, row: int, column: int):
-    """The number of the spring from the vertex in row i and column j of a grid that is numbered row by row to one of the eight around it.
+    """Return the number of the spring from the vertex in row i and column j of a grid to one of the eight around it.
 
-    Springs are the edges, sorted by their lower vertex, then of each face the diagonal of corners 0-2, then that of corners 1-3.
+    Springs are the edges, sorted by their lower vertex, then of each face the diagonal of corners 0-2, then that of
+    corners 1-3.
     rising: 0 if it is the former that runs from below left to above right, else 1.
     """
     of_row = 2 * columns - 1
@@ -154,8 +156,10 @@ def list_neighbors(
     offset: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
 ):
-    """The up to eight vertices around each one of a grid that is numbered row by row, in order. offset: #V+1, where each vertex's begin;
-    the last is not written."""
+    """List the up to eight vertices around each one of a grid numbered row by row, in order.
+
+    offset: #V+1, where each vertex's begin; the last is not written.
+    """
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
@@ -180,7 +184,7 @@ def list_values(
     # outputs
     listed: wp.array(dtype=wp.float64),
 ):
-    """The values (#S) of the springs to these vertices, by the numbers of `spring_to`, which are listed nowhere."""
+    """List the values (#S) of the springs to these vertices, by the numbers of `spring_to`."""
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
@@ -204,7 +208,7 @@ def list_lengths(
     # outputs
     listed: wp.array(dtype=wp.float64),
 ):
-    """Lengths [m] of the springs to these vertices: of edges the distance, of diagonals those of their faces' corners 0-2 and 1-3 (#F)."""
+    """List the lengths of the springs to these vertices [m]; diagonal: #F, those of corners 0-2 and 1-3."""
     v = natural(wp.tid() + first)
     i = v / columns
     j = v - i * columns
@@ -232,8 +236,9 @@ def list_stiffness(
     # outputs
     listed: wp.array(dtype=wp.float64),
 ):
-    """Stiffnesses [N/m] of the springs to these vertices: of edges the sum of what the faces on both sides give to them (#F), of diagonals
-    what their face gives to both of its (#F).
+    """List the stiffnesses of the springs to these vertices [N/m].
+
+    Edges have the sum of what the faces on both sides give to them (#F), diagonals what their face gives to both (#F).
 
     sides: which side of a face is the one below, on the left, on the right, above.
     """
@@ -271,7 +276,7 @@ def is_row_by_row(
     # outputs
     as_expected: wp.array(dtype=wp.bool),
 ):
-    """Whether a face (#F) is the one that it is in a grid numbered row by row; `corner`: the first face's vertices."""
+    """Check whether each face (#F) is as in a grid numbered row by row; `corner`: the first face's vertices."""
     f = natural(wp.tid() + first)
     row = f / (columns - 1)
     as_expected[f] = faces[f] - corner == wp.vec4i(f + row, f + row, f + row, f + row)
@@ -288,8 +293,10 @@ def lay_profiles(
     # outputs
     position: wp.array(dtype=wp.vec2d),
 ):
-    """Each row of a grid laid out along x at its arc lengths on the body (#V) from one column, to the right where `side` is 1, to the left
-    where it is -1; y is its station (#rows). All [m]."""
+    """Lay each row of a grid along x at its arc lengths on the body from one column; y is its station. All [m].
+
+    vertices: #V. station: #rows. side: 1 for columns to the right, -1 to the left.
+    """
     i = natural(wp.tid() + first)
     middle = grid[i, column]
     position[middle] = wp.vec2d(wp.float64(0.0), station[i])

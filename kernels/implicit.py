@@ -1,8 +1,8 @@
 """Approximate implicit integration, paper eqs. (4)-(10) with spring-wise stiffness: two gathers per step, no matrix.
 
-The same step smooths: without viscosity, and with shares of the velocity and of its change that are others from step to step
-(`warpflat.solver.smoother`). `pace` is an array of one that says so: what viscosity is to be taken times, 0 or 1, what
-the velocity and what its change; with three times 1 it is the paper's step.
+The step is also a smoother: without viscosity, and with factors of the velocity and of its change that vary from step
+to step (`warpflat.solver.smoother`). `coefficients`, an array of one vec3d, holds the factors of the viscosity (0 or
+1), of the velocity and of its change; with three ones it is the paper's step.
 """
 
 import warp as wp
@@ -13,14 +13,14 @@ from .springs import Springs, spring_forces_on
 
 wp.set_module_options({"enable_backward": False})
 
-# Every vertex may move this share of the least height of the cells around it: were all three corners of a cell to
-# approach each other, a fifth of its height would remain, so nothing can mirror a cell before all are looked at again.
+# Every vertex may move this share of the least height of the cells around it. If all three corners of a cell approach
+# each other, a fifth of its height remains, so no cell can be mirrored before the next check of all.
 STEP_SHARE = wp.constant(wp.float64(0.4))
 
 
 @wp.struct
 class Bonds:
-    """What else acts on the vertices, and where they may go.
+    """Further forces on the vertices, and the directions in which they may move.
 
     offset: #V+1, where each vertex's entries in `slot` begin. slot: into the arrays of the bonds' forces, say of seams.
     freedom: #V, (1, 1) for a free vertex, (0, 1) for one that keeps its x, as on a fold.
@@ -50,8 +50,8 @@ def gather_forces(
     bond_stiffness: wp.array(dtype=wp.float64),
     load: wp.array(dtype=wp.vec2d),
     time_step: wp.float64,
-    pace: wp.array(dtype=wp.vec3d),
-    watch: int,
+    coefficients: wp.array(dtype=wp.vec3d),
+    check_all: int,
     first: int,
     # outputs
     force: wp.array(dtype=wp.vec2d),
@@ -63,21 +63,21 @@ def gather_forces(
     reach: wp.array(dtype=wp.float64),
     guarded: wp.array(dtype=wp.int8),
 ):
-    """Force on each vertex, F~ = F + h sum k_ij (v_j - v_i), if there is to be viscosity, and the neighbours' share, eq. (9).
+    """Gather the force on each vertex, F~ = F + h sum k_ij (v_j - v_i) with viscosity, and eq. (9)'s neighbour term.
 
-    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`. bond_*: as
-    `seams.evaluate_seams`. load: #V, constant forces [N]. watch: 1 where all faces have been evaluated at these positions, 0 where only
-    those that act were; then anchor, reach and guarded stay what they were.
+    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`.
+    bond_*: as `constraints.evaluate_seams`. load: #V, constant forces [N]. check_all: 1 where all faces have been
+    evaluated at these positions, 0 where only those that act were; then anchor, reach and guarded stay what they were.
     force F [N], power F.v / K [m2/s], driving_force F~ [N], not written without viscosity, where it is F, first_guess
-    F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and the cells' around the vertex [N/m], anchor and reach: how far from where it
-    may move until all faces are evaluated again [m], guarded: 1 where a face around it acts. All #V.
+    F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and the cells' around the vertex [N/m], anchor and reach: how
+    far from where it may move until all faces are evaluated again [m], guarded: 1 where a face around it acts. All #V.
     """
     i = natural(wp.tid() + first)
-    viscosity = pace[0][0]
+    viscosity = coefficients[0][0]
     total, driving = spring_forces_on(i, position, velocity, springs, time_step, viscosity != wp.float64(0.0))
     total += load[i]
     k = spring_stiffness[i]
-    if watch != 0:
+    if check_all != 0:
         height = wp.float64(wp.inf)
         acting = wp.int8(0)
         e = natural(cells.offset[i])
@@ -120,7 +120,7 @@ def gather_forces(
 
 
 @wp.func
-def let_rest(
+def stop_vertex(
     i: int,
     mass: wp.array(dtype=wp.float64),
     force: wp.array(dtype=wp.vec2d),
@@ -130,7 +130,7 @@ def let_rest(
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
 ):
-    """The velocity becomes zero, and what `gather_forces` gave becomes what it gives there."""
+    """Set the velocity of a vertex to zero, and the results of `gather_forces` to those at zero velocity."""
     velocity[i] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     driving_force[i] = force[i]
     first_guess[i] = force[i] * (time_step / (mass[i] + time_step * time_step * stiffness[i]))
@@ -148,9 +148,9 @@ def stop(
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
 ):
-    """Velocities become zero, and what `gather_forces` gave becomes what it gives there. Arguments as there, all #V."""
+    """Set velocities, and the results of `gather_forces`, to those of the state at rest. Arguments as there, all #V."""
     i = natural(wp.tid() + first)
-    let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
+    stop_vertex(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
 
 @wp.kernel
@@ -167,10 +167,10 @@ def stop_braked(
     driving_force: wp.array(dtype=wp.vec2d),
     first_guess: wp.array(dtype=wp.vec2d),
 ):
-    """`stop`, of those pieces whose power (#P) is negative. piece: #V, which a vertex is of."""
+    """Apply `stop` to pieces whose power (#P) is negative. piece: #V, the piece of each vertex."""
     i = natural(wp.tid() + first)
     if power[piece[i]] < wp.float64(0.0):
-        let_rest(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
+        stop_vertex(i, mass, force, stiffness, time_step, velocity, driving_force, first_guess)
 
 
 @wp.kernel
@@ -180,7 +180,7 @@ def count_braked(
     # outputs
     count: wp.array(dtype=wp.int32),
 ):
-    """How often each piece was stopped: one more, where its power is negative. All #P."""
+    """Count how often each piece was stopped: add one where its power is negative. All #P."""
     p = natural(wp.tid() + first)
     if power[p] < wp.float64(0.0):
         count[p] = count[p] + 1
@@ -198,15 +198,17 @@ def advance(
     anchor: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
     time_step: wp.float64,
-    pace: wp.array(dtype=wp.vec3d),
+    coefficients: wp.array(dtype=wp.vec3d),
     first: int,
     # outputs
     position: wp.array(dtype=wp.vec2d),
     velocity: wp.array(dtype=wp.vec2d),
 ):
-    """Eq. (10): dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i), then eq. (4), at this pace.
+    """Advance velocities by eq. (10) and positions by eq. (4), with the coefficients.
 
-    A vertex that would come further from its anchor than its reach is stopped there. Arguments as in `gather_forces`, all #V.
+    dv_i = [F~_i h + h^2 sum_j k_ij F~_j h / (m_j + h^2 K_j)] / (m_i + h^2 K_i).
+
+    A vertex moves no further from its anchor than its reach. Arguments as in `gather_forces`, all #V.
     """
     i = natural(wp.tid() + first)
     coupling = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
@@ -216,11 +218,11 @@ def advance(
         coupling += springs.stiffness[s] * first_guess[natural(springs.neighbor[s])]
         s += 1
     driving = force[i]
-    if pace[0][0] != wp.float64(0.0):
+    if coefficients[0][0] != wp.float64(0.0):
         driving = driving_force[i]
     h2 = time_step * time_step
     dv = (driving * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
-    v = velocity[i] * pace[0][1] + dv * pace[0][2]
+    v = velocity[i] * coefficients[0][1] + dv * coefficients[0][2]
     here = position[i]
     away = here - anchor[i] + v * time_step
     distance = wp.length(away)
@@ -238,6 +240,6 @@ def compute_kinetic_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """1/2 m v^2. mass [kg], velocity [m/s], energy [J]: #V."""
+    """Compute 1/2 m v^2. mass [kg], velocity [m/s], energy [J]: #V."""
     i = natural(wp.tid() + first)
     energy[i] = wp.float64(0.5) * mass[i] * wp.dot(velocity[i], velocity[i])

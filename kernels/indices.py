@@ -1,8 +1,8 @@
-"""Indices that are known not to be negative.
+"""Indices that cannot be negative.
 
-Warp counts a negative index from the end of an array. Where it cannot rule that out, it asks at each access; `natural` rules it out. A
-`for` over a range that is known only when a kernel runs is counted on in memory, a `while` in a register. Loops over what lies around a
-vertex are written so: forces and steps take two thirds of the time.
+Warp counts a negative index from the end of an array, and checks for it at each access unless it can rule it out;
+`natural` does. A `for` over a range that is known only at run time keeps its counter in memory, a `while` in a
+register. Loops around a vertex therefore use `while`: forces and steps are faster by a third.
 """
 
 import warp as wp
@@ -12,5 +12,5 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def natural(number: int):
-    """The number, which is 0 or more."""
+    """Return the number, which must be 0 or more."""
     return wp.max(number, 0)

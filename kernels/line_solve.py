@@ -1,9 +1,8 @@
-"""Steps along the threads of a lattice: all vertices of a row, or of a column, at once.
+"""Line relaxation along the threads of a lattice: all vertices of a row, or of a column, move at once.
 
-A soft cloth is K/G times as stiff along its threads as in shear. A step by single vertices then leaves what shears from one row to
-the next, since each vertex is held along its row by its neighbours there, which would have gone along. Here each row goes
-where its springs balance the forces along it, and what else holds it, vertex by vertex (line relaxation): a system with three
-diagonals.
+A soft cloth is K/G times as stiff along its threads as in shear. A step of single vertices then reduces shear between
+rows slowly, since each vertex is held along its row by its neighbours there. Here each row moves to where its springs,
+and the other stiffness at each vertex, balance the forces along it: a tridiagonal system.
 """
 
 import warp as wp
@@ -14,8 +13,8 @@ from .springs import Springs
 
 wp.set_module_options({"enable_backward": False})
 
-# Of what the guard's cells hold at a vertex alone, this share is left where its neighbours on the line go along; with them the
-# guard makes a thread once more as stiff as its springs.
+# Share of the guard's stiffness at a vertex that is left where its neighbours on the line move with it. Between them
+# the guard makes a thread twice as stiff as its springs do.
 GUARD_LEFT = wp.constant(wp.float64(0.03125))
 
 
@@ -23,8 +22,8 @@ GUARD_LEFT = wp.constant(wp.float64(0.03125))
 class ThreadLines:
     """The vertices of a lattice, line by line: each is in one row and in one column.
 
-    offset: #L+1, where the vertices of each line begin. vertex: 2 #V, in their order along the lines. rows: how many of the lines are rows;
-    they come first.
+    offset: #L+1, where the vertices of each line begin. vertex: 2 #V, in their order along the lines. rows: how many of
+    the lines are rows; they come first.
     """
 
     offset: wp.array(dtype=wp.int32)
@@ -34,15 +33,18 @@ class ThreadLines:
 
 @wp.func
 def line_direction(position: wp.array(dtype=wp.vec2d), lines: ThreadLines, e: int, begin: int, end: int):
-    """Unit vector along a line at its entry e, zero where it has no length."""
+    """Return the unit vector along a line at its entry e; zero where it has no length."""
     before = lines.vertex[wp.max(e - 1, begin)]
     after = lines.vertex[wp.min(e + 1, end - 1)]
     return wp.normalize(position[after] - position[before])
 
 
 @wp.func
-def held_across(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64, along: wp.vec2d):
-    """Stiffness of a spring against motion of one end along a unit vector, where that is positive [N/m]; d: the vector to its far end."""
+def stiffness_along(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64, along: wp.vec2d):
+    """Return the positive stiffness of a spring against motion of one end along a unit vector [N/m].
+
+    d: vector to the far end [m].
+    """
     length = wp.max(wp.length(d), wp.float64(1.0e-300))
     c = wp.dot(d, along) / length
     taut = wp.max(wp.float64(1.0) - rest_length / length, wp.float64(0.0))
@@ -66,13 +68,13 @@ def solve_lines(
     along_rows: wp.array(dtype=wp.vec2d),
     along_columns: wp.array(dtype=wp.vec2d),
 ):
-    """Where the vertices go along their row and along their column [m], both #V: all of a line at once, so that what its springs and what
-    else holds its vertices balance the forces along it.
+    """Solve for the displacements along rows and along columns, #V each [m], that balance the forces along each line.
 
-    position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at these positions.
+    position [m], force [N], mass [kg], guarded: #V, and face_*, as `implicit.gather_forces` has them, evaluated at
+    these positions.
     """
     line = natural(wp.tid() + first)
-    way = wp.where(line < lines.rows, along_rows, along_columns)
+    displacement = wp.where(line < lines.rows, along_rows, along_columns)
     begin = lines.offset[line]
     end = lines.offset[line + 1]
     k_before = wp.float64(0.0)
@@ -97,7 +99,7 @@ def solve_lines(
             if j == after:
                 k_after = springs.stiffness[s]
             elif j != before:
-                held += held_across(position[j] - position[i], springs.rest_length[s], springs.stiffness[s], along)
+                held += stiffness_along(position[j] - position[i], springs.rest_length[s], springs.stiffness[s], along)
             s += 1
         if guarded[i] != wp.int8(0):
             c = natural(cells.offset[i])
@@ -113,19 +115,19 @@ def solve_lines(
         rest = wp.max(held + k_before * (wp.float64(1.0) - passed) + k_after, wp.float64(1.0e-300))
         pushed = (wp.dot(force[i], along) + k_before * pushed) / rest
         passed = k_after / rest
-        way[i] = wp.vec2d(pushed, passed)
+        displacement[i] = wp.vec2d(pushed, passed)
         k_before = k_after
         e += 1
-    gone = wp.float64(0.0)
+    moved = wp.float64(0.0)
     for back in range(end - begin):
         e = end - 1 - back
         i = lines.vertex[e]
-        gone = way[i][0] + way[i][1] * gone
-        way[i] = gone * line_direction(position, lines, e, begin, end)
+        moved = displacement[i][0] + displacement[i][1] * moved
+        displacement[i] = moved * line_direction(position, lines, e, begin, end)
 
 
 @wp.kernel
-def go_along_lines(
+def move_along_lines(
     along_rows: wp.array(dtype=wp.vec2d),
     along_columns: wp.array(dtype=wp.vec2d),
     reach: wp.array(dtype=wp.float64),
@@ -134,10 +136,10 @@ def go_along_lines(
     # outputs
     position: wp.array(dtype=wp.vec2d),
 ):
-    """Both ways one after the other, where a vertex is free to go, and no further than its reach [m]. All #V."""
+    """Move vertices by both displacements, where they are free to move, up to their reach [m]. All #V."""
     i = natural(wp.tid() + first)
-    way = wp.cw_mul(along_rows[i] + along_columns[i], freedom[i])
-    length = wp.length(way)
+    step = wp.cw_mul(along_rows[i] + along_columns[i], freedom[i])
+    length = wp.length(step)
     if length > reach[i]:
-        way = way * (reach[i] / length)
-    position[i] = position[i] + way
+        step = step * (reach[i] / length)
+    position[i] = position[i] + step

@@ -1,4 +1,4 @@
-"""The cloth as a membrane that is measured as worn: energy, forces and a bound on their stiffness, per cell.
+"""The cloth as a membrane measured as worn: energy, forces and a bound on their stiffness, per cell.
 
 Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and per flat area of cloth the energy is
 
@@ -7,9 +7,10 @@ Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and pe
 with t a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). W is that of an
 orthotropic sheet in plane stress; a J-shaped curve adds what the tension differs from K e; and under compression cloth
 wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wrinkled the least energy of any sheet that may shorten freely
-(Pipkin 1986). The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have been
-sheared by 45 degrees lock: 1/2 K_lock <|gamma| - sin 45>^2 is added, for gamma itself ends at 1, and at no more than 1/2 G of
-energy soft cloth would let threads come to lie side by side, and tiny faces of the body would open into palms of cloth.
+(Pipkin 1986). The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have
+been sheared by 45 degrees lock: 1/2 K_lock <|gamma| - sin 45>^2 is added, for gamma itself ends at 1, and at no more
+than 1/2 G of energy soft cloth would let threads come to lie side by side, and tiny faces of the body would open into
+palms of cloth.
 """
 
 import warp as wp
@@ -38,7 +39,7 @@ LOCKED = wp.constant(wp.float64(0.7071067811865476))
 
 @wp.struct
 class Cloth:
-    """The fabric, and what the step's matrix already holds of it.
+    """The fabric, and its stiffness in the step's matrix.
 
     warp, weft: unit vectors in the plane.
     c_warp, c_weft, c_cross, shear: plane stress [N/m].
@@ -69,7 +70,7 @@ class Cloth:
 
 @wp.func
 def follow_curve(e: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.array(dtype=wp.float64)):
-    """Tension [N/m], its integral from 0 [N/m] and its slope [N/m] at a strain e > 0."""
+    """Return tension [N/m], its integral from 0 [N/m] and its slope [N/m] at a strain e > 0."""
     count = strain.shape[0]
     pulled = wp.float64(0.0)
     energy = wp.float64(0.0)
@@ -93,7 +94,7 @@ def follow_curve(e: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.
 def beyond_hooke(
     e: wp.float64, stiffness: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.array(dtype=wp.float64)
 ):
-    """What the curve adds to K e: tension, energy, slope [N/m]; nothing under compression."""
+    """Return the excess of the curve over K e: tension, energy, slope [N/m]; zero under compression."""
     if e > wp.float64(0.0):
         hooke = wp.vec3d(stiffness * e, wp.float64(0.5) * stiffness * e * e, stiffness)
         return follow_curve(e, strain, tension) - hooke
@@ -102,7 +103,7 @@ def beyond_hooke(
 
 @wp.func
 def stretched_sheet(e: wp.vec2d, cloth: Cloth):
-    """sigma_warp, sigma_weft [N/m] and W [J/m2] at the strains e."""
+    """Return sigma_warp, sigma_weft [N/m] and W [J/m2] at the strains e."""
     s = wp.vec2d(cloth.c_warp * e[0] + cloth.c_cross * e[1], cloth.c_weft * e[1] + cloth.c_cross * e[0])
     w = wp.float64(0.5) * wp.dot(s, e)
     if s[0] < wp.float64(0.0) or s[1] < wp.float64(0.0):
@@ -118,7 +119,7 @@ def stretched_sheet(e: wp.vec2d, cloth: Cloth):
 
 @wp.func
 def sheared_threads(gamma: wp.float64, cloth: Cloth):
-    """tau [N/m], its integral from 0 [J/m2] and its slope [N/m]."""
+    """Return tau [N/m], its integral from 0 [J/m2] and its slope [N/m]."""
     beyond = wp.max(wp.abs(gamma) - LOCKED, wp.float64(0.0))
     slope = cloth.shear
     if beyond > wp.float64(0.0):
@@ -131,13 +132,13 @@ def sheared_threads(gamma: wp.float64, cloth: Cloth):
 def thread_slope(
     e: wp.float64, c: wp.float64, k: wp.float64, strain: wp.array(dtype=wp.float64), tension: wp.array(dtype=wp.float64)
 ):
-    """Bound on d sigma / d e along a thread [N/m]: the sheet's, and the curve's where that is steeper."""
+    """Return a bound on d sigma / d e along a thread [N/m]: the sheet's, or the curve's where that is steeper."""
     return c + wp.max(beyond_hooke(e, k, strain, tension)[2], wp.float64(0.0))
 
 
 @wp.func
 def thread_bounds(F: wp.mat22d, worn_warp: wp.vec2d, worn_weft: wp.vec2d, e: wp.vec2d, gamma: wp.float64, cloth: Cloth):
-    """Bounds on the second derivatives [N/m] by (w . warp) and (w . weft), w the gradients of the corners' weights.
+    """Return bounds on the second derivatives [N/m] by (w . warp) and (w . weft), w the corners' weight gradients.
 
     The gradient of |F t| by a corner's place is -(F^T F t / |F t|) (w . t).
     """
@@ -162,8 +163,10 @@ def thread_bounds(F: wp.mat22d, worn_warp: wp.vec2d, worn_weft: wp.vec2d, e: wp.
 
 @wp.func
 def pair_bound(a: wp.vec2d, b: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q: wp.vec2d, psi: wp.float64):
-    """Per area, a bound on the second derivative of the energy by the places of two corners, a and b the gradients of
-    their weights; of one corner, if both are the same."""
+    """Return, per area, a bound on the second derivative of the energy by the places of two corners.
+
+    a, b: gradients of their weights; of one corner, if both are the same.
+    """
     along_warp = wp.dot(a, warp) * wp.dot(b, warp)
     along_weft = wp.dot(a, weft) * wp.dot(b, weft)
     return q[0] * along_warp + q[1] * along_weft + psi * wp.dot(a, b)
@@ -171,7 +174,7 @@ def pair_bound(a: wp.vec2d, b: wp.vec2d, warp: wp.vec2d, weft: wp.vec2d, q: wp.v
 
 @wp.func
 def stress_rates(rate_warp: wp.float64, rate_weft: wp.float64, e: wp.vec2d, cloth: Cloth):
-    """Rates of sigma_warp and sigma_weft at the strains e for rates of these, as if pressed cloth did not wrinkle."""
+    """Return the rates of sigma_warp and sigma_weft for rates of the strains e, without wrinkling under compression."""
     slope_warp = thread_slope(e[0], cloth.c_warp, cloth.k_warp, cloth.strain_warp, cloth.tension_warp)
     slope_weft = thread_slope(e[1], cloth.c_weft, cloth.k_weft, cloth.strain_weft, cloth.tension_weft)
     return wp.vec2d(
@@ -186,8 +189,8 @@ def evaluate_membrane(
     cells: Cells,
     cloth: Cloth,
     time_step: wp.float64,
-    pace: wp.array(dtype=wp.vec3d),
-    watch: int,
+    coefficients: wp.array(dtype=wp.vec3d),
+    check_all: int,
     first: int,
     # outputs
     acting: wp.array(dtype=wp.int8),
@@ -196,27 +199,29 @@ def evaluate_membrane(
     viscosity: wp.array(dtype=wp.vec2d),
     stiffness: wp.array(dtype=wp.float64),
 ):
-    """Forces of the membrane, minus the gradient of (flat area) psi, and what its stiffness exceeds the matrix by.
+    """Compute the forces of the membrane, minus the gradient of (flat area) psi, and its stiffness beyond the matrix.
 
-    The approximate implicit step has the k_ij of the springs as its matrix, which bound the membrane's stiffness where they
-    were last taken (`bound_membrane`). What a cell has beyond them by now, k = 2 max(bound - held, 0), goes to the diagonal.
+    The approximate implicit step has the k_ij of the springs as its matrix, which bound the membrane's stiffness where
+    they were last taken (`bound_membrane`). What a cell has beyond them by now, k = 2 max(bound - held, 0), goes to the
+    diagonal.
 
     The viscosity is h (dF/dx) v of eq. (6) itself, without the part that the change of psi's area adds, which may be
-    negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear. With
-    the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and creep.
+    negative: a cell that moves as a whole is not held back, and one that shears only as much as it is stiff in shear.
+    With the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and
+    creep.
 
-    position: #V [m]. velocity: #V [m/s]. pace, watch: as in `cells.evaluate_guard`. acting: #F, 0 where all cells are mirrored; there the
-    last three are not written, and a mirrored cell adds nothing to them.
-    clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4 #F, at the
-    faces' corners [N]. stiffness: 4 #F [N/m].
+    position: #V [m]. velocity: #V [m/s]. coefficients, check_all: as in `cells.evaluate_guard`. acting: #F, 0 where all
+    cells are mirrored; there the last three are not written, and a mirrored cell adds nothing to them.
+    clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4
+    #F, at the faces' corners [N]. stiffness: 4 #F [N/m].
     """
     f = natural(wp.tid() + first)
-    if watch == 0 and acting[f] == wp.int8(0):
+    if check_all == 0 and acting[f] == wp.int8(0):
         return
     face = cells.face[f]
     begin = natural(cells.first[f])
     slot = 4 * f
-    viscous = pace[0][0] != wp.float64(0.0)
+    viscous = coefficients[0][0] != wp.float64(0.0)
     acts = int(0)
     least = wp.float64(wp.inf)
     k = int(0)
@@ -309,10 +314,10 @@ def bound_membrane(
     # outputs
     weight: wp.array(dtype=wp.float64),
 ):
-    """Each cell's share of the k_ij along its sides, such that they bound the membrane's stiffness at these positions.
+    """Compute each cell's share of the k_ij along its sides, which bound the membrane's stiffness at these positions.
 
-    It is what `warpflat.model.membrane.step_matrix` gives for a cell at rest: cotangents in the metric of the bounds along warp
-    and weft, of which negative ones may be left out.
+    It is what `warpflat.model.membrane.step_matrix` gives for a cell at rest: cotangents in the metric of the bounds
+    along warp and weft, of which negative ones may be left out.
 
     position: #V [m]. weight: 3 #C, along the sides 0-1, 1-2, 2-0 [N/m]; a mirrored cell's is left as it was.
     """
@@ -351,7 +356,7 @@ def bound_membrane(
 def membrane_energy(
     p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, cloth: Cloth
 ):
-    """(Flat area) psi of a cell with these corners, which counts with all of its area [J]; infinite if it is collapsed or mirrored."""
+    """Return (flat area) psi of a cell with all of its area [J]; infinite if it is collapsed or mirrored."""
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     if det <= wp.float64(0.0):
@@ -372,7 +377,7 @@ def compute_membrane_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """(Flat area) psi per face. position: #V [m]. energy: #F [J], infinite where a cell is collapsed or mirrored."""
+    """Compute (flat area) psi per face; position: #V [m], energy: #F [J], infinite with collapsed or mirrored cells."""
     f = natural(wp.tid() + first)
     face = cells.face[f]
     c = natural(cells.first[f])

@@ -1,4 +1,4 @@
-"""Between a level of a mesh and the next coarser one: layouts go up by weighted sums, forces come down by their transpose."""
+"""Transfer between a level and the next coarser one: interpolation by weighted sums, restriction by their transpose."""
 
 import warp as wp
 
@@ -18,8 +18,10 @@ class Weights:
 
 @wp.struct
 class Transpose:
-    """The transpose of such a matrix: column j of it has the rows `row`, and their weights as entries number `entry`, from `offset[j]` to
-    `offset[j + 1]`."""
+    """The transpose of a `Weights` matrix.
+
+    Column j has the rows `row`, and their weights as entries number `entry`, from `offset[j]` to `offset[j + 1]`.
+    """
 
     offset: wp.array(dtype=wp.int32)
     row: wp.array(dtype=wp.int32)
@@ -28,7 +30,7 @@ class Transpose:
 
 @wp.func
 def weighted_sum(i: int, weights: Weights, values: wp.array(dtype=wp.vec2d)):
-    """Row i of the matrix times `values`."""
+    """Return row i of the matrix times `values`."""
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     e = natural(weights.offset[i])
     end = weights.offset[i + 1]
@@ -46,7 +48,7 @@ def transfer(
     # outputs
     result: wp.array(dtype=wp.vec2d),
 ):
-    """result_i = sum_j w_ij values_j: a layout or a correction for the finer level."""
+    """Interpolate a layout or a correction on the finer level: result_i = sum_j w_ij values_j."""
     i = natural(wp.tid() + first)
     result[i] = weighted_sum(i, weights, values)
 
@@ -60,7 +62,7 @@ def coarse_difference(
     # outputs
     difference: wp.array(dtype=wp.vec2d),
 ):
-    """How far the coarse level has come from the places of its vertices on the finer one. kept: #coarse, fine vertices [m]."""
+    """Compute the displacement of the coarse layout from the fine one [m]. kept: #coarse, the fine vertices."""
     i = natural(wp.tid() + first)
     difference[i] = coarse[i] - fine[natural(kept[i])]
 
@@ -75,8 +77,11 @@ def coarse_load(
     # outputs
     load: wp.array(dtype=wp.vec2d),
 ):
-    """The load with which the coarse level has, where the finer one stands, the finer one's residual forces [N]:
-    load = P^T residual - force, force that of the coarse level without load (full approximation scheme)."""
+    """Compute the coarse load P^T residual - force [N] (full approximation scheme).
+
+    Under it the coarse forces in the injected layout are the restricted residual forces. force: of the coarse level
+    without load.
+    """
     i = natural(wp.tid() + first)
     total = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     e = natural(transpose.offset[i])
@@ -97,7 +102,7 @@ def correct(
     # outputs
     position: wp.array(dtype=wp.vec2d),
 ):
-    """position = base + share of the correction, where a vertex is free to go [m]."""
+    """Set position = base + share * correction, as far as a vertex is free to move [m]."""
     i = natural(wp.tid() + first)
     position[i] = base[i] + share * wp.cw_mul(correction[i], freedom[i])
 
@@ -110,6 +115,6 @@ def inject(
     # outputs
     coarse: wp.array(dtype=wp.vec2d),
 ):
-    """The places of the coarse level's vertices on the finer one. kept: #coarse, fine vertices [m]."""
+    """Copy the fine positions of the coarse level's vertices [m]. kept: #coarse, the fine vertices."""
     i = natural(wp.tid() + first)
     coarse[i] = fine[natural(kept[i])]

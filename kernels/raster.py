@@ -1,4 +1,4 @@
-"""Kernels of the picture: which triangle is in front at each sample of an image, and the colour of each pixel."""
+"""Rasterisation: the front triangle at each sample of an image, and the colour of each pixel."""
 
 import warp as wp
 
@@ -7,13 +7,13 @@ wp.set_module_options({"enable_backward": False})
 
 @wp.func
 def _crossing(p: wp.vec3d, q: wp.vec3d, y: wp.float64):
-    """Where the edge is at height y; from its lower vertex, whichever triangle asks, so that no sample falls between two."""
+    """Return x of the edge at height y, always from its first vertex, so that no sample falls between two triangles."""
     return p[0] + (q[0] - p[0]) * ((y - p[1]) / (q[1] - p[1]))
 
 
 @wp.func
 def _centres_within(low: wp.float64, high: wp.float64, count: int):
-    """The first and the last of `count` samples whose centres lie between two places."""
+    """Return the first and the last of `count` samples whose centres lie between two places."""
     half = wp.float64(0.5)
     first = wp.ceil(wp.clamp(low - half, wp.float64(0.0), wp.float64(count)))
     last = wp.floor(wp.clamp(high - half, wp.float64(-1.0), wp.float64(count - 1)))
@@ -29,7 +29,7 @@ def put_nearest(
     # outputs
     front: wp.array2d(dtype=wp.int64),
 ):
-    """At each sample the greatest of 2^32 times the depth in steps, plus the triangle; a thread per triangle."""
+    """Write to each sample the greatest of 2^32 times the depth in steps, plus the triangle; a thread per triangle."""
     t = wp.tid()
     corner = triangles[t]
     half = wp.float64(0.5)
@@ -96,7 +96,7 @@ def _shaded(
     light: wp.vec3f,
     back: wp.vec3f,
 ):
-    """The colour of triangle t at column x and row y."""
+    """Return the colour of triangle t at column x and row y."""
     shown = colours[face[t]]
     if not lit:
         return shown
@@ -128,6 +128,7 @@ def _shaded(
 
 @wp.func
 def _byte(value: wp.float32):
+    """Return a value of 0 to 1 as a byte."""
     return wp.uint8(int(wp.clamp(value, 0.0, 1.0) * 255.0 + 0.5))
 
 
@@ -147,7 +148,7 @@ def shade_pixels(
     # outputs
     pixels: wp.array2d(dtype=wp.vec4ub),
 ):
-    """The mean colour of a pixel's samples, side by side of them, and as opacity the share that a triangle covers."""
+    """Compute the mean colour of a pixel's `side` by `side` samples, and as opacity the share covered by triangles."""
     row, column = wp.tid()
     first = samples[row * side, column * side]
     others = wp.int32(0)

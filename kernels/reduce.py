@@ -1,6 +1,6 @@
-"""Sums, least and largest values over blocks of an array, for devices from which arrays would be slow to fetch.
+"""Sums and least values over blocks of an array, for devices from which copying arrays would be slow.
 
-A block is gone through by one thread, in order, so that a sum is the same each time; sums of sums are taken until few are left.
+One thread goes through a block in order, so that a sum repeats bit for bit; sums of sums are taken until few are left.
 """
 
 import warp as wp
@@ -16,7 +16,7 @@ def sum_blocks(
     # outputs
     total: wp.array(dtype=wp.float64),
 ):
-    """The sum of each block. begin: #B+1, where blocks begin and the last one ends. total: #B."""
+    """Sum each block. begin: #B+1, where blocks begin and the last one ends. total: #B."""
     b = wp.tid() + first
     s = wp.float64(0.0)
     for i in range(begin[b], begin[b + 1]):
@@ -32,7 +32,7 @@ def least_of_blocks(
     # outputs
     least: wp.array(dtype=wp.float64),
 ):
-    """The least value of each block. Arguments as of `sum_blocks`."""
+    """Find the least value of each block. Arguments as of `sum_blocks`."""
     b = wp.tid() + first
     s = wp.float64(wp.inf)
     for i in range(begin[b], begin[b + 1]):
@@ -49,7 +49,7 @@ def dot_blocks(
     # outputs
     total: wp.array(dtype=wp.float64),
 ):
-    """The sum of the scalar products in each block. Arguments as of `sum_blocks`."""
+    """Sum the scalar products in each block. Arguments as of `sum_blocks`."""
     block = wp.tid() + first
     s = wp.float64(0.0)
     for i in range(begin[block], begin[block + 1]):
@@ -65,7 +65,7 @@ def subtract(
     # outputs
     difference: wp.array(dtype=wp.vec2d),
 ):
-    """a - b, all #V."""
+    """Compute a - b, all #V."""
     i = wp.tid() + first
     difference[i] = a[i] - b[i]
 
@@ -73,11 +73,11 @@ def subtract(
 @wp.kernel
 def add_share(
     share: wp.float64,
-    way: wp.array(dtype=wp.vec2d),
+    vector: wp.array(dtype=wp.vec2d),
     first: int,
     # outputs
     total: wp.array(dtype=wp.vec2d),
 ):
-    """total + share of a way, all #V."""
+    """Add share * vector to the total, all #V."""
     i = wp.tid() + first
-    total[i] = total[i] + share * way[i]
+    total[i] = total[i] + share * vector[i]

@@ -1,4 +1,4 @@
-"""The rotation of each piece in the plane is summed up and removed, on devices from which arrays would be slow to fetch.
+"""Measurement and removal of the rotation of each piece, on devices from which copying arrays would be slow.
 
 See `warpflat.solver.grain_alignment`.
 """
@@ -9,13 +9,20 @@ wp.set_module_options({"enable_backward": False})
 
 
 MOMENTS = 12
-"""Of a block of vertices: w, w x (2), w |x|^2, x (2), f (2), x x f, w v (2), w x x v, with f what acts but for the load."""
+"""Number of sums of a block of vertices: w, w x (2), w |x|^2, x (2), f (2), x x f, w v (2), w x x v.
+
+f is the force without the load.
+"""
 
 
 @wp.struct
 class Turn:
-    """Of each piece (#P): about which centre it turns [m], by which angle, as (cos, sin); the weighted centre before [m]; by how much its
-    velocities turn [rad/s], and the torque of its cloth, over its inertia."""
+    """The rotation of each piece (#P).
+
+    centre: of the rotation [m]. by: its angle, as (cos, sin). middle: the weighted centre before [m]. spin: angular
+    velocity [rad/s].
+    torque: of the cloth, over the inertia.
+    """
 
     centre: wp.array(dtype=wp.vec2d)
     by: wp.array(dtype=wp.vec2d)
@@ -26,12 +33,13 @@ class Turn:
 
 @wp.func
 def cross(a: wp.vec2d, b: wp.vec2d):
+    """Return the cross product of two vectors in the plane."""
     return a[0] * b[1] - a[1] * b[0]
 
 
 @wp.func
 def turned(a: wp.vec2d, by: wp.vec2d):
-    """By an angle of this cosine and sine."""
+    """Return a turned by an angle of this cosine and sine."""
     return wp.vec2d(by[0] * a[0] - by[1] * a[1], by[1] * a[0] + by[0] * a[1])
 
 
@@ -47,7 +55,9 @@ def sum_moments(
     # outputs
     moments: wp.array(dtype=wp.float64),
 ):
-    """position [m], velocity [m/s], force, load [N], weight: #V. begin: #B+1, where blocks begin and the last one ends.
+    """Sum the moments of each block of vertices.
+
+    position [m], velocity [m/s], force, load [N], weight: #V. begin: #B+1, where blocks begin and the last one ends.
     moments: 12 #B."""
     b = wp.tid() + first
     w = wp.float64(0.0)
@@ -96,8 +106,10 @@ def turn_pieces(
     velocity: wp.array(dtype=wp.vec2d),
     load: wp.array(dtype=wp.vec2d),
 ):
-    """Turn each piece, rid its velocities of what turning there is in them, and give it the load that balances the torque of its cloth;
-    piece: #V, which a vertex is of, -1 where that is not held upright. All #V."""
+    """Turn each piece, remove its angular velocity, and balance the torque of its cloth by the load.
+
+    piece: #V, the piece of each vertex, -1 where its grain is not held. All #V.
+    """
     i = wp.tid() + first
     p = piece[i]
     if p >= 0:
@@ -109,7 +121,7 @@ def turn_pieces(
 
 
 @wp.kernel
-def strongest_of_blocks(
+def largest_force_of_blocks(
     position: wp.array(dtype=wp.vec2d),
     force: wp.array(dtype=wp.vec2d),
     load: wp.array(dtype=wp.vec2d),
@@ -121,7 +133,7 @@ def strongest_of_blocks(
     # outputs
     least: wp.array(dtype=wp.float64),
 ):
-    """Minus the square of the largest force in each block, but for the load and for what only turns a piece [N2]. Arguments as above."""
+    """Compute minus the largest squared force in each block, without load and rotation [N2]. Arguments as above."""
     b = wp.tid() + first
     s = wp.float64(0.0)
     for i in range(begin[b], begin[b + 1]):

@@ -15,19 +15,22 @@ class Springs:
     neighbor: the vertex at the far end.
     rest_length: length on the surface in space [m].
     stiffness: k_ij [N/m].
-    pull: 1 where the springs are the cloth, 0 where a membrane is and their k_ij only are the matrix of the step.
+    active: 1 where the springs are the cloth; 0 with a membrane, whose step matrix consists of their k_ij.
     """
 
     offset: wp.array(dtype=wp.int32)
     neighbor: wp.array(dtype=wp.int32)
     rest_length: wp.array(dtype=wp.float64)
     stiffness: wp.array(dtype=wp.float64)
-    pull: wp.float64
+    active: wp.float64
 
 
 @wp.func
 def spring_force(d: wp.vec2d, rest_length: wp.float64, stiffness: wp.float64):
-    """Force on the near end of a spring, d the vector to its far end: -grad of 1/2 k (l - L)^2. Zero at zero length."""
+    """Return the force on the near end of a spring, minus the gradient of 1/2 k (l - L)^2; zero at zero length.
+
+    d: vector to the far end [m].
+    """
     length = wp.sqrt(wp.max(wp.dot(d, d), wp.float64(1.0e-300)))
     return stiffness * (wp.float64(1.0) - rest_length / length) * d
 
@@ -41,11 +44,15 @@ def spring_forces_on(
     time_step: wp.float64,
     viscous: bool,
 ):
-    """Sum of the spring forces on vertex i, and, if it is asked for, paper, eq. (7) with spring-wise stiffness: h sum_j k_ij (v_j - v_i)
-    [N]; a membrane has forces and viscosity of its own."""
+    """Return the sum of the spring forces on vertex i, and, if `viscous`, the viscosity of eq. (7) [N].
+
+    The viscosity is h sum_j k_ij (v_j - v_i).
+
+    Both are zero with a membrane, which has forces and viscosity of its own.
+    """
     force = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     viscosity = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-    if springs.pull != wp.float64(0.0):
+    if springs.active != wp.float64(0.0):
         here = position[i]
         s = natural(springs.offset[i])
         end = springs.offset[i + 1]
@@ -72,7 +79,7 @@ def compute_spring_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """1/2 k (l - L)^2 of each spring, at the lower of its vertices, so that the sum over vertices is the network's.
+    """Sum 1/2 k (l - L)^2 of each spring at the lower of its vertices; the sum over vertices is the network's energy.
 
     position: #V [m]. energy: #V [J].
     """
@@ -87,20 +94,20 @@ def compute_spring_energy(
             stretch = wp.length(position[there] - here) - springs.rest_length[s]
             total += wp.float64(0.5) * springs.stiffness[s] * stretch * stretch
         s += 1
-    energy[i] = springs.pull * total
+    energy[i] = springs.active * total
 
 
 @wp.kernel
-def compute_spring_pull(
+def compute_spring_tension(
     position: wp.array(dtype=wp.vec2d),
     springs: Springs,
     first: int,
     # outputs
-    pull: wp.array(dtype=wp.float64),
+    tension: wp.array(dtype=wp.float64),
 ):
-    """k |l - L| of each spring, at the lower of its vertices, whether springs pull or are but the step's matrix.
+    """Sum k |l - L| of each spring at the lower of its vertices, also where springs are only the step's matrix.
 
-    position: #V [m]. pull: #V [N].
+    position: #V [m]. tension: #V [N].
     """
     i = natural(wp.tid() + first)
     here = position[i]
@@ -112,4 +119,4 @@ def compute_spring_pull(
         if there > i:
             total += springs.stiffness[s] * wp.abs(wp.length(position[there] - here) - springs.rest_length[s])
         s += 1
-    pull[i] = total
+    tension[i] = total

@@ -1,4 +1,4 @@
-"""Lengths and stiffnesses of the springs, and their lists vertex by vertex."""
+"""Lengths and stiffnesses of springs, and their lists vertex by vertex."""
 
 import warp as wp
 
@@ -7,9 +7,9 @@ from .indices import natural
 wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
-# The share of a membrane's hold on a wave from vertex to vertex that quads have.
-HELD = wp.constant(wp.float64(0.25))
-# A quad whose middle lines are parallel but for this square of a sine has no shape to be kept.
+# Hourglass stiffness of quads over that of a membrane.
+HOURGLASS_SHARE = wp.constant(wp.float64(0.25))
+# A quad whose middle lines enclose an angle with less than this squared sine has no shape to keep.
 FLAT = wp.constant(wp.float64(1.0e-12))
 
 
@@ -21,7 +21,7 @@ def measure_edges(
     # outputs
     length: wp.array(dtype=wp.float64),
 ):
-    """Distance [m] of the two ends of each edge."""
+    """Compute the distance of the two ends of each edge [m]."""
     e = natural(wp.tid() + first)
     length[e] = wp.length(vertices[natural(ends[e][0])] - vertices[natural(ends[e][1])])
 
@@ -37,11 +37,11 @@ def list_springs(
     neighbor: wp.array(dtype=wp.int32),
     spring: wp.array(dtype=wp.int32),
 ):
-    """The springs around each vertex by the vertices at their far ends.
+    """List the springs around each vertex, sorted by the vertices at their far ends.
 
-    offset: #V+1, where each vertex's entries begin in `end`: the spring at its second end, or #S more at its first, so that
-    edges, sorted by their lower vertex, are in order already. neighbor, spring: 2 #S, in the same order but for that within a
-    vertex.
+    offset: #V+1, where each vertex's entries begin in `end`: the spring at its second end, or #S more at its first, so
+    that edges, sorted by their lower vertex, are in order already. neighbor, spring: 2 #S, in the same order but for
+    that within a vertex.
     """
     i = natural(wp.tid() + first)
     begin = natural(offset[i])
@@ -73,7 +73,7 @@ def pick_values(
     # outputs
     listed: wp.array(dtype=wp.float64),
 ):
-    """The value of the spring that each entry of a list names."""
+    """Copy the value of the spring that each entry of a list names."""
     e = natural(wp.tid() + first)
     listed[e] = value[natural(entry[e])]
 
@@ -88,8 +88,10 @@ def find_sides(
     # outputs
     side: wp.array(dtype=wp.vec3i),
 ):
-    """The springs along each cell's edges 0-1, 1-2, 2-0, -1 where there is none. offset, neighbor, spring: as `list_springs` has
-    them."""
+    """Find the springs along each cell's edges 0-1, 1-2, 2-0; -1 where there is none.
+
+    offset, neighbor, spring: as `list_springs` has them.
+    """
     c = natural(wp.tid() + first)
     found = wp.vec3i(-1, -1, -1)
     for k in range(3):
@@ -113,7 +115,7 @@ def sum_stiffness(
     # outputs
     around: wp.array(dtype=wp.float64),
 ):
-    """#V, the sum of the k_ij [N/m] that are listed around each vertex, and a share of the stiffest."""
+    """Sum the k_ij listed around each vertex, and add a share of the stiffest, #V [N/m]."""
     i = natural(wp.tid() + first)
     total = wp.float64(0.0)
     stiffest = wp.float64(0.0)
@@ -129,7 +131,7 @@ def sum_stiffness(
 
 @wp.func
 def first_direction(position: wp.array(dtype=wp.vec2d), quad: wp.vec4i):
-    """Along a quad's edges 0-1 and 3-2, in the plane."""
+    """Return the vector along a quad's edges 0-1 and 3-2 in the plane."""
     p0 = position[natural(quad[0])]
     p1 = position[natural(quad[1])]
     p2 = position[natural(quad[2])]
@@ -146,7 +148,7 @@ def find_directions(
     # outputs
     fourfold: wp.array(dtype=wp.vec2d),
 ):
-    """(cos 4a, sin 4a) of the angle a from the warp to each quad's first edges."""
+    """Compute (cos 4a, sin 4a) of the angle a from the warp to each quad's first edges."""
     q = natural(wp.tid() + first)
     d = first_direction(position, quads[q])
     along = wp.dot(d, warp)
@@ -166,8 +168,9 @@ def find_directions(
 class Lattice:
     """A fabric as a lattice of springs along the edges of quads.
 
-    direction: of the quads' first edges on the whole, unit vector in the plane. along, across: K of those edges and of the others. shear: G
-    [N/m].
+    direction: mean direction of the quads' first edges, unit vector in the plane. along, across: K of those edges and
+    of the others.
+    shear: G [N/m].
     least: share of K that a structural spring keeps.
     """
 
@@ -179,13 +182,16 @@ class Lattice:
 
 
 @wp.func
-def wave_hold(k: wp.float64, lattice: Lattice, ratio: wp.float64, inverse: wp.float64):
-    """What a quad should hold a wave from vertex to vertex by [N/m], along the sides of K = k: a quarter of what a membrane does, or the
-    share of that by which structural springs do in a square, where it is less, as off the grain. ratio: of the other sides to these, and
-    its inverse."""
+def hourglass_stiffness(k: wp.float64, lattice: Lattice, ratio: wp.float64, inverse: wp.float64):
+    """Return the stiffness that a quad should have in its hourglass mode along the sides of K = k [N/m].
+
+    It is a quarter of a membrane's, or the share that structural springs have in a square, where that is less, as off
+    the grain.
+    ratio: of the other sides to these, and its inverse.
+    """
     in_square = wp.max(k - lattice.shear, lattice.least * k)
-    share = HELD
-    if in_square < HELD * (k + lattice.shear):
+    share = HOURGLASS_SHARE
+    if in_square < HOURGLASS_SHARE * (k + lattice.shear):
         share = in_square / (k + lattice.shear)
     return share * (k * ratio + lattice.shear * inverse)
 
@@ -205,15 +211,16 @@ def weigh_quads(
     lack: wp.array(dtype=wp.vec2d),
     hold: wp.array(dtype=wp.float64),
 ):
-    """Stiffness [N/m] that a quad gives to the springs along its sides and to both its diagonals.
+    """Compute the stiffness that a quad gives to the springs along its sides and to both diagonals [N/m].
 
-    A cell a by b of springs K b/a, less what its diagonals G (a2 + b2)/2ab take over, and half of them to each of two sides. Which
-    pair of edges is nearer to the warp is each quad's own. Where a quad is so long that next to nothing would be left along it, its
-    diagonals are weaker.
+    A cell a by b has springs K b/a, less the part of its diagonals G (a2 + b2)/2ab, half of it on each of two sides.
+    The pair of edges nearer to the warp is chosen for each quad. Where a quad is so long that next to nothing would be
+    left along it, its diagonals are weaker.
 
-    side: #Q, the first of each quad's half-edges. wider: #Q, how many times as long as on the body a and b are in the cloth.
-    stiffness: #H. diagonal: #Q. lack: #Q, what they lack in shear, as `cells.Cells.shear` has it. hold: #Q, what a wave from vertex to
-    vertex along rows and columns alike, in which no diagonal is strained, has to be held by besides [N/m] (`weigh_waves`).
+    side: #Q, the first of each quad's half-edges. wider: #Q, how many times as long as on the body a and b are in the
+    cloth.
+    stiffness: #H. diagonal: #Q. lack: #Q, their shear deficit, as `cells.Cells.shear`. hold: #Q, missing stiffness of
+    the hourglass mode, in which no diagonal is strained [N/m] (`weigh_hourglass`).
     """
     q = natural(wp.tid() + first)
     quad = quads[q]
@@ -239,10 +246,10 @@ def weigh_quads(
     lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if shear < lattice.shear:
         lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
-    # A wave of 1 m strains a side by 2 m, and what holds the quad against it by 4 m.
+    # An hourglass mode of 1 m strains a side by 2 m, and the hourglass spring by 4 m.
     short = wp.max(
-        wave_hold(ka, lattice, ratio, inverse) - wp.float64(2.0) * half_a,
-        wave_hold(kb, lattice, inverse, ratio) - wp.float64(2.0) * half_b,
+        hourglass_stiffness(ka, lattice, ratio, inverse) - wp.float64(2.0) * half_a,
+        hourglass_stiffness(kb, lattice, inverse, ratio) - wp.float64(2.0) * half_b,
     )
     hold[q] = wp.float64(0.25) * wp.max(short, wp.float64(0.0))
     h = natural(side[q])
@@ -254,22 +261,24 @@ def weigh_quads(
 
 
 @wp.kernel
-def weigh_waves(
+def weigh_hourglass(
     vertices: wp.array(dtype=wp.vec3d),
     quads: wp.array(dtype=wp.vec4i),
     hold: wp.array(dtype=wp.float64),
     first: int,
     # outputs
-    wave: wp.array(dtype=wp.vec4d),
+    weights: wp.array(dtype=wp.vec4d),
 ):
-    """What a quad is held by against a wave from corner to corner, 1/2 |sum of wave_k p_k|^2 of its corners' places p in the plane.
+    """Compute the hourglass weights of quads.
 
-    The weights are +1, -1, +1, -1, less what a quad with its shape on the body has of the like, so that this shape and all that uniform
-    strains make of it store nothing (Flanagan and Belytschko 1981), times the root of `hold`, #Q [N/m]. wave: #Q.
+    With them a quad stores 1/2 |sum of weight_k p_k|^2, p its corners in the plane.
+
+    The weights are +1, -1, +1, -1, less the same mode of the quad's shape on the body, so that this shape under any
+    uniform strain stores nothing (Flanagan and Belytschko 1981), times the root of `hold`, #Q [N/m]. weights: #Q.
     """
     q = natural(wp.tid() + first)
     quad = quads[q]
-    wave[q] = wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    weights[q] = wp.vec4d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
     if hold[q] > wp.float64(0.0):
         p0 = vertices[quad[0]]
         p1 = vertices[quad[1]]
@@ -287,7 +296,7 @@ def weigh_waves(
             along_u = half * (wp.dot(h, u) * vv - wp.dot(h, v) * uv) / det
             along_v = half * (wp.dot(h, v) * uu - wp.dot(h, u) * uv) / det
             one = wp.float64(1.0)
-            wave[q] = wp.sqrt(hold[q]) * wp.vec4d(
+            weights[q] = wp.sqrt(hold[q]) * wp.vec4d(
                 one + along_u + along_v, -one - along_u + along_v, one - along_u - along_v, -one + along_u - along_v
             )
 
@@ -304,10 +313,12 @@ def weigh_triangles(
     # outputs
     stiffness: wp.array(dtype=wp.float64),
 ):
-    """Stiffness [N/m] that a triangle gives to the springs along its sides: K area / length^2 (Van Gelder 1998), K that of a
-    strip of the cloth in the side's direction.
+    """Compute the stiffness of the springs along a triangle's sides [N/m]: K area / length^2 (Van Gelder 1998).
 
-    compliance: 1/K = (c4 [0] + s4 [1] + s2 c2 [2]) / (c2 + s2)^2 of a side that goes c along and s across the warp [m/N].
+    K is that of a strip of the cloth in the side's direction.
+
+    compliance: 1/K = (c4 [0] + s4 [1] + s2 c2 [2]) / (c2 + s2)^2 of a side that goes c along and s across the warp
+    [m/N].
     side: #T, the first of each triangle's half-edges. stiffness: #H.
     """
     t = natural(wp.tid() + first)
@@ -333,7 +344,7 @@ def weigh_triangles(
 
 
 @wp.kernel
-def measure_hold(
+def measure_shear_stiffness(
     position: wp.array(dtype=wp.vec2d),
     offset: wp.array(dtype=wp.int32),
     neighbor: wp.array(dtype=wp.int32),
@@ -345,7 +356,9 @@ def measure_hold(
     # outputs
     hold: wp.array(dtype=wp.float64),
 ):
-    """Shear stiffness [N/m] of the springs around each vertex against warp and weft: sum of 1/2 k L^2 cos^2 sin^2 over the
+    """Measure the shear stiffness of the springs around each vertex against warp and weft [N/m].
+
+    It is the sum of 1/2 k L^2 cos^2 sin^2 over the
     vertex's area [m2]. rest_length, stiffness: 2 #S, as they are listed around the vertices."""
     i = natural(wp.tid() + first)
     held = wp.float64(0.0)
@@ -363,7 +376,7 @@ def measure_hold(
 
 @wp.func
 def strain_field(d: wp.vec2d):
-    """c^4, s^4 and c^2 s^2 of a direction: what a spring along it stores of uniform strains along x, along y and of both."""
+    """Return c^4, s^4 and c^2 s^2 of a direction: a spring's shares of energy under uniform strain."""
     c2 = d[0] * d[0] / wp.max(wp.dot(d, d), TINY)
     s2 = wp.float64(1.0) - c2
     return wp.vec3d(c2 * c2, s2 * s2, c2 * s2)
@@ -381,8 +394,10 @@ def sum_strain_fields(
     stored: wp.array(dtype=wp.vec3d),
     products: wp.array(dtype=wp.mat33d),
 ):
-    """Sums over the springs around each vertex of k L^2 w, w their `strain_field` in a layout [J], and, if there is room for them, of
-    k L^2 w w^T."""
+    """Sum k L^2 w over the springs around each vertex, w their `strain_field` in a layout [J].
+
+    If `products` has entries, sum k L^2 w w^T, too.
+    """
     i = natural(wp.tid() + first)
     total = wp.vec3d()
     squares = wp.mat33d()

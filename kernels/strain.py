@@ -1,4 +1,4 @@
-"""Worn strain and strain energy of the cloth, per cell, in the fabric's axes: paper eqs. (1)-(3), and by the membrane's own law."""
+"""Worn strain and strain energy per cell in the fabric's axes, by paper eqs. (1)-(3) and by the membrane's law."""
 
 import warp as wp
 
@@ -32,15 +32,20 @@ def measure_flat_cells(
     # outputs
     area: wp.array(dtype=wp.float64),
 ):
-    """position: #V [m]. corner: #C. area: #C, signed [m2]; 0 or less where a cell is mirrored or collapsed."""
+    """Measure the signed area of cells in the plane.
+
+    position: #V [m]. corner: #C. area: #C [m2], 0 or less where a cell is mirrored or collapsed.
+    """
     c = natural(wp.tid() + first)
     area[c] = wp.float64(0.5) * wp.determinant(flat_edges(position, corner[c]))
 
 
 @wp.func
 def worn_strain(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
-    """Of a cell with these corners the determinant of its edges in the plane [m2], 0 or less if it is mirrored, and its strains along
-    warp and weft and in shear, then 0."""
+    """Return the determinant of a cell's edges in the plane [m2], and its strains along warp and weft and in shear.
+
+    The determinant of a mirrored cell is 0 or less, and its strains are 0.
+    """
     D = edge_matrix(p0, p1, p2)
     det = wp.determinant(D)
     e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
@@ -57,7 +62,7 @@ def worn_strain(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membra
 
 @wp.func
 def stress_of(e: wp.vec3d, membrane: Membrane):
-    """sigma_warp, sigma_weft, tau [N/m]."""
+    """Return sigma_warp, sigma_weft, tau [N/m]."""
     return wp.vec3d(
         membrane.c_warp * e[0] + membrane.c_cross * e[1],
         membrane.c_weft * e[1] + membrane.c_cross * e[0],
@@ -67,7 +72,7 @@ def stress_of(e: wp.vec3d, membrane: Membrane):
 
 @wp.func
 def stored_energy(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
-    """Of a cell, which counts with all of its area [J]."""
+    """Return the strain energy of a cell with all of its area [J]."""
     det, e = worn_strain(p0, p1, p2, laid, membrane)
     return wp.float64(0.25) * wp.dot(stress_of(e, membrane), e) * det
 
@@ -84,12 +89,17 @@ def compute_worn_strain(
     energy: wp.array(dtype=wp.float64),
     area: wp.array(dtype=wp.float64),
 ):
-    """The cloth is flat when relaxed and strained when worn: e = |F e_warp| - 1, |F e_weft| - 1, gamma = F e_warp . F e_weft.
+    """Compute worn strain, stress and energy of cells.
+
+    The cloth is flat when relaxed and strained when worn: e = |F e_warp| - 1, |F e_weft| - 1, gamma = F e_warp . F
+    e_weft.
 
     U = 1/2 (sigma_warp e_warp + sigma_weft e_weft + tau gamma) a, eq. (3), with a the signed flat area of the cell.
 
-    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
-    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft,
+    tau) [N/m].
+    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as
+    0.
     """
     f = natural(wp.tid() + first)
     face = cells.face[f]
@@ -120,7 +130,7 @@ def compute_strain_energy(
     # outputs
     energy: wp.array(dtype=wp.float64),
 ):
-    """The energy of `compute_worn_strain` alone, per face. position: #V [m]. energy: #F [J]."""
+    """Compute the energy of `compute_worn_strain` alone, per face. position: #V [m]. energy: #F [J]."""
     f = natural(wp.tid() + first)
     face = cells.face[f]
     c = natural(cells.first[f])
@@ -153,7 +163,7 @@ def average_over_faces(
     face_energy: wp.array(dtype=wp.float64),
     face_area: wp.array(dtype=wp.float64),
 ):
-    """Energies and areas added up, strains and stresses averaged by area, 0 where a face has none.
+    """Add up the energies and areas of each face's cells, and average their strains and stresses by area.
 
     offset: #F+1, where each face's cells begin. strain, stress, energy, area: #C. The same with face_: #F.
     """
@@ -188,10 +198,12 @@ def compute_membrane_strain(
     energy: wp.array(dtype=wp.float64),
     area: wp.array(dtype=wp.float64),
 ):
-    """Worn strain against the unstretched cloth, with the membrane's stresses and energy; as `compute_worn_strain`.
+    """Compute the worn strain against the unstretched cloth, with the membrane's stresses and energy.
 
-    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft, tau) [N/m].
-    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as 0.
+    Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft,
+    tau) [N/m].
+    energy: #C [J]. area: #C, the weighted flat area [m2], 0 or less in a mirrored cell, whose strain is then given as
+    0.
     """
     f = natural(wp.tid() + first)
     face = cells.face[f]

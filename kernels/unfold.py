@@ -1,6 +1,6 @@
-"""What a surface is when it is laid flat face by face: creases of quads, diagonals, cells.
+"""A surface laid flat face by face: creases of quads, diagonals, cells.
 
-Rounded as NumPy rounds, without fused products: two quads that are mirror images of each other get the same.
+Products are not fused, as in NumPy, so that quads that are mirror images of each other get the same results.
 """
 
 import warp as wp
@@ -11,11 +11,11 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 
 # Diagonals that pass each other within this share of their length belong to a flat quad, creased or not.
 FLAT = wp.constant(wp.float64(1.0e-9))
-# A diagonal is the crease if the surface is curved along it less than this share of what it is along the other one; where the
-# mesh around tells nothing, if it is longer.
+# A diagonal is the crease if the surface is curved along it less than this share of what it is along the other one;
+# where the mesh around tells nothing, if it is longer.
 STRAIGHTER = wp.constant(wp.float64(0.5))
 LONGER = wp.constant(wp.float64(1.0 - 1.0e-6))
-# Turns below this [rad] tell nothing.
+# Smaller turns [rad] are ignored.
 NO_TURN = wp.constant(wp.float64(1.0e-7))
 TINY = wp.constant(wp.float64(2.2250738585072014e-308))
 
@@ -29,8 +29,11 @@ def find_bends(
     normal: wp.array(dtype=wp.vec3d),
     bent: wp.array(dtype=wp.int8),
 ):
-    """normal: #F, of twice the face's area, of a quad at right angles to both diagonals [m2]. bent: #F, 1 for a convex quad
-    whose corners lie in no plane, else 0."""
+    """Find the quads whose corners lie in no plane.
+
+    normal: #F, with twice the face's area as length, for a quad at right angles to both diagonals [m2]. bent: #F, 1 for
+    a convex quad that is not flat, else 0.
+    """
     f = natural(wp.tid() + first)
     face = faces[f]
     p0 = vertices[natural(face[0])]
@@ -63,7 +66,9 @@ def average_normals(
     # outputs
     mean: wp.array(dtype=wp.vec3d),
 ):
-    """The mean normal, of length 1, of the faces around each vertex, whose `normal` (#F) are as long as they are large.
+    """Average the normals of the faces around each vertex by area.
+
+    mean: #V, of length 1. normal: #F, as long as faces are large.
 
     offset: #V+1, into `corner`: 4 times the face plus the column.
     """
@@ -86,7 +91,10 @@ def measure_triangles(
     area: wp.array(dtype=wp.float64),
     product: wp.array(dtype=wp.vec3d),
 ):
-    """area: #T, of triangles in space [m2]. product: #T, at each corner that of the two edges that leave it [m2]."""
+    """Measure triangles in space.
+
+    area: #T [m2]. product: #T, at each corner the scalar product of the two edges that leave it [m2].
+    """
     i = natural(wp.tid() + first)
     corner = triangles[i]
     p = vertices[natural(corner[0])]
@@ -101,7 +109,7 @@ def measure_triangles(
 
 @wp.func
 def turn_along(from_normal: wp.vec3d, to_normal: wp.vec3d, diagonal: wp.vec3d, length: wp.float64):
-    """How far the surface turns from one end of a diagonal to the other [rad], for small turns."""
+    """Return the angle by which the surface turns from one end of a diagonal to the other [rad], for small angles."""
     return wp.abs(wp.dot(to_normal - from_normal, diagonal)) / wp.max(length, TINY)
 
 
@@ -115,7 +123,7 @@ def find_creases(
     # outputs
     crease: wp.array(dtype=wp.int8),
 ):
-    """Along which diagonal a bent quad is creased: 0 for corners 0-2, 1 for 1-3, else -1. normal: #V, of length 1."""
+    """Find the diagonal along which a bent quad is creased: 0 for corners 0-2, 1 for 1-3, else -1. normal: #V, unit."""
     f = natural(wp.tid() + first)
     crease[f] = wp.int8(-1)
     if bent[f] != wp.int8(0):
@@ -144,8 +152,10 @@ def find_creases(
 def unfolded(
     a: wp.vec3d, b: wp.vec3d, p: wp.vec3d, q: wp.vec3d, normal: wp.vec3d, straight: wp.float64, length: wp.float64
 ):
-    """Distance of a and b with both triangles on the hinge p-q laid into one plane; a, p, b, q run around the quad. straight, length:
-    distances of a and b, and of p and q, as they are."""
+    """Return the distance of a and b with both triangles on the hinge p-q laid into one plane.
+
+    a, p, b, q run around the quad. straight, length: distances of a and b, and of p and q, in space.
+    """
     hinge = q - p
     if length == wp.float64(0.0):
         return straight
@@ -168,7 +178,7 @@ def unfold_diagonals(
     # outputs
     length: wp.array(dtype=wp.vec2d),
 ):
-    """Lengths [m] of the diagonals 0-2 and 1-3 of quads on the surface; that along a crease is straight. All #Q."""
+    """Measure the diagonals 0-2 and 1-3 of quads along the surface [m]; that along a crease is straight. All #Q."""
     q = natural(wp.tid() + first)
     quad = quads[q]
     p0 = vertices[natural(quad[0])]
@@ -189,13 +199,13 @@ def unfold_diagonals(
 
 @wp.func
 def beside(out: wp.vec3d, hinge: wp.vec3d, length: wp.float64, side: wp.float64):
-    """The point `out` from the hinge's beginning, in the plane in which the hinge is the x axis."""
+    """Return the point `out` from the hinge's beginning, in the plane in which the hinge is the x axis."""
     return wp.vec3d(wp.dot(out, hinge) / length, side * wp.length(wp.cross(hinge, out)) / length, wp.float64(0.0))
 
 
 @wp.func
 def lay_cell(p: wp.vec3d, q: wp.vec3d, r: wp.vec3d):
-    """A triangle laid flat with p at the origin and q along x: x of q, x and y of r [m]."""
+    """Return a triangle laid flat with p at the origin and q along x: x of q, x and y of r [m]."""
     a = q - p
     b = r - p
     length = wp.length(a)
@@ -215,8 +225,7 @@ def lay_cells(
     # outputs
     laid: wp.array(dtype=wp.vec3d),
 ):
-    """Cells laid flat: a triangle is one, a quad four, at its corners; those of a creased quad come from the one quad that it
-    unfolds into.
+    """Lay cells flat: one of a triangle, four at a quad's corners; those of a creased quad lie in the unfolded quad.
 
     crease: #F, as `find_creases` has it. cell: #F, the first of each face. laid: #C, as `cells.Cells` has them [m].
     """
@@ -269,8 +278,11 @@ def add_areas(
     # outputs
     total: wp.array(dtype=wp.float64),
 ):
-    """A third of the weighted areas of the cells around each vertex [m2]. cell: #F, the first of each face. laid: #C, as `lay_cells`
-    has them. offset: #V+1, into `slot`: 4 times the face plus the corner."""
+    """Sum a third of the weighted areas of the cells around each vertex [m2].
+
+    cell: #F, the first of each face. laid: #C, as `lay_cells` has them. offset: #V+1, into `slot`: 4 times the face
+    plus the corner.
+    """
     i = natural(wp.tid() + first)
     twice = wp.float64(0.0)
     e = natural(offset[i])

@@ -11,7 +11,7 @@ from devices import DEVICE
 from numpy.typing import NDArray
 from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
-from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
+from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 
 from warpflat.fabric.fabric import Fabric
 from warpflat.model.network import SpringNetwork
@@ -70,8 +70,8 @@ class Launched:
     velocities: NDArray[np.float64] | None = None
     time_step: float = 0.01
     pieces: int = 1
-    watch: int = 1
-    pace: tuple[float, float, float] = IMPLICIT_STEP
+    check_all: int = 1
+    coefficients: tuple[float, float, float] = IMPLICIT_STEP
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -94,8 +94,8 @@ class Launched:
             "anchor": zeros(n, wp.vec2d),
             "reach": zeros(n),
             "guarded": zeros(n, wp.int8),
-            "pull": zeros(n),
-            "pace": wp.array(np.array([self.pace]), dtype=wp.vec3d, device=DEVICE),
+            "tension": zeros(n),
+            "coefficients": wp.array(np.array([self.coefficients]), dtype=wp.vec3d, device=DEVICE),
             "energy": zeros(n),
         }
 
@@ -106,7 +106,11 @@ class Launched:
         given = {
             name: getattr(self.network, name) for name in ("springs", "cells", "guard", "mass", "spring_stiffness")
         }
-        given |= {"bonds": getattr(self.network, "bonds", None), "time_step": self.time_step, "watch": self.watch}
+        given |= {
+            "bonds": getattr(self.network, "bonds", None),
+            "time_step": self.time_step,
+            "check_all": self.check_all,
+        }
         # no seam binds this network
         given |= {"bond_force": zeros(0, wp.vec2d), "bond_viscosity": zeros(0, wp.vec2d), "bond_stiffness": zeros(0)}
         given |= {"load": zeros(self.network.vertex_count, wp.vec2d)}
@@ -139,9 +143,9 @@ class Launched:
         self._launch(compute_spring_energy, self.network.vertex_count)
         return self["energy"]
 
-    def spring_pull(self) -> NDArray[np.float64]:
-        self._launch(compute_spring_pull, self.network.vertex_count)
-        return self["pull"]
+    def spring_tension(self) -> NDArray[np.float64]:
+        self._launch(compute_spring_tension, self.network.vertex_count)
+        return self["tension"]
 
     def kinetic_energy(self) -> NDArray[np.float64]:
         self._launch(compute_kinetic_energy, self.network.vertex_count)

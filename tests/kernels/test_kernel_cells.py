@@ -44,8 +44,8 @@ def guard_energy_by_hand(network: SpringNetwork, positions: NDArray[np.float64])
             t = np.array([-s[1], s[0]])
             density += 0.5 * lack * ((deformation @ s) @ (deformation @ t)) ** 2
         energies.append(weight * area * density)
-    wave = network.spring_arrays.wave
-    waves = 0.0 if wave is None else np.einsum("fk,fkd->fd", wave, positions[network.surface.faces])
+    hourglass = network.spring_arrays.hourglass
+    waves = 0.0 if hourglass is None else np.einsum("fk,fkd->fd", hourglass, positions[network.surface.faces])
     return np.bincount(cells.face, energies) + 0.5 * np.square(waves).sum(axis=-1)
 
 
@@ -54,7 +54,7 @@ def lacking(network: SpringNetwork, shear: float) -> SpringNetwork:
     angle = np.random.default_rng(6).uniform(0.0, 2.0 * np.pi, network.face_count)
     lack = shear**0.25 * np.column_stack([np.cos(angle), np.sin(angle)])
     lack[2::3] = 0.0
-    return replace(network, spring_arrays=replace(network.spring_arrays, lack=lack, wave=None))
+    return replace(network, spring_arrays=replace(network.spring_arrays, shear_deficit=lack, hourglass=None))
 
 
 def held(network: SpringNetwork) -> SpringNetwork:
@@ -65,13 +65,13 @@ def held(network: SpringNetwork) -> SpringNetwork:
     )
     wave[2::3] = 0.0
     wave[~network.surface.is_quad] = 0.0
-    return replace(network, spring_arrays=replace(network.spring_arrays, wave=wave))
+    return replace(network, spring_arrays=replace(network.spring_arrays, hourglass=wave))
 
 
 def one_cell(shape: NDArray[np.float64]) -> SpringNetwork:
     """A network of one triangle (3 by 2 [m])."""
     surface = make_surface(np.column_stack([shape, np.zeros(3)]), [[0, 1, 2]])
-    return SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE, hold=np.inf)
+    return SpringNetwork.build(surface, CLOTH, shape, grain_angle=0.0, device=DEVICE, buckling_stiffness=np.inf)
 
 
 def random_cell(seed: int) -> tuple[SpringNetwork, NDArray[np.float64]]:
@@ -128,17 +128,17 @@ def test_waves_store_their_amplitude_squared_and_pull_back(scale: float):
     np.testing.assert_allclose(
         Launched(network, positions).guard_energy(), guard_energy_by_hand(network, positions), rtol=1e-10, atol=1e-15
     )
-    without = replace(network, spring_arrays=replace(network.spring_arrays, wave=None))
+    without = replace(network, spring_arrays=replace(network.spring_arrays, hourglass=None))
     here, there = (Launched(net, positions, velocities, time_step=0.02).evaluate_guard() for net in (network, without))
-    wave, faces = network.spring_arrays.wave, network.surface.faces
-    is_held = wave.any(axis=1)
+    hourglass, faces = network.spring_arrays.hourglass, network.surface.faces
+    is_held = hourglass.any(axis=1)
     assert is_held.any()
     assert (here["face_acting"][is_held] == 1).all()
-    amplitude, moving = (np.einsum("fk,fkd->fd", wave, values[faces]) for values in (positions, velocities))
+    amplitude, moving = (np.einsum("fk,fkd->fd", hourglass, values[faces]) for values in (positions, velocities))
     expected = {
-        "face_force": -wave[:, :, None] * amplitude[:, None],
-        "face_viscosity": -0.02 * wave[:, :, None] * moving[:, None],
-        "face_stiffness": np.abs(wave) * np.abs(wave).sum(axis=1, keepdims=True),
+        "face_force": -hourglass[:, :, None] * amplitude[:, None],
+        "face_viscosity": -0.02 * hourglass[:, :, None] * moving[:, None],
+        "face_stiffness": np.abs(hourglass) * np.abs(hourglass).sum(axis=1, keepdims=True),
     }
     for name, more in expected.items():
         shape = more.shape
@@ -243,7 +243,7 @@ def test_a_quad_does_half_of_what_its_four_corner_triangles_do(squeeze: float):
     """Whether all, some or none of them are squeezed."""
     shape = np.array([[0.0, 0.0], [0.1, 0.01], [0.11, 0.12], [0.0, 0.1]])
     surface = make_surface(np.column_stack([shape, np.zeros(4)]), [[0, 1, 2, 3]])
-    network = SpringNetwork.build(surface, CLOTH, shape, device=DEVICE, hold=np.inf)
+    network = SpringNetwork.build(surface, CLOTH, shape, device=DEVICE, buckling_stiffness=np.inf)
     rng = np.random.default_rng(4)
     positions, velocities = squeeze * shape, rng.normal(size=(4, 2))
     positions[2] *= 0.93
@@ -356,8 +356,8 @@ def test_without_viscosity_none_is_written_and_all_else_is_the_same():
     network = small_network()
     velocities = np.random.default_rng(3).normal(size=(network.vertex_count, 2))
     with_it, without = (
-        Launched(network, shaken(network, scale=0.8), velocities, pace=pace).evaluate_guard()
-        for pace in (IMPLICIT_STEP, IMPLICIT_STEP_AT_REST)
+        Launched(network, shaken(network, scale=0.8), velocities, coefficients=coefficients).evaluate_guard()
+        for coefficients in (IMPLICIT_STEP, IMPLICIT_STEP_AT_REST)
     )
     for name in ("face_acting", "face_clearance", "face_force", "face_stiffness"):
         np.testing.assert_array_equal(with_it[name], without[name])

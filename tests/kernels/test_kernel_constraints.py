@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
-from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_misses, evaluate_seams
+from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT, Seams, compute_seam_residuals, evaluate_seams
 
 POSITIONS = np.array([[0.0, 0.0], [0.11, 0.02], [0.5, 0.1], [0.52, 0.19], [0.1, 0.12]])
 # Two seams, one with ease; an edge of a fixed length; a vertex on a line through two others; a mirror image; one vertex alone.
@@ -113,7 +113,7 @@ def test_the_stiffness_bounds_the_curvature_when_all_ends_move():
 def test_misses_and_edges_of_no_length():
     found = wp.zeros(COUNT, dtype=wp.float64, device=DEVICE)
     wp.launch(
-        compute_seam_misses,
+        compute_seam_residuals,
         dim=COUNT,
         inputs=[wp.array(POSITIONS, dtype=wp.vec2d, device=DEVICE), seams(), 0],
         outputs=[found],

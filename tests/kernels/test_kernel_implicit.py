@@ -106,7 +106,7 @@ def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_it
     assert not idle.all()
     reach, anchor, clearance = at["reach"], at["anchor"], at["face_clearance"]
     assert np.array_equal(anchor, at["position"])
-    at.watch = 0
+    at.check_all = 0
     for _ in range(5):
         at.advance()
         away = np.linalg.norm(at["position"] - anchor, axis=1)
@@ -117,7 +117,7 @@ def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_it
         assert np.array_equal(at["anchor"], anchor)
         assert np.array_equal(at["reach"], reach)
     assert away.max() > 0.5 * reach.max()
-    at.watch = 1
+    at.check_all = 1
     assert (at.evaluate_guard()["face_clearance"] > 0).all()
 
 
@@ -125,7 +125,7 @@ def test_two_looks_at_one_layout_give_the_same_forces():
     network = small_network()
     at = Launched(network, shaken(network, scale=0.8)).evaluate_guard().gather_forces()
     whole = {name: at[name] for name in ("force", "driving_force", "stiffness", "first_guess")}
-    at.watch = 0
+    at.check_all = 0
     at.evaluate_guard().gather_forces()
     for name, values in whole.items():
         assert np.array_equal(at[name], values), name
@@ -185,12 +185,16 @@ def test_pieces_of_a_launch_equal_the_whole():
     assert np.array_equal(whole.kinetic_energy(), parts.kinetic_energy())
 
 
-@pytest.mark.parametrize("pace", [(0.0, 0.0, 4.0 / 3.0), (0.0, 0.2, 2.4), (1.0, 1.0, 1.0)])
-def test_shares_of_velocity_and_push_are_those_of_the_pace(pace: tuple[float, float, float]):
+@pytest.mark.parametrize("coefficients", [(0.0, 0.0, 4.0 / 3.0), (0.0, 0.2, 2.4), (1.0, 1.0, 1.0)])
+def test_velocity_and_its_change_have_their_factors(coefficients: tuple[float, float, float]):
     network = small_network()
     velocities = np.random.default_rng(7).normal(scale=1e-3, size=(network.vertex_count, 2))
-    at = Launched(network, shaken(network, scale=1.2), velocities, 0.02, pace=pace).evaluate_guard().gather_forces()
-    viscosity, carried, push = pace
+    at = (
+        Launched(network, shaken(network, scale=1.2), velocities, 0.02, coefficients=coefficients)
+        .evaluate_guard()
+        .gather_forces()
+    )
+    viscosity, carried, push = coefficients
     h, m, stiffness = 0.02, network.mass.numpy()[:, None], at["stiffness"][:, None]
     viscous = spring_sums(network, velocities) - velocities * spring_sums(network, np.ones_like(velocities))
     driving = at["force"] + viscosity * h * viscous

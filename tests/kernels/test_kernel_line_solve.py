@@ -7,7 +7,7 @@ import pytest
 import warp as wp
 from numpy.typing import NDArray
 from small_networks import CLOTH, DEVICE, Launched, vec2
-from warpflat.kernels.line_solve import go_along_lines, solve_lines
+from warpflat.kernels.line_solve import move_along_lines, solve_lines
 
 from warpflat.core.launch import launch_each
 from warpflat.model.network import SpringNetwork
@@ -104,7 +104,7 @@ def test_no_vertex_goes_beyond_its_reach_or_where_it_may_not():
     freedom = np.where(rng.random((40, 2)) < 0.3, [0.0, 1.0], 1.0)
     position = vec2(here)
     inputs = [vec2(rows), vec2(columns), wp.array(reach, dtype=wp.float64, device=DEVICE), vec2(freedom)]
-    launch_each(go_along_lines, 40, inputs, [position], device=DEVICE)
+    launch_each(move_along_lines, 40, inputs, [position], device=DEVICE)
     way = (rows + columns) * freedom
     length = np.linalg.norm(way, axis=1)
     assert 5 < np.count_nonzero(length > reach) < 35

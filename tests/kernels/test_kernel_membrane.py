@@ -14,7 +14,7 @@ from warpflat.kernels.membrane import compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.strain import compute_membrane_strain
 
 from warpflat.fabric.fabric import Fabric, grain_axes
-from warpflat.model.membrane import cloth_of
+from warpflat.model.membrane import make_cloth
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.membrane_stiffness import TangentMatrix
 from warpflat.solver.smoother import IMPLICIT_STEP
@@ -258,7 +258,7 @@ def one_cell(F: FloatArray, fabric: Fabric) -> tuple[float, FloatArray]:
         inputs=[
             wp.array(points, dtype=wp.vec2d, device=DEVICE),
             network.cells,
-            cloth_of(fabric, grain_axes(0.0), network.device),
+            make_cloth(fabric, grain_axes(0.0), network.device),
             0,
         ],
         outputs=[strain, stress, energy, area],
@@ -389,10 +389,10 @@ def test_the_matrix_that_follows_bounds_the_stiffness_of_the_present_layout_and_
     network = network_of(make_surface(worn(points, np.eye(2), fold=False), faces), CLOTHS["soft shear"], points)
     at_rest = np.array(network.springs.stiffness.numpy())
     matrix = TangentMatrix(network)
-    matrix.follow(wp.array(points, dtype=wp.vec2d, device=DEVICE))
+    matrix.update(wp.array(points, dtype=wp.vec2d, device=DEVICE))
     np.testing.assert_allclose(network.springs.stiffness.numpy(), at_rest, rtol=1e-6, atol=1e-9 * at_rest.max())
     flat = points @ np.array([[1.2, 0.4], [0.0, 0.8]])
-    matrix.follow(wp.array(flat, dtype=wp.vec2d, device=DEVICE))
+    matrix.update(wp.array(flat, dtype=wp.vec2d, device=DEVICE))
     assert np.abs(network.springs.stiffness.numpy() - at_rest).max() > 0.5 * at_rest.max()
     # Nothing is left for the diagonal, and x . H x <= sum k_ij |x_i - x_j|^2 for the part of H without second derivatives.
     assert evaluated(network, flat)["stiffness"].max() < 1e-9 * at_rest.max()

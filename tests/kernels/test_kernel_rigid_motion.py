@@ -7,7 +7,7 @@ import warp as wp
 from devices import DEVICE
 from small_networks import vec2
 from warpflat.kernels.implicit import count_braked, stop_braked
-from warpflat.kernels.rigid_motion import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
+from warpflat.kernels.rigid_motion import MOMENTS, Turn, largest_force_of_blocks, sum_moments, turn_pieces
 
 from warpflat.core.launch import launch_each
 
@@ -81,7 +81,7 @@ def test_the_strongest_force_but_for_turning():
     weight = np.random.default_rng(5).uniform(1.0, 2.0, COUNT)
     got = double(np.full(3, np.nan))
     given = [*map(vec2, (x, f, load)), double(weight), whole(PIECE), turn, whole(BEGIN)]
-    launch_each(strongest_of_blocks, 3, given, [got], device=DEVICE)
+    launch_each(largest_force_of_blocks, 3, given, [got], device=DEVICE)
     arm = 1.0j * (number(x) - number(turn.middle.numpy())[PIECE])
     force = number(f - load) - np.where(PIECE >= 0, turn.torque.numpy()[PIECE] * weight * arm, 0.0)
     np.testing.assert_allclose(got.numpy(), -np.maximum.reduceat(abs(force) ** 2, BEGIN[:-1]), rtol=1e-13)

@@ -19,12 +19,12 @@ def test_energy_is_half_k_stretch_squared_of_every_spring_once():
     np.testing.assert_allclose(per_vertex, at_lower, rtol=1e-12)
 
 
-def test_pull_is_k_times_stretch_of_every_spring_once():
+def test_tension_is_k_times_stretch_of_every_spring_once():
     network = small_network()
     positions = shaken(network, scale=1.1)
     s = network.spring_arrays
     length = np.linalg.norm(positions[s.ends[:, 1]] - positions[s.ends[:, 0]], axis=1)
-    assert Launched(network, positions).spring_pull().sum() == pytest.approx(
+    assert Launched(network, positions).spring_tension().sum() == pytest.approx(
         (s.stiffness * np.abs(length - s.rest_length)).sum(), rel=1e-13
     )
 

@@ -13,7 +13,7 @@ from warpflat.kernels.strain import compute_worn_strain
 
 from warpflat.fabric.fabric import grain_axes
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import membrane_of
+from warpflat.model.strain import make_membrane
 
 
 def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int = 1) -> list[NDArray[np.float64]]:
@@ -21,7 +21,7 @@ def worn(network: SpringNetwork, positions: NDArray[np.float64], *, pieces: int 
     count = network.cell_count
     outputs = [wp.zeros(count, dtype=t, device=DEVICE) for t in (wp.vec3d, wp.vec3d, wp.float64, wp.float64)]
     bounds = np.linspace(0, network.face_count, pieces + 1).astype(int)
-    membrane = membrane_of(network.fabric, network.grain_angle)
+    membrane = make_membrane(network.fabric, network.grain_angle)
     for first, last in pairwise(bounds):
         wp.launch(
             compute_worn_strain,

@@ -101,7 +101,7 @@ def test_a_rectangle_under_uniform_strain_stores_the_membranes_energy(strain, hx
     network = SpringNetwork.build(
         surface, cloth(warp=warp, weft=weft, shear=shear), surface.vertices[:, :2], device=DEVICE
     )
-    assert network.spring_arrays.lack is None
+    assert network.spring_arrays.shear_deficit is None
     e = np.array(STRAINS[strain])
     exx, eyy, gamma = e[0, 0], e[1, 1], 2 * e[0, 1]
     density = 0.5 * (weft * exx**2 + warp * eyy**2 + 2 * shear * exx * eyy + shear * gamma**2)
@@ -202,12 +202,12 @@ def test_quads_held_against_waves_store_nothing_of_their_shape_strained_uniforml
     faces = np.stack([number[:-1, :-1], number[:-1, 1:], number[1:, 1:], number[1:, :-1]], axis=-1).reshape(-1, 4)
     surface, flat = make_surface(vertices, faces), np.ascontiguousarray(vertices[:, :2])
     network = SpringNetwork.build(surface, cloth(shear=375.0), flat, device=DEVICE)
-    wave = network.spring_arrays.wave
-    assert wave is not None
-    assert wave.any(axis=1).sum() > 20
+    hourglass = network.spring_arrays.hourglass
+    assert hourglass is not None
+    assert hourglass.any(axis=1).sum() > 20
     turned = flat @ np.array([[0.8, 0.6], [-0.6, 0.8]]) @ np.diag([1.1, 0.9]) + [0.3, -0.2]
     for layout in (flat, turned):
-        np.testing.assert_allclose(np.einsum("fk,fkd->fd", wave, layout[faces]), 0.0, atol=1e-14)
+        np.testing.assert_allclose(np.einsum("fk,fkd->fd", hourglass, layout[faces]), 0.0, atol=1e-14)
 
 
 def test_stiffnesses_of_quads_have_no_jump_at_any_angle_to_the_grain():
@@ -344,7 +344,7 @@ def test_springs_weighed_anew_have_the_new_stiffness_at_both_ends():
     before, lists = network.spring_arrays.listed_stiffness.copy(), network.springs.stiffness.ptr
     sums = network.spring_stiffness.ptr
     wished = np.random.default_rng(2).uniform(1.0, 9.0, network.spring_count)
-    network.weigh(wished)
+    network.update_stiffness(wished)
     assert (network.springs.stiffness.ptr, network.spring_stiffness.ptr) == (lists, sums)
     np.testing.assert_array_equal(network.spring_arrays.listed_stiffness, before)
     offset, neighbor = network.springs.offset.numpy(), network.springs.neighbor.numpy()
@@ -371,8 +371,8 @@ def test_between_triangles_the_guard_begins_before_their_springs_lose_their_hold
     network = SpringNetwork.build(surface, fabric, flat, device=DEVICE)
     shear = 1e-5
     stored = spring_energy(network, flat + np.column_stack([shear * flat[:, 1], np.zeros(len(flat))]))
-    assert network.shear_hold == pytest.approx(0.75 * 2.0 * stored / shear**2 / 0.12**2, rel=1e-3)
-    np.testing.assert_allclose(network.cells.onset.numpy(), network.shear_hold / 1000.0)
+    assert network.buckling_stiffness == pytest.approx(0.75 * 2.0 * stored / shear**2 / 0.12**2, rel=1e-3)
+    np.testing.assert_allclose(network.cells.onset.numpy(), network.buckling_stiffness / 1000.0)
     few = SpringNetwork.build(sheet(12, 12, 0.01, 0.01, split=12), fabric, flat, device=DEVICE)
     np.testing.assert_allclose(few.cells.onset.numpy(), 0.2)
 

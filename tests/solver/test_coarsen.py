@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial import Delaunay
 
-from warpflat.model.springs import unweighed_springs
+from warpflat.model.springs import spring_geometry
 from warpflat.solver.multigrid.coarsen import (
     Coarsening,
     _prepare_levels,
@@ -472,7 +472,7 @@ def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkey
         monkeypatch.setattr(f"warpflat.{made_once}", None)
     for step in coarsenings_of(piece):
         assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
-        assert unweighed_springs(step.surface).edge_count == len(half_edges_of(step.surface).edges)
+        assert spring_geometry(step.surface).edge_count == len(half_edges_of(step.surface).edges)
 
 
 @pytest.mark.parametrize("kind", ["triangles", "grid", "crack"])

@@ -24,7 +24,7 @@ from warpflat.model.join import join_networks
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
-from warpflat.model.wear import Wear, meant_stretch
+from warpflat.model.wear import Wear, intended_stretch
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
@@ -93,7 +93,7 @@ class RelaxationTask:
     def _wanted_stretch(self, positions: FloatArray) -> tuple[FloatArray | None, tuple[str, ...]]:
         if self.wear is None:
             return None, ()
-        return meant_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
+        return intended_stretch(self.surface, self.fabric, positions, self.wear, grain_angle=self.grain_angle)
 
     def build_network(self, positions: FloatArray) -> SpringNetwork:
         """Build the piece's network, with directions measured in a layout (#V by 2 [m])."""

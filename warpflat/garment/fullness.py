@@ -173,7 +173,9 @@ def _widened_network(network: SpringNetwork, positions: FloatArray, full: FloatA
     stretch = network.stretch
     meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
     weights, held = step_matrix(network.fabric, axes, cells.corner, cells.edges, cells.area, positions, meant)
-    return replace(network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held=held)
+    return replace(
+        network, spring_arrays=with_stiffness(springs, cells, weights), cell_arrays=cells, held_stiffness=held
+    )
 
 
 def _wider_springs(
@@ -184,18 +186,23 @@ def _wider_springs(
     before = (positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]) @ np.column_stack(axes)
     here = 0.5 * (full[springs.ends[:, 0]] + full[springs.ends[:, 1]])
     longer = _stretch_factor(before, here)
-    stiffness, lack, wave = springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer, None, None
+    stiffness, shear_deficit, hourglass = (
+        springs.stiffness * _stretch_factor(before[:, ::-1], here) / longer,
+        None,
+        None,
+    )
     if surface.is_quad.any():
         wider = _wider_quads(surface, positions, axes, full)
         made = springs_of(surface, network.fabric, positions, grain_angle=network.grain_angle, wider=wider)
         of_quads = _beside_quads(surface, springs)
-        stiffness[of_quads], lack, wave = made.stiffness[of_quads], made.lack, made.wave
+        stiffness[of_quads] = made.stiffness[of_quads]
+        shear_deficit, hourglass = made.shear_deficit, made.hourglass
     return replace(
         springs,
         listed_length=springs.listed(springs.rest_length * longer),
         listed_stiffness=springs.listed(stiffness),
-        lack=lack,
-        wave=wave,
+        shear_deficit=shear_deficit,
+        hourglass=hourglass,
     )
 
 

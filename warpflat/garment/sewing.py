@@ -177,7 +177,7 @@ def sew(
     start = np.concatenate([_straighten_fold(piece, folds.get(name)) for name, piece in pieces.items()])
     network = joined.network()
     if folds:
-        network.guide(np.concatenate([joined.numbers(name, ids) for name, ids in folds.items()]))
+        network.keep_vertical(np.concatenate([joined.numbers(name, ids) for name, ids in folds.items()]))
     if len(equations):
         thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
         median = float(np.median(network.spring_arrays.listed_stiffness))
@@ -267,7 +267,7 @@ def _relax_in_rounds(
         steps = _STEPS_PER_ROUND + len(violations) // _ROUNDS_UNTIL_LONGER * _STEPS_PER_ROUND // 4
         state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
         outcome, residuals = relax(state), _residuals(state)
-        violations.append(equations.amiss(residuals))
+        violations.append(equations.violation(residuals))
         farthest = np.abs(np.where(equations.soft > 0, 0.0, residuals)).max(initial=0.0)
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
         done = outcome.converged and len(violations) > 1 and max(violations[-2:]) <= 1.0
@@ -295,11 +295,11 @@ def _constraint_results(
     if seams is None:
         return []
     force = seams.stiffness.numpy() * (seams.offset.numpy() + residuals)
-    cost = equations.sums(0.5 * force * _residuals(state, unsewn))
+    cost = equations.group_sums(0.5 * force * _residuals(state, unsewn))
     largest = np.zeros(len(kinds))
     np.maximum.at(largest, equations.group, np.where(equations.soft > 0, 0.0, np.abs(residuals)))
     summed = np.isfinite(equations.sum_tolerance)
-    violation = np.where(summed, np.abs(equations.sums(residuals)), largest)
+    violation = np.where(summed, np.abs(equations.group_sums(residuals)), largest)
     return [
         ConstraintResult(name=name, kind=kind, cost=float(cost[number]), violation=float(violation[number]))
         for number, (name, kind) in enumerate(kinds)
@@ -363,4 +363,4 @@ def _residuals(state: Relaxation, positions: FloatArray | None = None) -> FloatA
     """Return the residual c of each equation (#P [m]), in the present layout or another one."""
     network = state.network
     at = state.position if positions is None else wp.array(positions, dtype=wp.vec2d, device=network.device)
-    return network.seam_misses(at)
+    return network.seam_residuals(at)

@@ -1,4 +1,4 @@
-"""Ties: seams and constraints as equations on vertices, in the arrays that `kernels.constraints` takes."""
+"""Seams and constraints as equations on vertices, in the arrays that `kernels.constraints` takes."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ __all__ = [
 ]
 
 
-# What may be amiss of an edge's length, and of the sum along a line [m].
+# Tolerances of an edge's length, and of the sum along a line [m].
 _EDGE_TOLERANCE = 2e-5
 _SUM_TOLERANCE = 1e-4
-# How far a vertex may lie from its line or from its mirror image [m].
+# Tolerance of a vertex's distance from its line or from its mirror image [m].
 _PLACE_TOLERANCE = 5e-5
-# Waves up to this length [m] are kept out of a line whose lengths are ruled, by springs of this stiffness over the stiffer thread's
-# where two edges are as long as a wave.
+# Waves up to this length [m] are kept out of a line of prescribed lengths, by springs of this stiffness over the
+# stiffer thread's where two edges are as long as a wave.
 WAVE, SMOOTH = 0.04, 0.3
 
 
@@ -42,11 +42,11 @@ class ConstraintEquations:
 
     Attributes:
         ends: #P by 4. kind: #P. ratio: #P. target: #P [m]. lever: #P by 4 by 2.
-        tolerance: #P, by how much c may miss zero [m].
-        soft: #P, of ties that are no equations, only springs, their stiffness over that of the stiffer thread: what they miss is
-            neither made good nor counted; 0 of all others.
-        group: #P, the seam or constraint that a tie belongs to.
-        sum_tolerance: #groups, by how much the sum of its c may miss zero [m]; infinite where sums mean nothing.
+        tolerance: #P, tolerance of |c| [m].
+        soft: #P, for equations that are only springs, their stiffness over that of the stiffer thread: their residuals
+            are neither corrected nor counted; 0 for all others.
+        group: #P, the seam or constraint that an equation belongs to.
+        sum_tolerance: #groups, tolerance of the absolute sum of its c [m]; infinite where sums mean nothing.
     """
 
     ends: IntArray
@@ -60,159 +60,166 @@ class ConstraintEquations:
     sum_tolerance: FloatArray = field(default_factory=lambda: np.array([np.inf]))
 
     def __len__(self) -> int:
-        """#P."""
+        """Return the number of equations, #P."""
         return len(self.ends)
 
-    def sums(self, misses: FloatArray) -> FloatArray:
-        """#groups, the sum of the misses (#P) of each."""
-        counted = np.where(self.soft > 0, 0.0, misses)
+    def group_sums(self, residuals: FloatArray) -> FloatArray:
+        """Return the sum of the residuals (#P [m]) of each group, #groups [m]."""
+        counted = np.where(self.soft > 0, 0.0, residuals)
         return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
 
-    def amiss(self, misses: FloatArray) -> float:
-        """The largest of what ties and sums are amiss by, each over its tolerance: they agree up to 1."""
-        own, sums = np.abs(misses) / self.tolerance, np.abs(self.sums(misses)) / self.sum_tolerance
+    def violation(self, residuals: FloatArray) -> float:
+        """Return the largest residual or sum over its tolerance; up to 1 the equations hold."""
+        own, sums = np.abs(residuals) / self.tolerance, np.abs(self.group_sums(residuals)) / self.sum_tolerance
         return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
 
 
-def one_group(*ties: ConstraintEquations) -> ConstraintEquations:
-    """Ties of one seam or constraint."""
-    joined = join_equations(ties)
-    return replace(joined, group=np.zeros_like(joined.group), sum_tolerance=ties[0].sum_tolerance)
+def one_group(*equations: ConstraintEquations) -> ConstraintEquations:
+    """Join the equations of one seam or constraint."""
+    joined = join_equations(equations)
+    return replace(joined, group=np.zeros_like(joined.group), sum_tolerance=equations[0].sum_tolerance)
 
 
-def join_equations(ties: Sequence[ConstraintEquations]) -> ConstraintEquations:
-    """The ties of several seams and constraints, a group each."""
-    if not ties:
-        return _ties(np.zeros((0, 4)), LENGTHS, tolerance=_EDGE_TOLERANCE, sum_tolerance=None)
+def join_equations(equations: Sequence[ConstraintEquations]) -> ConstraintEquations:
+    """Join the equations of several seams and constraints, a group each."""
+    if not equations:
+        return _equations(np.zeros((0, 4)), LENGTHS, tolerance=_EDGE_TOLERANCE, sum_tolerance=None)
     return ConstraintEquations(
-        ends=np.concatenate([t.ends for t in ties]),
-        kind=np.concatenate([t.kind for t in ties]),
-        ratio=np.concatenate([t.ratio for t in ties]),
-        target=np.concatenate([t.target for t in ties]),
-        lever=np.concatenate([t.lever for t in ties]),
-        tolerance=np.concatenate([t.tolerance for t in ties]),
-        soft=np.concatenate([t.soft for t in ties]),
-        group=np.concatenate([np.full(len(t), number, dtype=np.int32) for number, t in enumerate(ties)]),
-        sum_tolerance=np.concatenate([t.sum_tolerance for t in ties]),
+        ends=np.concatenate([each.ends for each in equations]),
+        kind=np.concatenate([each.kind for each in equations]),
+        ratio=np.concatenate([each.ratio for each in equations]),
+        target=np.concatenate([each.target for each in equations]),
+        lever=np.concatenate([each.lever for each in equations]),
+        tolerance=np.concatenate([each.tolerance for each in equations]),
+        soft=np.concatenate([each.soft for each in equations]),
+        group=np.concatenate([np.full(len(each), number, dtype=np.int32) for number, each in enumerate(equations)]),
+        sum_tolerance=np.concatenate([each.sum_tolerance for each in equations]),
     )
 
 
 def seam_equations(first: IntArray, second: IntArray, ratio: float = 1.0) -> ConstraintEquations:
-    """Every edge of the first row of vertices `ratio` times as long as its partner of the second."""
+    """Return equations that make each edge of the first row `ratio` times as long as its partner of the second."""
     ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
-    return _ties(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+    return _equations(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
 def stretch_equations(
     first: IntArray, second: IntArray, joints: IntArray, body: FloatArray, positions: FloatArray, ratio: float = 1.0
 ) -> ConstraintEquations:
-    """Two rows of other vertices sewn by their length on the body, the first `ratio` times as long as the second.
+    """Return equations that sew two rows by their lengths on the body, the first `ratio` times as long as the second.
 
-    Between two joints both rows stretch evenly from where they lie. The two vertices of a joint need not lie at the same share
-    of the length: from the first one's joint to its next, the second row is taken between the same shares.
+    The rows have different vertices. Between two joints both rows stretch evenly from where they lie. The two vertices
+    of a joint need not lie at the same share of the length: between two joints of the first row, the second row is
+    taken between the same shares.
 
     Args:
         first, second: vertices.
         joints: #J by 2, places in both rows that belong together, their ends among them.
         body: #V by 3 [m].
         positions: #V by 2, the layout before it is sewn [m].
-        ratio: of the whole lengths.
+        ratio: of the whole lengths, first over second.
     """
     rows = (first, second)
     shares = [arc / arc[-1] for arc in (arc_lengths(body[row]) for row in rows)]
     arcs = [arc_lengths(positions[row]) for row in rows]
     steps = [np.diff(arc) for arc in arcs]
-    ties = []
+    equations = []
     for side, row in enumerate(rows):
         inner = np.setdiff1d(np.arange(1, len(row) - 1), joints[:, side])
         ends = np.column_stack([row[inner - 1], row[inner], row[inner], row[inner + 1]])
-        ties.append(_ties(ends, LENGTHS, ratio=steps[side][inner - 1] / steps[side][inner], tolerance=_EDGE_TOLERANCE))
+        equations.append(
+            _equations(ends, LENGTHS, ratio=steps[side][inner - 1] / steps[side][inner], tolerance=_EDGE_TOLERANCE)
+        )
     i, j = joints[:-1].T
     ends = np.column_stack([first[i], first[i + 1], second[j], second[j + 1]])
     there = np.diff(np.interp(shares[0][joints[:, 0]], shares[1], arcs[1]))
     share = [steps[side][places] / np.diff(arcs[side][joints[:, side]]) for side, places in ((0, i), (1, j))]
     own = np.diff(arcs[1][joints[:, 1]])
-    between = _ties(ends, LENGTHS, ratio=ratio * there / own * share[0] / share[1], tolerance=_EDGE_TOLERANCE)
-    return replace(one_group(*ties, between), sum_tolerance=np.array([_SUM_TOLERANCE]))
+    between = _equations(ends, LENGTHS, ratio=ratio * there / own * share[0] / share[1], tolerance=_EDGE_TOLERANCE)
+    return replace(one_group(*equations, between), sum_tolerance=np.array([_SUM_TOLERANCE]))
 
 
 def length_equations(line: IntArray, lengths: FloatArray) -> ConstraintEquations:
-    """Every edge of a row of vertices so long [m]."""
+    """Return equations that give the edges of a row of vertices their lengths [m]."""
     ends = np.column_stack([line[:-1], line[1:], line[:-1], line[1:]])
-    return _ties(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
+    return _equations(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
 def straight_equations(line: IntArray) -> ConstraintEquations:
-    """Every inner vertex of a row on the straight line between its ends."""
+    """Return equations that put every inner vertex of a row on the straight line between its ends."""
     inner = line[1:-1]
     ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
-    return _ties(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
+    return _equations(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
 
 
 def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> ConstraintEquations:
-    """Every inner vertex of a row held, softly, at its present distance from chords of the row around it.
+    """Return springs that hold every inner vertex of a row at its present distance from chords of the row around it.
 
-    Where ties ask for more length than the cloth gives, a row of vertices would find it in waves, at the price of a little
-    shear. A wave changes the distance from a chord of its own length by its whole height, a curve that bends otherwise by a
-    share of the square of the chord. What pushes a row into waves are threads that are to be longer, and they push the more the
-    shorter the waves. So the chords span two edges, four, eight and so on up to `WAVE`, and their springs go with the threads'
-    stiffness and against the square of the span, however fine the mesh and however soft the cloth is in shear.
+    Where equations ask for more length than the cloth gives, a row of vertices would find it in waves, at the price of
+    a little shear. A wave changes the distance from a chord of its own length by its whole height; a smoother curve
+    changes it by a share of the square of the chord. Threads that must become longer push a row into waves, with a
+    force that grows as the waves become shorter. So the chords span two edges, four, eight and so on up to `WAVE`. The
+    stiffness of their springs is proportional to the threads' stiffness and to the inverse square of the span, for any
+    mesh size and shear stiffness.
 
     Args:
         line: vertices.
         positions: #V by 2, where the distances are taken [m].
-        fold: vertices on an upright fold, if there is one. A row that ends there goes on beyond it as its mirror image, and
-            each half has half of what holds the end.
+        fold: vertices on an upright fold, if there is one. A row that ends there continues beyond it as its mirror
+            image, and each half has half of the springs at the end.
     """
     step = float(segment_lengths(positions[line]).mean())
-    ties, reach = [], 1
+    springs, reach = [], 1
     while reach == 1 or (2 * reach * step <= WAVE and 2 * reach < len(line)):
         soft = SMOOTH * WAVE / (2 * step) / reach**2
-        ties.append(_from_chords(line, positions, reach, soft))
+        springs.append(_from_chords(line, positions, reach, soft))
         if fold is not None:
-            ties.append(_from_mirror_image(line, positions, fold, reach, soft))
+            springs.append(_from_mirror_image(line, positions, fold, reach, soft))
         reach *= 2
-    return one_group(*ties)
+    return one_group(*springs)
 
 
 def _from_chords(line: IntArray, positions: FloatArray, reach: int, soft: float) -> ConstraintEquations:
-    """Each vertex held at its distance from the chord of those so many edges before and after it."""
+    """Return springs that hold each vertex's distance from the chord of those `reach` edges before and after."""
     here, before, after = line[reach:-reach], line[: -2 * reach], line[2 * reach :]
     chord, away = positions[after] - positions[before], positions[here] - positions[before]
     cross = chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]
     distance = cross / np.maximum(np.linalg.norm(chord, axis=1), np.finfo(np.float64).tiny)
-    ties = _ties(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
-    return replace(ties, soft=np.full(len(here), soft))
+    springs = _equations(np.column_stack([here, before, after, here]), STRAIGHT, target=distance, tolerance=np.inf)
+    return replace(springs, soft=np.full(len(here), soft))
 
 
 def _from_mirror_image(
     line: IntArray, positions: FloatArray, fold: IntArray, reach: int, soft: float
 ) -> ConstraintEquations:
-    """The ends on an upright fold held at their distance from the chord of the vertex so many edges before and its mirror image."""
+    """Return springs that hold the ends on a fold at their distance from the chord to the vertex `reach` edges before.
+
+    The chord runs between that vertex and its mirror image.
+    """
     rows = [(row[reach], row[0]) for row in (line, line[::-1]) if row[0] in fold and row[reach] not in fold]
     ends = np.array([(before, end, end, end) for before, end in rows], dtype=np.int32).reshape(-1, 4)
     lever = np.zeros((len(rows), 4, 2))
     lever[:, 0, 1], lever[:, 1, 1] = -1.0, 1.0
     target = np.einsum("pjk,pjk->p", lever, positions[ends])
-    ties = _ties(ends, LINEAR, target=target, lever=lever, tolerance=np.inf)
-    return replace(ties, soft=np.full(len(rows), soft / 2))
+    springs = _equations(ends, LINEAR, target=target, lever=lever, tolerance=np.inf)
+    return replace(springs, soft=np.full(len(rows), soft / 2))
 
 
 def level_equations(line: IntArray, across: FloatArray) -> ConstraintEquations:
-    """The ends of a row of vertices at the same place across a direction: `across` is the unit vector at right angles."""
+    """Return the equation that puts both ends of a row at the same place along the unit vector `across`."""
     ends = np.array([[line[0], line[-1], line[0], line[0]]])
     lever = np.zeros((1, 4, 2))
     lever[0, 0], lever[0, 1] = -across, across
-    return _ties(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
+    return _equations(ends, LINEAR, lever=lever, tolerance=_PLACE_TOLERANCE)
 
 
 def mirror_equations(pairs: IntArray, axis: IntArray, across: FloatArray, place: float) -> ConstraintEquations:
-    """The first vertex of each pair (#Q by 2) the mirror image of the second, and those of the axis (#A) on it.
+    """Return equations that make pairs of vertices mirror images, and put the axis's vertices on the axis.
 
     Args:
-        pairs, axis: vertices.
+        pairs: #Q by 2, vertices. axis: #A, vertices.
         across: unit vector at right angles to the axis.
-        place: of the axis along `across` [m].
+        place: position of the axis along `across` [m].
     """
     along = np.array([-across[1], across[0]])
     first, second = pairs[:, 0], pairs[:, 1]
@@ -224,10 +231,10 @@ def mirror_equations(pairs: IntArray, axis: IntArray, across: FloatArray, place:
     lever[count : 2 * count, 0], lever[count : 2 * count, 1] = along, -along
     lever[2 * count :, 0] = across
     target = np.concatenate([np.full(count, 2.0 * place), np.zeros(count), np.full(len(axis), place)])
-    return _ties(np.concatenate([both, both, own]), LINEAR, target=target, lever=lever, tolerance=_PLACE_TOLERANCE)
+    return _equations(np.concatenate([both, both, own]), LINEAR, target=target, lever=lever, tolerance=_PLACE_TOLERANCE)
 
 
-def _ties(
+def _equations(
     ends: ArrayLike,
     kind: int,
     *,

@@ -1,7 +1,7 @@
-"""Tightness: how a pattern sits when it is worn, and how much smaller it is cut to sit tight.
+"""The fit of a pattern when it is worn: strain, tension, pressure, and regions beyond the fabric's limit.
 
-Worn, the cloth lies on the body point for point as it was flattened. Strain and tension follow from that, and what the
-cloth presses onto the skin is its tension times the curvature of the body along it (Laplace's law).
+Worn, the cloth lies on the body point for point as it was flattened. Strain and tension follow from that. The pressure
+on the skin is the tension times the curvature of the body along it (Laplace's law).
 """
 
 from __future__ import annotations
@@ -15,10 +15,13 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.sorting import counting_sort
+from warpflat.core.sums import weighted_percentiles
 from warpflat.fabric.fabric import Fabric
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import worn_cells
-from warpflat.model.wear import SKIN_LENGTH, curvature_along, smoothed_along
+from warpflat.model.strain import worn_cell_strain
+from warpflat.model.wear import SKIN_LENGTH, smooth_face_values, thread_curvatures
+from warpflat.surface.connectivity import components
 from warpflat.surface.energy_map import place_in_words
 from warpflat.surface.mesh import Surface
 
@@ -36,7 +39,7 @@ MAPS: dict[str, tuple[str, float, str]] = {
     "tension_weft": ("tension along weft", 1.0, "N/m"),
     "pressure": ("pressure on the skin", 1.0, "Pa"),
 }
-"""What is known of each face: a name for people, the factor to their unit, and that unit."""
+"""The maps of a worn pattern by attribute: title, factor to the unit shown, and that unit."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,7 +65,7 @@ class Misfit:
 
     @cached_property
     def words(self) -> str:
-        """What is wrong and where, for a pattern maker. Seldom asked for: a rough mesh has thousands of regions."""
+        """The misfit and its place in words, for a pattern maker."""
         state = "stretched" if self.worst > 0 else "slack"
         return (
             f"{state} {100 * abs(self.worst):.1f} % along {self.thread} (limit {100 * self.limit:.3g} %), "
@@ -72,7 +75,7 @@ class Misfit:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class WornFit:
-    """A pattern as worn. Arrays are #F, means over each face by flat area.
+    """The fit of a pattern as worn; arrays are #F, means over each face by flat area.
 
     Attributes:
         strain_warp, strain_weft: length on the body over length flat, minus 1.
@@ -102,33 +105,31 @@ class WornFit:
 
     @property
     def fits(self) -> bool:
-        """Whether no more than 1 % of the cloth is strained beyond the fabric's limit, either way."""
+        """Whether at most 1 % of the cloth is strained beyond the fabric's limit, stretched or slack."""
         return self.outside <= TOLERATED
 
     def as_dict(self) -> dict[str, Any]:
-        """As in `metrics.json`: fractions, N/m and Pa, each at 5, 50 and 95 % of the area, least, most and mean."""
+        """Return the entries for `metrics.json`: fractions, N/m and Pa, with percentiles by area, extremes and mean."""
         return {
             "fits": self.fits,
             "strain_limit": self.limit,
             "outside": self.outside,
             "hollow": self.hollow,
             "where_not": [misfit.words for misfit in self.misfits[:3]],
-            **{name: _spread(getattr(self, name), self.area) for name in MAPS},
+            **{name: _distribution(getattr(self, name), self.area) for name in MAPS},
         }
 
 
-def _spread(values: FloatArray, area: FloatArray) -> dict[str, float]:
-    from warpflat.core.sums import weighted_percentiles
-
+def _distribution(values: FloatArray, area: FloatArray) -> dict[str, float]:
     percents = (5, 50, 95)
     at = weighted_percentiles(values, area, [percent / 100 for percent in percents])
-    spread = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
+    percentiles = {f"p{percent:02d}": value for percent, value in zip(percents, at, strict=True)}
     mean = float(values @ area) / max(float(area.sum()), 1e-300)
-    return {"min": float(values.min()), **spread, "max": float(values.max()), "mean": mean}
+    return {"min": float(values.min()), **percentiles, "max": float(values.max()), "mean": mean}
 
 
 def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grain_angle: float = 0.0) -> WornFit:
-    """How a given pattern of a surface sits in a fabric.
+    """Return the fit of a given pattern of a surface in a fabric.
 
     Args:
         surface: the piece on the body.
@@ -137,7 +138,7 @@ def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grai
         grain_angle: of the warp against +y, degrees.
 
     Raises:
-        InputError: the pattern is no such array.
+        InputError: the pattern has another shape, or numbers that are not finite.
     """
     flat = np.asarray(pattern, dtype=np.float64)
     if flat.shape != (len(surface.vertices), 2) or not np.isfinite(flat).all():
@@ -146,7 +147,7 @@ def assess_pattern(surface: Surface, fabric: Fabric, pattern: ArrayLike, *, grai
 
 
 def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_length: float = SKIN_LENGTH) -> WornFit:
-    """How a layout (#V by 2 [m]) of the network's surface sits in the network's fabric, whatever the model.
+    """Return the fit of a layout (#V by 2 [m]) of the network's surface in the network's fabric, with any model.
 
     Args:
         network: of the piece.
@@ -154,10 +155,10 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         smoothing_length: over which the pressure is averaged [m].
     """
     fabric, surface = network.fabric, network.surface
-    # By the fabric's own law with its curves, whatever the model.
-    strain, stress, _, area = (np.array(of.numpy()) for of in worn_cells(network, positions, "membrane"))
+    # By the fabric's own law with its curves, with any model.
+    strain, stress, _, area = (np.array(of.numpy()) for of in worn_cell_strain(network, positions, "membrane"))
     area = np.maximum(area, 0.0)
-    along_warp, along_weft, crossed = curvature_along(network, positions)
+    along_warp, along_weft, crossed = thread_curvatures(network, positions)
     lengths = 1.0 + strain[:, :2]
     # sigma = P F^T / J: force per worn width, and per worn area times curvature.
     spread = np.maximum(np.sqrt(np.maximum((lengths[:, 0] * lengths[:, 1]) ** 2 - strain[:, 2] ** 2, 0.0)), 1e-12)
@@ -174,7 +175,7 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
         total = np.bincount(face, area * values, minlength=faces)
         return np.asarray(np.divide(total, face_area, out=np.zeros(faces), where=face_area > 0.0))
 
-    pressure = smoothed_along(surface, mean(load), smoothing_length)
+    pressure = smooth_face_values(surface, mean(load), smoothing_length)
     weight = np.maximum(face_area, 0.0)
     strain_warp, strain_weft = mean(strain[:, 0]), mean(strain[:, 1])
     excess = np.maximum(np.abs(strain_warp), np.abs(strain_weft)) - fabric.strain_limit
@@ -198,8 +199,6 @@ def assess_fit(network: SpringNetwork, positions: FloatArray, *, smoothing_lengt
 def _misfits(
     surface: Surface, warp: FloatArray, weft: FloatArray, excess: FloatArray, area: FloatArray, limit: float
 ) -> tuple[Misfit, ...]:
-    from warpflat.core.sorting import counting_sort
-    from warpflat.surface.connectivity import components
 
     outside = np.flatnonzero(excess > 1e-9)
     if len(outside) == 0:

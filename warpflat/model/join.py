@@ -18,7 +18,7 @@ __all__ = ["join_networks", "join_surfaces"]
 
 
 def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
-    """One surface of several, without their lines: the vertices and faces of the first one, then of the next."""
+    """Return several surfaces as one, without their lines: vertices and faces of the first, then of the next."""
     vertices = np.concatenate([surface.vertices for surface in surfaces])
     first = range_offsets([len(surface.vertices) for surface in surfaces])
     return Surface(
@@ -33,18 +33,21 @@ def join_surfaces(surfaces: Sequence[Surface]) -> Surface:
 
 
 def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
-    """The networks as one, with them for its parts; nothing is sorted or measured again. A single one is returned as it is.
+    """Return the networks as one that has them as its parts; nothing is sorted or measured again.
+
+    A single network is returned as it is.
 
     Args:
-        networks: of one fabric, grain, model and device; of all or of none a stretch is meant. Nothing is sewn or guided yet.
+        networks: of one fabric, grain, model and device; all or none with an intended stretch. Nothing is sewn or fixed
+            yet.
     """
     first = networks[0]
     if len(networks) == 1:
         return first
     vertex = range_offsets([net.vertex_count for net in networks])
     stretches = [net.stretch for net in networks if net.stretch is not None]
-    held = [net.held for net in networks if net.held is not None]
-    hold = np.concatenate([np.broadcast_to(net.shear_hold, net.face_count) for net in networks])
+    held = [net.held_stiffness for net in networks if net.held_stiffness is not None]
+    buckling = np.concatenate([np.broadcast_to(net.buckling_stiffness, net.face_count) for net in networks])
     return SpringNetwork(
         surface=join_surfaces([net.surface for net in networks]),
         fabric=first.fabric,
@@ -54,14 +57,14 @@ def join_networks(networks: Sequence[SpringNetwork]) -> SpringNetwork:
         device=first.device,
         model=first.model,
         stretch=np.concatenate(stretches) if stretches else None,
-        held=np.concatenate(held) if held else None,
-        shear_hold=float(hold[0]) if (hold == hold[0]).all() else hold,
+        held_stiffness=np.concatenate(held) if held else None,
+        buckling_stiffness=float(buckling[0]) if (buckling == buckling[0]).all() else buckling,
         parts=tuple(networks),
     )
 
 
-def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> FloatArray | None:
-    """#F by so many, what `SpringArrays` have of their faces under a name; None where no piece has any."""
+def _join_face_values(networks: Sequence[SpringNetwork], name: str, depth: int) -> FloatArray | None:
+    """Return the values of the faces that `SpringArrays` have under a name, #F by `depth`; None if no piece has any."""
     arrays = [getattr(net.spring_arrays, name) for net in networks]
     if not any(array is not None for array in arrays):
         return None
@@ -71,7 +74,12 @@ def _join_of_faces(networks: Sequence[SpringNetwork], name: str, depth: int) -> 
 
 
 def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> SpringArrays:
-    """Numbered mesh edges first, then diagonals, as in each. vertex: the first of each in the whole's numbering."""
+    """Join springs, numbered mesh edges first, then diagonals, as in each network.
+
+    Args:
+        networks: the parts.
+        vertex: #parts, the first vertex of each in the joined numbering.
+    """
     springs = [net.spring_arrays for net in networks]
     edge = range_offsets([s.edge_count for s in springs])
     diagonal = edge[-1] + range_offsets([s.count - s.edge_count for s in springs])
@@ -94,8 +102,8 @@ def _join_springs(networks: Sequence[SpringNetwork], vertex: IntArray) -> Spring
         listed_length=np.concatenate([s.listed_length for s in springs]),
         listed_stiffness=np.concatenate([s.listed_stiffness for s in springs]),
         edge_count=int(edge[-1]),
-        lack=_join_of_faces(networks, "lack", 2),
-        wave=_join_of_faces(networks, "wave", 4),
+        shear_deficit=_join_face_values(networks, "shear_deficit", 2),
+        hourglass=_join_face_values(networks, "hourglass", 4),
     )
 
 

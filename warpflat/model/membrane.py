@@ -1,4 +1,4 @@
-"""The fabric as the membrane that is measured as worn (`warpflat.kernels.membrane`), and the matrix of its steps."""
+"""The fabric as a membrane that is measured as worn (`warpflat.kernels.membrane`), and the matrix of its steps."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.fabric.fabric import Curve, Fabric
 from warpflat.kernels.membrane import Cloth
 
-__all__ = ["MODELS", "Model", "check_model", "cloth_of", "corner_sums", "step_matrix"]
+__all__ = ["MODELS", "Model", "check_model", "corner_sums", "make_cloth", "step_matrix"]
 
 
 Model = Literal["springs", "membrane"]
@@ -20,19 +20,19 @@ MODELS: tuple[Model, ...] = ("springs", "membrane")
 
 
 def check_model(model: str) -> None:
-    """Raise InputError for an unknown model; names the nearest."""
+    """Raise InputError, with the nearest name, for an unknown model."""
     if model not in MODELS:
         raise InputError(f"model {model!r} is unknown: {nearest(str(model), MODELS)}")
 
 
 def plane_stress(fabric: Fabric) -> tuple[float, float, float]:
-    """c_warp, c_weft, c_cross [N/m] of an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21)."""
+    """Return c_warp, c_weft, c_cross [N/m] of an orthotropic sheet: c_warp = K_warp / (1 - nu_12 nu_21)."""
     nu = fabric.poisson_ratio
     share = 1.0 / (1.0 - nu * nu * fabric.stiffness_weft / fabric.stiffness_warp)
     return fabric.stiffness_warp * share, fabric.stiffness_weft * share, nu * fabric.stiffness_weft * share
 
 
-def cloth_of(
+def make_cloth(
     fabric: Fabric,
     axes: tuple[FloatArray, FloatArray],
     device: wp.Device,
@@ -40,21 +40,21 @@ def cloth_of(
     curves: bool = True,
     held: FloatArray | None = None,
 ) -> Cloth:
-    """The fabric as the kernels take it.
+    """Return the fabric as the membrane's kernels take it.
 
     Args:
-        fabric: with its curves, if `curves`; else with its secant stiffnesses only.
+        fabric: the cloth.
         axes: unit vectors of warp and weft in the plane.
         device: for its arrays.
-        curves: whether J-shaped curves count.
-        held: 3 #C, what the matrix of the step holds of each cell's corners [N/m]; for forces only.
+        curves: use its J-shaped curves; otherwise its secant stiffnesses only.
+        held: 3 #C, stiffness in the step's matrix at each cell's corners [N/m]; needed for forces only.
     """
     cloth = Cloth()
     cloth.warp, cloth.weft = wp.vec2d(*axes[0]), wp.vec2d(*axes[1])
     cloth.c_warp, cloth.c_weft, cloth.c_cross = plane_stress(fabric)
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft
-    # Half of a thread's own: then no more is asked of the step than along the threads.
+    # Half of a thread's own stiffness: then the step is no stiffer than along the threads.
     cloth.lock = 0.5 * min(fabric.stiffness_warp, fabric.stiffness_weft)
     cloth.compression = fabric.compression_factor
     for direction in ("warp", "weft"):
@@ -82,11 +82,11 @@ def step_matrix(
     positions: FloatArray,
     stretch: FloatArray,
 ) -> tuple[FloatArray, FloatArray]:
-    """k_ij [N/m] that bound the membrane's stiffness at small strain, whatever the mesh.
+    """Return k_ij [N/m] that bound the membrane's stiffness at small strain on any mesh.
 
     The energy of a small displacement u is at most that of a scalar Laplacian with the conductivities
-    max(c_warp + c_cross, 2 G) along the warp and max(c_weft + c_cross, 2 G) along the weft; its weights are cotangents in
-    that metric, and negative ones may be left out of a bound. On rectangles along the grain they are the structural
+    max(c_warp + c_cross, 2 G) along the warp and max(c_weft + c_cross, 2 G) along the weft; its weights are cotangents
+    in that metric, and negative ones may be left out of a bound. On rectangles along the grain they are the structural
     springs'.
 
     Args:
@@ -94,14 +94,32 @@ def step_matrix(
         axes: unit vectors of warp and weft in the plane.
         corner, edges, area: the cells, as `warpflat.surface.cells.CellArrays` has them.
         positions: #V by 2, a layout that says how each cell lies in the plane [m].
-        stretch: #C by 2, length worn over length flat that is meant along warp and weft.
+        stretch: #C by 2, intended length worn over length flat along warp and weft.
 
     Returns:
         #C by 3, weights of the cell's edges 0-1, 1-2, 2-0, and #C by 3, their sums at its corners.
     """
+    det = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
+    turned = _gradients_in_cloth(corner, edges, det, positions)
+    along = np.stack([turned @ axes[0], turned @ axes[1]], axis=-1) * stretch[:, None, :]
+    c_warp, c_weft, c_cross = plane_stress(fabric)
+    shear = 2.0 * fabric.shear_stiffness
+    conductivity = np.array([max(c_warp + c_cross, shear), max(c_weft + c_cross, shear)])
+    flat = np.where(det > 0.0, area / (stretch[:, 0] * stretch[:, 1]), 0.0)
+    weights = np.stack(
+        [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
+        axis=1,
+    )
+    return weights, corner_sums(weights)
+
+
+def _gradients_in_cloth(corner: IntArray, edges: FloatArray, det: FloatArray, positions: FloatArray) -> FloatArray:
+    """Return the gradients of the corners' barycentric weights in the plane of the cloth, #C by 3 by 2 [1/m].
+
+    Each cell keeps its shape on the body and has the rotation it has in the layout.
+    """
     p = positions[corner]
     D = np.stack([p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]], axis=-1)
-    det = edges[:, 0, 0] * edges[:, 1, 1] - edges[:, 0, 1] * edges[:, 1, 0]
     safe = np.where(det > 0.0, det, 1.0)
     inverse = (
         np.stack(
@@ -115,30 +133,21 @@ def step_matrix(
     )
     turn = D @ inverse
     angle = np.arctan2(turn[:, 1, 0] - turn[:, 0, 1], turn[:, 0, 0] + turn[:, 1, 1])
-    # Rows of `inverse` are the gradients of corners 1 and 2 in the cell's own frame; the cell turned by `angle` is the cloth.
+    # Rows of `inverse` are the gradients of corners 1 and 2 in the cell's own frame; the cell turned by `angle` is the
+    # cloth.
     c, s = np.cos(angle), np.sin(angle)
     gradients = np.stack([-(inverse[:, 0] + inverse[:, 1]), inverse[:, 0], inverse[:, 1]], axis=1)
-    turned = np.stack(
+    return np.stack(
         [
             c[:, None] * gradients[..., 0] - s[:, None] * gradients[..., 1],
             s[:, None] * gradients[..., 0] + c[:, None] * gradients[..., 1],
         ],
         axis=-1,
     )
-    along = np.stack([turned @ axes[0], turned @ axes[1]], axis=-1) * stretch[:, None, :]
-    c_warp, c_weft, c_cross = plane_stress(fabric)
-    shear = 2.0 * fabric.shear_stiffness
-    conductivity = np.array([max(c_warp + c_cross, shear), max(c_weft + c_cross, shear)])
-    flat = np.where(det > 0.0, area / (stretch[:, 0] * stretch[:, 1]), 0.0)
-    weights = np.stack(
-        [np.maximum(-flat * ((along[:, i] * along[:, j]) @ conductivity), 0.0) for i, j in ((0, 1), (1, 2), (2, 0))],
-        axis=1,
-    )
-    return weights, corner_sums(weights)
 
 
 def corner_sums(weights: FloatArray) -> FloatArray:
-    """#C by 3, sums at the cells' corners of the weights along their edges 0-1, 1-2, 2-0."""
+    """Return the sums at the cells' corners of the weights along their edges 0-1, 1-2, 2-0, #C by 3."""
     return np.stack(
         [weights[:, 2] + weights[:, 0], weights[:, 0] + weights[:, 1], weights[:, 1] + weights[:, 2]], axis=1
     )

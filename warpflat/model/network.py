@@ -1,28 +1,29 @@
 """SpringNetwork: a surface and a fabric as the arrays of a mass-spring model on a device.
 
-**Springs** (`warpflat.model.springs`) have their rest lengths from the surface in space, their stiffnesses from the fabric; **cells**
-(`warpflat.surface.cells`) their shape from the surface.
+**Springs** (`warpflat.model.springs`) have their rest lengths from the surface in space and their stiffnesses from the
+fabric. **Cells** (`warpflat.surface.cells`) have their shape from the surface.
 
 **Threads stay straight.** Edge springs alone have minima that no cloth has. A compressed spring pushes its ends
-sideways, k (1 - L/l) < 0, so a thread compressed by more than G/K kinks between its neighbours at the scale of the mesh,
-and faces fold over, at *lower* spring energy than any unfolded layout. In cloth the threads are straight in the plane
-and it is the body that stretches them, so the network adds, per cell, what such a thread stores beyond the strain at
-which the springs lose their hold,
+sideways, k (1 - L/l) < 0, so a thread compressed by more than G/K kinks between its neighbours at the scale of the
+mesh, and faces fold over, at *lower* spring energy than any unfolded layout. In cloth the threads are straight in the
+plane, and the body stretches them. So the network adds, per cell, the energy of such a thread beyond the strain at
+which the springs buckle,
 
     a [1/2 K_warp <|F e_warp| - 1 - G/K_warp>^2 + 1/2 K_weft <|F e_weft| - 1 - G/K_weft>^2],    <x> = max(x, 0),
 
-with F from the plane to the surface and a the flat area. It is zero below the onset, it makes the energy convex against
-kinks (its sideways stiffness outweighs the springs' loss), and it grows without bound as a cell collapses, so that no
-face can be mirrored. Its share is reported as `guard_energy_j`.
+with F from the plane to the surface and a the flat area. This guard is zero below its onset. It makes the energy convex
+against kinks, since its sideways stiffness outweighs the springs' negative one. It grows without bound as a cell
+collapses, so that no face can be mirrored. Its energy is reported as `guard_energy_j`.
 
-**Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs of all of G would be stiffer than the fabric, and
-hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.lack`), and their cells add a 1/2 G' (F s . F t)^2
-for what is missing, s along the quad and t across; it counts among the guard's. And where too little of the structural springs is left to
-hold a vertex against its four neighbours, quads are held against such waves (`SpringArrays.wave`).
+**Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs with all of G would be stiffer
+than the fabric, and would hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.shear_deficit`),
+and their cells add a 1/2 G' (F s . F t)^2 for the deficit G', s along the quad and t across; it counts among the
+guard's energy. Where the structural springs left are too weak to hold a vertex against its four neighbours, quads have
+hourglass stiffness (`SpringArrays.hourglass`).
 
-**Or a membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`):
-exact on any mesh, and without a guard. The springs then pull at nothing; their k_ij, set so that they bound the membrane's
-stiffness, stay the matrix of the approximate implicit step.
+**Membrane.** With `model = "membrane"` the cloth is measured as worn, cell by cell (`warpflat.kernels.membrane`): exact
+on any mesh, and without a guard. The springs then have no force. Their k_ij bound the membrane's stiffness, and are
+still the matrix of the approximate implicit step.
 """
 
 from __future__ import annotations
@@ -41,14 +42,14 @@ from warpflat.core.launch import launch_each
 from warpflat.core.sorting import counting_sort
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.kernels.cells import Cells, ThreadGuard, compute_guard_energy, evaluate_guard
-from warpflat.kernels.constraints import Seams, compute_seam_misses
+from warpflat.kernels.constraints import Seams, compute_seam_residuals
 from warpflat.kernels.implicit import Bonds
 from warpflat.kernels.line_solve import ThreadLines
 from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_membrane
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
-from warpflat.model.membrane import Model, check_model, cloth_of, step_matrix
-from warpflat.model.springs import SpringArrays, shear_hold, shortened, springs_of, with_stiffness
+from warpflat.model.membrane import Model, check_model, make_cloth, step_matrix
+from warpflat.model.springs import SpringArrays, measure_buckling_stiffness, shorten_springs, springs_of, with_stiffness
 from warpflat.surface.cells import CellArrays, cells_of
 from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
 from warpflat.surface.mesh import Surface
@@ -56,12 +57,12 @@ from warpflat.surface.mesh import Surface
 __all__ = ["SpringNetwork"]
 
 
-# Eq. (10) cuts a Neumann series off after its second term, and leaves a mode in which the two ends of one spring that
-# outweighs all others move against each other (the short side of a needle) without any correction; this share of the
-# stiffest spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
+# Eq. (10) truncates a Neumann series after its second term. Where one spring outweighs all others (the short side of a
+# needle), the mode in which its two ends move against each other would get no correction. This share of the stiffest
+# spring, added to the sum around a vertex, restores it. On a regular grid it costs a few per cent of the steps.
 _PAIR_SHARE = 0.5
-# K/G from which two of the steps on a lattice are one along its lines, and up to which what is left of a layout that has been carried up
-# from a coarser grid is rough.
+# K/G from which smoothing on a lattice uses line relaxation, and K/G up to which a layout interpolated from a coarser
+# grid has only rough errors.
 _SOFT = 12.0
 _STIFF = 5.0
 
@@ -72,14 +73,15 @@ class SpringNetwork:
 
     Attributes:
         surface, fabric, grain_angle: what it was made from.
-        spring_arrays, cell_arrays: the same on the host.
-        model: "springs", with their guard, or "membrane".
-        stretch: #F by 2, length worn over length flat that is meant along warp and weft; None where none is.
-        held: #C by 3, what the k_ij hold of each cell's corners [N/m], for a membrane.
-        shear_hold: shear stiffness of the springs that keeps threads straight [N/m], one for all or #F; the fabric's where that is less.
-        parts: the networks of which this one was joined, to be relaxed side by side (see `warpflat.model.join`); none of any other.
-        springs, cells, guard, cloth: what the kernels take.
+        spring_arrays, cell_arrays: the springs and cells on the host.
         device: Warp device.
+        model: "springs", with their guard, or "membrane".
+        stretch: #F by 2, intended length worn over length flat along warp and weft; None if none is intended.
+        held_stiffness: #C by 3, stiffness of the k_ij at each cell's corners [N/m], for a membrane.
+        buckling_stiffness: shear stiffness with which the springs keep threads straight [N/m], one for all or #F; the
+            fabric's where that is less.
+        parts: the networks from which this one was joined (see `warpflat.model.join`); empty for any other.
+        springs, cells, guard, cloth, seams, bonds: the structs that the kernels take.
     """
 
     surface: Surface
@@ -90,8 +92,8 @@ class SpringNetwork:
     device: wp.Device
     model: Model = "springs"
     stretch: FloatArray | None = None
-    held: FloatArray | None = None
-    shear_hold: float | FloatArray = np.inf
+    held_stiffness: FloatArray | None = None
+    buckling_stiffness: float | FloatArray = np.inf
     parts: Sequence[SpringNetwork] = ()
     springs: Springs = field(init=False)
     cells: Cells = field(init=False)
@@ -111,19 +113,19 @@ class SpringNetwork:
         device: str | wp.Device | None = None,
         model: Model = "springs",
         stretch: FloatArray | None = None,
-        hold: float | None = None,
+        buckling_stiffness: float | None = None,
     ) -> SpringNetwork:
-        """Network for the surface, with directions measured in the layout `positions` (#V by 2 [m]).
+        """Make the network of a surface.
 
         Args:
-            surface, fabric: what it is of.
-            positions: #V by 2, a layout [m].
+            surface, fabric: the cloth on the body.
+            positions: #V by 2, the layout in which the directions of springs are measured [m].
             grain_angle: of the warp against +y, degrees.
             device: Warp device.
             model: "springs" or "membrane".
-            stretch: #F by 2, length worn over length flat that is meant along warp and weft. Springs and cells then are at
-                rest in a pattern that is so much smaller.
-            hold: `shear_hold`, if it is not to be measured.
+            stretch: #F by 2, intended length worn over length flat along warp and weft. Springs and cells are then at
+                rest in a pattern that is smaller by this factor.
+            buckling_stiffness: [N/m]; measured if not given.
 
         Raises:
             InputError: an unknown model.
@@ -131,16 +133,16 @@ class SpringNetwork:
         check_model(model)
         springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), cells_of(surface)
         if stretch is not None:
-            springs = shortened(springs, surface, positions, grain_axes(grain_angle), stretch)
+            springs = shorten_springs(springs, surface, positions, grain_axes(grain_angle), stretch)
         held = None
         if model == "membrane":
-            meant = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
+            intended = np.ones((len(cells.laid), 2)) if stretch is None else stretch[cells.face]
             weights, held = step_matrix(
-                fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, meant
+                fabric, grain_axes(grain_angle), cells.corner, cells.edges, cells.area, positions, intended
             )
-            springs, hold = with_stiffness(springs, cells, weights), np.inf
-        elif hold is None:
-            hold = shear_hold(surface, springs, positions, grain_axes(grain_angle)[0])
+            springs, buckling_stiffness = with_stiffness(springs, cells, weights), np.inf
+        elif buckling_stiffness is None:
+            buckling_stiffness = measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
         return cls(
             surface=surface,
             fabric=fabric,
@@ -150,8 +152,8 @@ class SpringNetwork:
             device=wp.get_device(device),
             model=model,
             stretch=stretch,
-            held=held,
-            shear_hold=hold,
+            held_stiffness=held,
+            buckling_stiffness=buckling_stiffness,
         )
 
     def __post_init__(self) -> None:
@@ -161,9 +163,9 @@ class SpringNetwork:
         springs.offset = _on(device, at.offset, wp.int32)
         springs.neighbor = _on(device, at.neighbor, wp.int32)
         springs.rest_length = _on(device, s.listed_length, wp.float64)
-        springs.pull = 1.0 if self.model == "springs" else 0.0
+        springs.active = 1.0 if self.model == "springs" else 0.0
         self.springs = springs
-        self.make_springs(s.listed_stiffness)
+        self.replace_stiffness(s.listed_stiffness)
 
         cells = Cells()
         cells.face = _on(device, c.faces, wp.vec4i)
@@ -172,13 +174,13 @@ class SpringNetwork:
         cells.offset = _on(device, corners.offset, wp.int32)
         cells.slot = _on(device, corners.entry, wp.int32)
         fabric, faces = self.fabric, self.face_count
-        hold = np.minimum(fabric.shear_stiffness, self.shear_hold)
-        onset = np.stack([hold / fabric.stiffness_warp, hold / fabric.stiffness_weft], axis=-1)
+        buckling = np.minimum(fabric.shear_stiffness, self.buckling_stiffness)
+        onset = np.stack([buckling / fabric.stiffness_warp, buckling / fabric.stiffness_weft], axis=-1)
         cells.onset = _on(device, np.broadcast_to(onset, (faces, 2)), wp.vec2d)
-        same = partial(_same, device.alias)
+        same = partial(_constant, device.alias)
         cells.slack = same(wp.vec2d, 1.0, faces) if self.stretch is None else _on(device, 1.0 / self.stretch, wp.vec2d)
-        cells.shear = same(wp.vec2d, 0.0, faces) if s.lack is None else _on(device, s.lack, wp.vec2d)
-        cells.wave = same(wp.vec4d, 0.0, faces) if s.wave is None else _on(device, s.wave, wp.vec4d)
+        cells.shear = same(wp.vec2d, 0.0, faces) if s.shear_deficit is None else _on(device, s.shear_deficit, wp.vec2d)
+        cells.hourglass = same(wp.vec4d, 0.0, faces) if s.hourglass is None else _on(device, s.hourglass, wp.vec4d)
         self.cells = cells
         self.bonds = Bonds()
         self.bonds.offset = same(wp.int32, 0, count + 1)
@@ -190,20 +192,21 @@ class SpringNetwork:
         guard.warp, guard.weft = wp.vec2d(*warp), wp.vec2d(*weft)
         guard.stiffness_warp, guard.stiffness_weft = fabric.stiffness_warp, fabric.stiffness_weft
         self.guard = guard
-        if self.held is not None:
-            # What exceeds the stretch that is meant is small, and measured with the secant stiffness.
-            self.cloth = cloth_of(fabric, (warp, weft), device, curves=self.stretch is None, held=self.held.ravel())
+        if self.held_stiffness is not None:
+            # Strain beyond an intended stretch is small, and measured with the secant stiffness.
+            held = self.held_stiffness.ravel()
+            self.cloth = make_cloth(fabric, (warp, weft), device, curves=self.stretch is None, held=held)
 
-    def make_springs(self, listed_stiffness: FloatArray) -> None:
-        """Make the springs anew, with these k_ij [N/m] (2 #S), before anything is recorded of them."""
+    def replace_stiffness(self, listed_stiffness: FloatArray) -> None:
+        """Give the springs other k_ij (2 #S [N/m]), before any launch is recorded over them."""
         self.spring_arrays = replace(self.spring_arrays, listed_stiffness=listed_stiffness)
-        # Those of a membrane follow it.
+        # Those of a membrane change with its layout.
         k_ij = listed_stiffness if self.model == "springs" else listed_stiffness.copy()
         self.springs.stiffness = _on(self.device, k_ij, wp.float64)
         vars(self).pop("spring_stiffness", None)
 
-    def weigh(self, stiffness: FloatArray) -> None:
-        """Give the springs (#S) of a membrane these k_ij [N/m]; `spring_arrays` keeps those that it was made with."""
+    def update_stiffness(self, stiffness: FloatArray) -> None:
+        """Set the k_ij of a membrane (#S [N/m]) on the device; `spring_arrays` keeps those of the beginning."""
         self.springs.stiffness.assign(self.spring_arrays.listed(stiffness))
         if "spring_stiffness" in vars(self):
             self._sum_stiffness(self.spring_stiffness)
@@ -212,73 +215,75 @@ class SpringNetwork:
         given = [self.springs.offset, self.springs.stiffness, _PAIR_SHARE]
         launch_each(sum_stiffness, self.vertex_count, given, [around], device=self.device)
 
-    # What only steps ask for: a network that is measured alone, or one of several that are stepped as one, has neither.
+    # Needed for steps only: a network that is only measured, or a part of a joined one, never makes them.
 
     @cached_property
     def mass(self) -> wp.array:
-        """#V [kg]."""
+        """The mass of each vertex, #V [kg]."""
         return _on(self.device, self.fabric.areal_density * self.cell_arrays.vertex_areas, wp.float64)
 
     @cached_property
     def spring_stiffness(self) -> wp.array:
-        """#V, sum of k_ij around each vertex, and a half of the stiffest [N/m]."""
+        """The sum of the k_ij around each vertex, plus half of the stiffest, #V [N/m]."""
         around = wp.empty(self.vertex_count, dtype=wp.float64, device=self.device)
         self._sum_stiffness(around)
         return around
 
     @property
     def cell_model(self) -> tuple[wp.Kernel, wp.Kernel, ThreadGuard | Cloth]:
-        """Kernels of the forces and of the energy on the cells, and their parameters."""
+        """The kernels of the cells' forces and energy, and their parameters."""
         if self.cloth is None:
             return evaluate_guard, compute_guard_energy, self.guard
         return evaluate_membrane, compute_membrane_energy, self.cloth
 
     @property
     def pieces(self) -> Sequence[SpringNetwork]:
-        """Of each piece that is relaxed on its own its network: the parts of a joined one, otherwise this one."""
+        """The network of each piece: the parts of a joined network, otherwise this one."""
         return self.parts or (self,)
 
     @property
-    def goes_along_lines(self) -> bool:
-        """Whether some of the steps go along the lines of its lattices, if it has any."""
+    def uses_line_relaxation(self) -> bool:
+        """Whether smoothing uses line relaxation on lattices."""
         return self.model == "springs" and self.fabric.softness >= _SOFT
 
     @property
     def is_stiff(self) -> bool:
-        """Whether steps alone bring it to rest that has been carried up from a coarser grid at rest."""
+        """Whether smoothing alone brings a layout to rest that was interpolated from a relaxed coarser grid."""
         return self.model == "springs" and self.fabric.softness < _STIFF
 
     @property
     def vertex_count(self) -> int:
-        """#V."""
+        """The number of vertices, #V."""
         return len(self.surface.vertices)
 
     @property
     def cell_count(self) -> int:
-        """#C."""
+        """The number of cells, #C."""
         return len(self.cell_arrays.laid)
 
     @property
     def face_count(self) -> int:
-        """#F."""
+        """The number of faces, #F."""
         return len(self.cell_arrays.faces)
 
     @property
     def seam_count(self) -> int:
-        """#P, pairs of edges that are sewn together."""
+        """The number of seam and constraint equations, #P."""
         return 0 if self.seams is None else len(self.seams.ends)
 
     @cached_property
     def line_arrays(self) -> LineArrays | None:
-        """The rows and columns of the pieces that lie on a lattice, along which steps may go; None where none does, or threads run across
-        them."""
+        """The rows and columns of pieces on a lattice along which line relaxation may go.
+
+        None if no piece lies on a lattice, or if threads run across the lines.
+        """
         if not self.parts:
             return lines_of(self.surface) if self.spring_arrays.aligned else None
         return join_lines([net.line_arrays for net in self.parts], [net.vertex_count for net in self.parts])
 
     @cached_property
     def lines(self) -> ThreadLines | None:
-        """The same on the device."""
+        """The lines of `line_arrays` on the device; None without lines."""
         arrays = self.line_arrays
         if arrays is None:
             return None
@@ -298,13 +303,13 @@ class SpringNetwork:
         target: FloatArray | None = None,
         lever: FloatArray | None = None,
     ) -> None:
-        """Hold lengths and places to one another (see `kernels.constraints`); by default, sew pairs of edges together.
+        """Add seam and constraint equations (see `kernels.constraints`); by default, sew pairs of edges together.
 
         Args:
             ends: #P by 4, vertices of the first edge, then of the second.
-            ratio: #P, wished length of the first over the second.
+            ratio: #P, intended length of the first over the second.
             stiffness: #P [N/m].
-            kind: #P, of `kernels.constraints`.
+            kind: #P, as in `kernels.constraints`.
             target: #P [m].
             lever: #P by 4 by 2.
         """
@@ -323,34 +328,34 @@ class SpringNetwork:
         self.bonds.offset = _on(device, offset, wp.int32)
         self.bonds.slot = _on(device, slot, wp.int32)
 
-    def seam_misses(self, position: wp.array) -> FloatArray:
-        """#P, c of each tie [m] in a layout (#V vec2d [m])."""
-        miss = wp.zeros(self.seam_count, dtype=wp.float64, device=self.device)
+    def seam_residuals(self, position: wp.array) -> FloatArray:
+        """Return c of each equation in a layout (#V vec2d [m]), #P [m]."""
+        residual = wp.zeros(self.seam_count, dtype=wp.float64, device=self.device)
         if self.seams is not None:
-            launch_each(compute_seam_misses, self.seam_count, [position, self.seams], [miss], device=self.device)
-        return np.array(miss.numpy(), dtype=np.float64)
+            launch_each(compute_seam_residuals, self.seam_count, [position, self.seams], [residual], device=self.device)
+        return np.array(residual.numpy(), dtype=np.float64)
 
     def seam_energy(self, position: wp.array) -> float:
-        """What all ties pull with, 1/2 k (c + offset)^2, in a layout (#V vec2d [m]) [J]."""
+        """Return the energy of all equations, 1/2 k (c + offset)^2, in a layout (#V vec2d [m]) [J]."""
         if self.seams is None:
             return 0.0
-        stretch = self.seam_misses(position) + self.seams.offset.numpy()
-        return 0.5 * float(self.seams.stiffness.numpy() @ stretch**2)
+        residual = self.seam_residuals(position) + self.seams.offset.numpy()
+        return 0.5 * float(self.seams.stiffness.numpy() @ residual**2)
 
-    def guide(self, vertices: IntArray) -> None:
-        """Let these vertices move up and down only, as on a fold or a straight centre front."""
+    def keep_vertical(self, vertices: IntArray) -> None:
+        """Restrict vertices to motion along y, as on a fold or a straight centre front."""
         freedom = np.ones((self.vertex_count, 2))
         freedom[vertices, 0] = 0.0
         self.bonds.freedom = wp.array(freedom, dtype=wp.vec2d, device=self.device)
 
     @property
     def spring_count(self) -> int:
-        """#S."""
+        """The number of springs, #S."""
         return self.spring_arrays.count
 
 
 def _on(device: wp.Device, values: NDArray[np.generic], dtype: type) -> wp.array:
-    """The values on the device; on the CPU these very ones. One number for all rows stays one."""
+    """Return the values on the device; on the CPU in the same memory. A value broadcast to all rows is stored once."""
     if device.is_cpu:
         return wp.array(values, dtype=dtype, device=device, copy=False)
     if len(values) and values.strides[0] == 0:
@@ -363,13 +368,13 @@ def _row(device: str, dtype: Any, value: float) -> wp.array:
     return wp.full(1, value=value, dtype=dtype, device=device)
 
 
-def _same(device: str, dtype: Any, value: float, count: int) -> wp.array:
-    """An array of so many that are all alike, not to be written to."""
+def _constant(device: str, dtype: Any, value: float, count: int) -> wp.array:
+    """Return a read-only array of `count` equal values."""
     return _repeated(_row(device, dtype, value), count)
 
 
 def _repeated(row: wp.array, count: int) -> wp.array:
-    """An array of one as one of so many."""
+    """Return an array of `count` rows that all share the memory of one."""
     rows = wp.array(ptr=row.ptr, dtype=row.dtype, shape=(count,), strides=(0,), device=row.device)
-    rows._ref = row  # as slices hold what they are of
+    rows._ref = row  # keeps the memory alive, as slices do
     return rows

@@ -8,6 +8,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
+from typing import Any
 
 import numpy as np
 import warp as wp
@@ -22,11 +23,11 @@ from warpflat.kernels.stiffness import (
     find_sides,
     list_springs,
     measure_edges,
-    measure_hold,
+    measure_shear_stiffness,
     pick_values,
+    weigh_hourglass,
     weigh_quads,
     weigh_triangles,
-    weigh_waves,
 )
 from warpflat.surface.cells import CellArrays, cells_of, creases_of, first_of_faces
 from warpflat.surface.half_edges import half_edges, half_edges_of
@@ -37,37 +38,38 @@ from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 __all__ = [
     "SpringArrays",
     "SpringsAround",
-    "shear_hold",
-    "shortened",
+    "measure_buckling_stiffness",
+    "shorten_springs",
+    "spring_geometry",
+    "springs_along_cells",
     "springs_of",
-    "springs_of_sides",
-    "unweighed_springs",
     "with_stiffness",
 ]
 
 
-# A shear spring stiffens tension too; a cell so long that nothing would be left for the structural spring keeps this share of it, has
-# weaker shear springs, and is sheared as a whole against what they lack.
+# A shear spring stiffens tension too. In a cell so long that nothing would be left for the structural spring, that
+# spring keeps this share of its stiffness, the shear springs are weaker, and the cell is sheared as a whole against
+# their deficit.
 _LEAST_STRUCTURAL_SHARE = 0.05
-# Where springs between triangles have just lost their hold, threads waver at no cost, and a relaxation creeps for ever; the
-# guard begins at this share of it.
-_HOLD_SHARE = 0.75
-# Edges of quads within the first of these angles of the grain are taken for the threads, beyond the second for what they are, and between
-# the two for more and more of it, so that sizes of one pattern that lie on both sides are of one cloth. Up to the second a step may
-# go along them.
+# On triangles the guard begins at this share of the buckling stiffness: exactly at buckling threads would waver at no
+# cost, and a relaxation would creep for ever.
+_BUCKLING_SHARE = 0.75
+# Edges of quads within the first of these angles of the grain count as threads, beyond the second at their true angle,
+# and in between at a growing share of it, so that sizes of one pattern on both sides behave alike. Line relaxation may
+# follow edges up to the second angle.
 _ALIGNED, _OFF_GRAIN = np.deg2rad([7.5, 15.0])
 _QUARTER = np.pi / 2
 
 
 @dataclass(frozen=True, kw_only=True)
 class SpringsAround:
-    """The springs around each vertex.
+    """The springs around each vertex, listed vertex by vertex.
 
     Attributes:
         offset: #V+1, where the entries of each vertex begin.
         neighbor: 2 #S, for each entry the vertex at the far end, by which they are sorted.
-        numbering: what makes their numbers, or of a grid whose numbers tell them, that: they are asked for when a network is made, and
-            seldom later.
+        numbering: makes the springs' numbers, which are needed when a network is made and seldom later; for a grid
+            numbered row by row, the object that computes them.
     """
 
     offset: IntArray
@@ -76,36 +78,36 @@ class SpringsAround:
 
     @property
     def entry(self) -> IntArray:
-        """2 #S, the springs' numbers, mesh edges first."""
-        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowMajorGrid) else self._kept
+        """The number of the spring of each entry, 2 #S; mesh edges have the first numbers."""
+        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowMajorGrid) else self._numbers
 
     @cached_property
-    def _kept(self) -> IntArray:
+    def _numbers(self) -> IntArray:
         assert not isinstance(self.numbering, RowMajorGrid)
         return self.numbering()
 
-    def forget_numbers(self) -> None:
-        """Make them again when they are next asked for."""
-        vars(self).pop("_kept", None)
+    def drop_numbers(self) -> None:
+        """Drop the springs' numbers; they are made again when they are next needed."""
+        vars(self).pop("_numbers", None)
 
     def listed(self, values: FloatArray) -> FloatArray:
-        """2 #S, the springs' values (#S) at both of their ends."""
+        """Return the springs' values (#S) at both of their ends, 2 #S."""
         if isinstance(self.numbering, RowMajorGrid):
             return self.numbering.listed(self.offset, values)
         listed = np.empty(len(self.neighbor))
-        given = [self._kept, np.ascontiguousarray(values, dtype=np.float64)]
+        given = [self._numbers, np.ascontiguousarray(values, dtype=np.float64)]
         launch_each(pick_values, len(listed), given, [listed])
         return listed
 
     @property
     def count(self) -> int:
-        """#S."""
+        """The number of springs, #S."""
         return len(self.neighbor) // 2
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Unweighed:
-    """Of a surface's springs what no fabric changes, as in SpringArrays."""
+class _SpringGeometry:
+    """The springs of a surface as in SpringArrays, without what depends on the fabric."""
 
     edge_count: int
     around: SpringsAround
@@ -114,37 +116,39 @@ class _Unweighed:
 
 @dataclass(frozen=True, kw_only=True)
 class SpringArrays:
-    """The springs as the kernels want them, each listed at both of its ends.
+    """The springs as the kernels take them, each listed at both of its ends.
 
     Attributes:
-        around: which springs there are around each vertex.
+        around: the springs around each vertex.
         listed_length, listed_stiffness: 2 #S, rest length [m] and stiffness [N/m] of each entry.
         edge_count: #E; the first springs are the mesh edges.
-        lack: #F by 2, what the springs of long quads lack in shear, as `kernels.cells.Cells` has it; None where there are none.
-        wave: #F by 4, what else holds quads against waves, likewise.
-        aligned: whether there are quads, and their edges carry the threads.
-        shear_excess: how many times as stiff in shear as the cloth the quads are whose edges lie across its threads; 1 without quads.
+        shear_deficit: #F by 2, shear stiffness that the springs of long quads lack, as `kernels.cells.Cells.shear`;
+            None without such quads.
+        hourglass: #F by 4, hourglass weights of quads, as `kernels.cells.Cells.hourglass`; None if no quad needs any.
+        aligned: whether there are quads whose edges run along the threads.
+        shear_excess: shear stiffness of the quads over the fabric's, above 1 where their edges run across the threads;
+            1 without quads.
     """
 
     around: SpringsAround
     listed_length: FloatArray
     listed_stiffness: FloatArray
     edge_count: int
-    lack: FloatArray | None = None
-    wave: FloatArray | None = None
+    shear_deficit: FloatArray | None = None
+    hourglass: FloatArray | None = None
     aligned: bool = False
     shear_excess: float = 1.0
 
-    # Once each: lists are all that a relaxation needs, so these are made when they are asked for.
+    # A relaxation needs the lists alone, so the arrays with one entry a spring are made at their first use.
 
     @property
     def count(self) -> int:
-        """#S."""
+        """The number of springs, #S."""
         return self.around.count
 
     @cached_property
     def ends(self) -> IntArray:
-        """#S by 2, the lower vertex first."""
+        """The two ends of each spring, the lower vertex first, #S by 2."""
         offset, neighbor = self.around.offset, self.around.neighbor
         vertex = np.repeat(np.arange(len(offset) - 1, dtype=np.int32), np.diff(offset))
         lower = vertex < neighbor
@@ -154,27 +158,27 @@ class SpringArrays:
 
     @cached_property
     def rest_length(self) -> FloatArray:
-        """#S [m]."""
-        return self._once(self.listed_length)
+        """The rest lengths, #S [m]."""
+        return self._unlisted(self.listed_length)
 
     @cached_property
     def stiffness(self) -> FloatArray:
-        """#S [N/m]."""
-        return self._once(self.listed_stiffness)
+        """The stiffnesses, #S [N/m]."""
+        return self._unlisted(self.listed_stiffness)
 
-    def _once(self, listed: FloatArray) -> FloatArray:
+    def _unlisted(self, listed: FloatArray) -> FloatArray:
         values = np.empty(self.count)
         values[self.around.entry] = listed
         return values
 
     def listed(self, values: FloatArray) -> FloatArray:
-        """2 #S, the springs' values (#S) at both of their ends."""
+        """Return the springs' values (#S) at both of their ends, 2 #S."""
         return self.around.listed(values)
 
     @property
     def long_quads(self) -> int:
-        """How many quads lack something in shear."""
-        return 0 if self.lack is None else int(np.count_nonzero(self.lack.any(axis=1)))
+        """The number of quads with a shear deficit."""
+        return 0 if self.shear_deficit is None else int(np.count_nonzero(self.shear_deficit.any(axis=1)))
 
 
 def springs_of(
@@ -185,7 +189,7 @@ def springs_of(
     grain_angle: float = 0.0,
     wider: FloatArray | None = None,
 ) -> SpringArrays:
-    """Springs with rest lengths from space and stiffnesses from the fabric.
+    """Return springs with rest lengths from space and stiffnesses from the fabric.
 
     Args:
         surface: of quads and/or triangles.
@@ -193,66 +197,76 @@ def springs_of(
         positions: #V by 2, a layout [m]: directions are measured in the plane against the grain, since threads are
             straight in the cloth and not on the body.
         grain_angle: of the warp against +y, degrees.
-        wider: #F by 2, how many times as long as on the body a quad's first edges and its others are meant to be: its stiffnesses are those
-            of such a quad. Rest lengths are the body's all the same.
+        wider: #F by 2, intended length of a quad's first edges, and of its others, over that on the body. It determines
+            the stiffnesses; rest lengths are still the body's.
     """
-    own, faces, is_quad = unweighed_springs(surface), surface.faces, surface.is_quad
+    own, faces, is_quad = spring_geometry(surface), surface.faces, surface.is_quad
     warp, _ = grain_axes(grain_angle)
-    first = first_of_faces(surface, 4, 3)
     of_side, diagonal = np.empty(3 * len(faces) + np.count_nonzero(is_quad)), np.empty(0)
-    position, lack, wave = np.ascontiguousarray(positions, dtype=np.float64), None, None
-    aligned, shear_excess = False, 1.0
+    position = np.ascontiguousarray(positions, dtype=np.float64)
+    quads: dict[str, Any] = {}
     if not is_quad.all():
-        triangles = selected_rows(faces, ~is_quad)
-        given = [
-            surface.vertices,
-            position,
-            triangles,
-            selected_rows(first, ~is_quad),
-            wp.vec2d(*warp),
-            _compliance(fabric),
-        ]
+        triangles, first = selected_rows(faces, ~is_quad), selected_rows(first_of_faces(surface, 4, 3), ~is_quad)
+        given = [surface.vertices, position, triangles, first, wp.vec2d(*warp), _compliance(fabric)]
         launch_each(weigh_triangles, len(triangles), given, [of_side])
     if is_quad.any():
-        quads = selected_rows(faces, is_quad)
-        diagonal, short, hold = np.empty(len(quads)), np.empty((len(quads), 2)), np.empty(len(quads))
-        lattice, angle = _lattice(fabric, quads, position, warp)
-        aligned = _off_threads(angle) <= _OFF_GRAIN
-        shear_excess = lattice.shear / fabric.shear_stiffness
-        # One number for all, where they are as on the body.
-        times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else selected_rows(wider, is_quad)
-        given = [
-            surface.vertices,
-            position,
-            quads,
-            selected_rows(first, is_quad),
-            wp.array(times, dtype=wp.vec2d, device="cpu", copy=False),
-            lattice,
-        ]
-        launch_each(weigh_quads, len(quads), given, [of_side, diagonal, short, hold])
-        # Most have none: what is not written to takes no memory.
-        if short.any():
-            lacks, lack = short.any(axis=1), np.zeros((len(faces), 2))
-            lack[np.flatnonzero(is_quad)[lacks]] = short[lacks]
-        held = np.flatnonzero(hold)
-        if len(held):
-            weights, wave = np.empty((len(held), 4)), np.zeros((len(faces), 4))
-            launch_each(weigh_waves, len(held), [surface.vertices, quads[held], hold[held]], [weights])
-            wave[np.flatnonzero(is_quad)[held]] = weights
+        lattice, angle = _lattice(fabric, selected_rows(faces, is_quad), position, warp)
+        diagonal, shear_deficit, hourglass = _weigh_quads(surface, position, lattice, wider, of_side)
+        quads = {
+            "shear_deficit": shear_deficit,
+            "hourglass": hourglass,
+            "aligned": _off_threads(angle) <= _OFF_GRAIN,
+            "shear_excess": lattice.shear / fabric.shear_stiffness,
+        }
     return SpringArrays(
         around=own.around,
         listed_length=own.listed_length,
         listed_stiffness=_listed_stiffness(surface, own, of_side, diagonal),
         edge_count=own.edge_count,
-        lack=lack,
-        wave=wave,
-        aligned=aligned,
-        shear_excess=shear_excess,
+        **quads,
     )
 
 
-def _listed_stiffness(surface: Surface, own: _Unweighed, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
-    """2 #S [N/m], from what faces give to the springs along their sides (#H) and, quads, to both diagonals (#Q)."""
+def _weigh_quads(
+    surface: Surface, position: FloatArray, lattice: Lattice, wider: FloatArray | None, of_side: FloatArray
+) -> tuple[FloatArray, FloatArray | None, FloatArray | None]:
+    """Compute the stiffnesses that quads give to their springs; those along their sides are written to `of_side`.
+
+    Returns:
+        #Q, stiffness of the diagonals [N/m]; #F by 2, shear deficits, and #F by 4, hourglass weights, as in
+        `SpringArrays`.
+    """
+    faces, is_quad, shear_deficit, hourglass = surface.faces, surface.is_quad, None, None
+    quads, first = selected_rows(faces, is_quad), selected_rows(first_of_faces(surface, 4, 3), is_quad)
+    diagonal, deficit, stabilisation = np.empty(len(quads)), np.empty((len(quads), 2)), np.empty(len(quads))
+    # Ones broadcast to all quads, where they are as long as on the body.
+    times = np.broadcast_to(np.ones(2), (len(quads), 2)) if wider is None else selected_rows(wider, is_quad)
+    times = wp.array(times, dtype=wp.vec2d, device="cpu", copy=False)
+    given = [surface.vertices, position, quads, first, times, lattice]
+    launch_each(weigh_quads, len(quads), given, [of_side, diagonal, deficit, stabilisation])
+    # Most quads have none: pages that are not written to take no memory.
+    if deficit.any():
+        lacking, shear_deficit = deficit.any(axis=1), np.zeros((len(faces), 2))
+        shear_deficit[np.flatnonzero(is_quad)[lacking]] = deficit[lacking]
+    unstable = np.flatnonzero(stabilisation)
+    if len(unstable):
+        weights, hourglass = np.empty((len(unstable), 4)), np.zeros((len(faces), 4))
+        launch_each(
+            weigh_hourglass, len(unstable), [surface.vertices, quads[unstable], stabilisation[unstable]], [weights]
+        )
+        hourglass[np.flatnonzero(is_quad)[unstable]] = weights
+    return diagonal, shear_deficit, hourglass
+
+
+def _listed_stiffness(surface: Surface, own: _SpringGeometry, of_side: FloatArray, diagonal: FloatArray) -> FloatArray:
+    """Return the stiffnesses of the listed springs, 2 #S [N/m].
+
+    Args:
+        surface: of faces.
+        own: its springs.
+        of_side: #H, stiffness that a face gives to the springs along its sides [N/m].
+        diagonal: #Q, stiffness of both diagonals of a quad [N/m].
+    """
     numbered = row_major_grid(surface)
     if numbered is not None:
         return numbered.listed_stiffness(own.around.offset, of_side, diagonal)
@@ -261,12 +275,12 @@ def _listed_stiffness(surface: Surface, own: _Unweighed, of_side: FloatArray, di
 
 
 def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
-    """K along a quad's first edges, along its second ones, and G [N/m], for first edges at `angle` [rad] from the warp.
+    """Return K along a quad's first and second edges, and G [N/m], for first edges at `angle` [rad] from the warp.
 
-    Within 7.5 degrees of warp or weft the edges are the threads. From 15 degrees on the crossed lattice gets the rotated
-    elasticity; a crossed lattice has C12 = C66 = G, and no coupling of shear with tension, so there it is an
-    approximation. Between the two it is rotated by a growing share of the angle. In an isotropic fabric no direction is another
-    one, and nothing is rotated: C12 = C66 = G is not isotropic itself, and would be felt.
+    Within 7.5 degrees of warp or weft the edges are the threads. From 15 degrees on the crossed lattice gets the
+    rotated elasticity. This is an approximation: a crossed lattice has C12 = C66 = G, and no coupling of shear with
+    tension. In between it is rotated by a growing share of the angle. An isotropic fabric is not rotated, since C12 =
+    C66 = G is not isotropic itself, and a rotation would change the result.
     """
     nearest = np.round(angle / _QUARTER) * _QUARTER
     off = 0.0 if fabric.is_isotropic else _off_threads(angle)
@@ -286,26 +300,30 @@ def quad_stiffness(fabric: Fabric, angle: float) -> tuple[float, float, float]:
 
 
 def _off_threads(angle: float) -> float:
-    """How far a direction at `angle` [rad] from the warp is from the nearer of warp and weft [rad]."""
+    """Return the angle between a direction at `angle` [rad] from the warp and the nearer of warp and weft [rad]."""
     return float(abs(angle - np.round(angle / _QUARTER) * _QUARTER))
 
 
 def _compliance(fabric: Fabric) -> wp.vec3d:
-    """1/K [m/N] of a strip of the cloth cut at an angle from the warp and pulled along itself, as coefficients of cos^4, sin^4 and
-    sin^2 cos^2: 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp."""
+    """Return the coefficients of cos^4, sin^4 and sin^2 cos^2 in 1/K(theta) [m/N].
+
+    They are 1/K_warp, 1/K_weft and 1/G - 2 nu/K_warp.
+
+    K(theta) is the stiffness of a strip cut at the angle theta from the warp and pulled along itself.
+    """
     cross = 1.0 / fabric.shear_stiffness - 2.0 * fabric.poisson_ratio / fabric.stiffness_warp
     return wp.vec3d(1.0 / fabric.stiffness_warp, 1.0 / fabric.stiffness_weft, cross)
 
 
 def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: FloatArray) -> tuple[Lattice, float]:
-    """The fabric along the quads' edges, and the angle from the warp to the first of these [rad].
+    """Return the fabric along the quads' edges, and the angle from the warp to their first edges [rad].
 
     The angle between cells and grain is that of the whole piece (the mean over its cells, taken with the fourfold
     symmetry of a grid).
     """
     fourfold = np.empty((len(quads), 2))
     launch_each(find_directions, len(quads), [positions, quads, wp.vec2d(*warp)], [fourfold])
-    # As complex numbers, of which one row is summed many times as fast as two columns are.
+    # A row of complex numbers is summed many times as fast as two columns of reals.
     mean = complex(fourfold.view(np.complex128).sum())
     angle = float(np.angle(mean)) / 4.0
     across = np.array([-warp[1], warp[0]])
@@ -317,41 +335,44 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 
 
 @once_per_surface
-def unweighed_springs(surface: Surface) -> _Unweighed:
-    """What no fabric changes of a surface's springs, worked out once."""
+def spring_geometry(surface: Surface) -> _SpringGeometry:
+    """Return the springs of a surface without what depends on the fabric; made once for each surface."""
     vertices, around, numbered = surface.vertices, _springs_around(surface), row_major_grid(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
     if numbered is not None:
         lengths = numbered.listed_lengths(around.offset, vertices, diagonal)
-        return read_only(_Unweighed(edge_count=numbered.edge_count, around=around, listed_length=lengths))
+        return read_only(_SpringGeometry(edge_count=numbered.edge_count, around=around, listed_length=lengths))
     edges = half_edges_of(surface).edges
     rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
     launch_each(measure_edges, len(edges), [vertices, edges], [rest_length])
-    return read_only(_Unweighed(edge_count=len(edges), around=around, listed_length=around.listed(rest_length)))
+    return read_only(_SpringGeometry(edge_count=len(edges), around=around, listed_length=around.listed(rest_length)))
 
 
 @once_per_faces
 def _springs_around(surface: Surface) -> SpringsAround:
-    """The springs around each vertex, edges first, then diagonals."""
+    """Return the springs around each vertex, edges first, then diagonals."""
     numbered = row_major_grid(surface)
     if numbered is not None:
         offset, neighbor = numbered.neighbors_around()
         return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))
     faces, count = surface.faces, len(surface.vertices)
     offset, neighbor, spring = _sorted_springs(half_edges_of(surface).edges, faces, count)
-    around = SpringsAround(offset=offset, neighbor=neighbor, numbering=partial(_numbers, faces, count))
-    vars(around)["_kept"] = spring
+    around = SpringsAround(offset=offset, neighbor=neighbor, numbering=partial(_spring_numbers, faces, count))
+    vars(around)["_numbers"] = spring
     return read_only(around)
 
 
-def _numbers(faces: IntArray, count: int) -> IntArray:
+def _spring_numbers(faces: IntArray, count: int) -> IntArray:
     return _sorted_springs(half_edges(faces).edges, faces, count)[2]
 
 
 def _sorted_springs(edges: IntArray, faces: IntArray, count: int) -> tuple[IntArray, IntArray, IntArray]:
-    """Edges, then diagonals, around so many vertices: #V+1, where each vertex's begin; 2 #S each, the vertices at the far ends, and the
-    springs' numbers."""
+    """Return the edges and diagonals around each of `count` vertices, sorted by their far ends.
+
+    Returns:
+        #V+1, where the entries of each vertex begin; 2 #S, the vertices at the far ends; 2 #S, the springs' numbers.
+    """
     corner = selected_rows(faces, faces[:, 3] >= 0)
     ends = np.concatenate([edges, corner[:, 0::2], corner[:, 1::2]])
     end, offset = counting_sort(ends[:, ::-1].T.ravel(), count)
@@ -360,14 +381,24 @@ def _sorted_springs(edges: IntArray, faces: IntArray, count: int) -> tuple[IntAr
     return offset, neighbor, spring
 
 
-def shortened(
+def shorten_springs(
     springs: SpringArrays,
     surface: Surface,
     positions: FloatArray,
     axes: tuple[FloatArray, FloatArray],
     stretch: FloatArray,
 ) -> SpringArrays:
-    """The springs of a cloth that is worn stretched: a thread of unit direction u is |(s_warp u_warp, s_weft u_weft)| long."""
+    """Return the springs of a cloth that is worn stretched, with shorter rest lengths.
+
+    A thread of unit direction u is worn |(s_warp u_warp, s_weft u_weft)| long.
+
+    Args:
+        springs: of the cloth as on the body.
+        surface: the body.
+        positions: #V by 2, a layout for the directions [m].
+        axes: unit vectors of warp and weft in the plane.
+        stretch: #F by 2, intended length worn over length flat.
+    """
     used = surface.faces >= 0
     at = surface.faces[used]
     faces = np.bincount(at, minlength=len(surface.vertices))
@@ -385,8 +416,8 @@ def shortened(
     return replace(springs, listed_length=springs.listed(springs.rest_length / np.where(worn > 0.0, worn, 1.0)))
 
 
-def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
-    """3 #C, the spring along each cell's edges 0-1, 1-2, 2-0."""
+def springs_along_cells(springs: SpringArrays, cells: CellArrays) -> IntArray:
+    """Return the springs along each cell's edges 0-1, 1-2, 2-0, 3 #C."""
     around = springs.around
     side = np.empty_like(cells.corner)
     given = [cells.corner, around.offset, around.neighbor, around.entry]
@@ -395,18 +426,20 @@ def springs_of_sides(springs: SpringArrays, cells: CellArrays) -> IntArray:
 
 
 def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray) -> SpringArrays:
-    """The springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
-    side = springs_of_sides(springs, cells)
+    """Return the springs with the sums of the cells' weights (#C by 3, along the edges 0-1, 1-2, 2-0) as k_ij."""
+    side = springs_along_cells(springs, cells)
     stiffness = np.bincount(side, weights.ravel(), minlength=springs.count).astype(np.float64)
-    return replace(springs, listed_stiffness=springs.listed(stiffness), lack=None, wave=None)
+    return replace(springs, listed_stiffness=springs.listed(stiffness), shear_deficit=None, hourglass=None)
 
 
-def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray) -> float:
-    """Shear stiffness [N/m] that the springs between triangles really have against warp and weft.
+def measure_buckling_stiffness(
+    surface: Surface, springs: SpringArrays, positions: FloatArray, warp: FloatArray
+) -> float:
+    """Return the shear stiffness with which springs on triangles resist the buckling of threads [N/m].
 
-    They shear as their directions happen to lie: split squares have K(45 degrees)/4, and threads between them kink at
-    that over K, not at G/K. Taken per vertex, sum of 1/2 k L^2 cos^2 sin^2 over its share of the area, infinite beside a quad,
-    and of these three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
+    It depends on the directions of the edges: split squares have K(45 degrees)/4, so threads kink at that over K, not
+    at G/K. Per vertex it is the sum of 1/2 k L^2 cos^2 sin^2 over the vertex's area, infinite beside a quad. The result
+    is three quarters of the lower quartile: one value for the piece, and the same on a finer mesh of its kind.
 
     Args:
         surface, springs: of the piece.
@@ -421,6 +454,6 @@ def shear_hold(surface: Surface, springs: SpringArrays, positions: FloatArray, w
     layout = np.ascontiguousarray(positions, dtype=np.float64)
     lists = [around.offset, around.neighbor, springs.listed_length, springs.listed_stiffness]
     given = [layout, *lists, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
-    launch_each(measure_hold, count, given, [hold])
+    launch_each(measure_shear_stiffness, count, given, [hold])
     hold[surface.faces[is_quad].ravel()] = np.inf
-    return _HOLD_SHARE * float(np.partition(hold, count // 4)[count // 4])
+    return _BUCKLING_SHARE * float(np.partition(hold, count // 4)[count // 4])

@@ -21,7 +21,7 @@ from warpflat.kernels.strain import (
     compute_strain_energy,
     compute_worn_strain,
 )
-from warpflat.model.membrane import Model, cloth_of, plane_stress
+from warpflat.model.membrane import Model, make_cloth, plane_stress
 from warpflat.model.network import SpringNetwork
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
@@ -33,19 +33,19 @@ __all__ = [
     "WornStrain",
     "face_areas",
     "layout_errors",
-    "membrane_of",
+    "make_membrane",
     "strain_energy",
-    "worn_cells",
+    "worn_cell_strain",
     "worn_strain",
 ]
 
 
-# A cell that is smaller in the plane than this share of its area on the body is crushed to a point or a line.
+# A cell smaller in the plane than this share of its area on the body is crushed to a point or a line.
 _COLLAPSED = 1e-9
 
 
-def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
-    """The fabric as an orthotropic sheet in plane stress: c_warp = K_warp / (1 - nu_12 nu_21), and so on."""
+def make_membrane(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
+    """Return the fabric as an orthotropic sheet in plane stress, c_warp = K_warp / (1 - nu_12 nu_21) and so on."""
     warp, weft = grain_axes(grain_angle)
     membrane = Membrane()
     membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
@@ -56,7 +56,7 @@ def membrane_of(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
 
 @dataclass(frozen=True, kw_only=True)
 class WornStrain:
-    """Per face, the mean over its cells by flat area.
+    """Worn strain, stress and energy of each face, means over its cells by flat area.
 
     Attributes:
         strain: #F by 3: along warp, along weft, shear angle [1, 1, rad].
@@ -72,7 +72,7 @@ class WornStrain:
 
     @property
     def energy_density(self) -> FloatArray:
-        """#F [J/m2], per flat area of cloth; of a face that is crushed to a point, the most that a film's numbers can say."""
+        """Strain energy per flat area, #F [J/m2]; at most the largest float32, where a face is crushed to a point."""
         with np.errstate(over="ignore", invalid="ignore"):
             density = self.energy / np.where(self.area > 0, self.area, np.inf)
         most = float(np.finfo(np.float32).max)
@@ -80,14 +80,14 @@ class WornStrain:
 
 
 def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
-    """Worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric.
+    """Return the worn strain of a layout (#V by 2 [m]) of the network's surface in the network's fabric.
 
     Stresses are linear for springs; a membrane's are its own, with the fabric's curves and its wrinkling.
     """
     offset, device = network.cell_arrays.of_face, network.device
     cells = [
         wp.array(offset, dtype=wp.int32, device=device, copy=False),
-        *worn_cells(network, positions, network.model),
+        *worn_cell_strain(network, positions, network.model),
     ]
     strain, stress, energy, area = faces = _worn_arrays(len(offset) - 1, device)
     launch_each(average_over_faces, len(offset) - 1, cells, faces, device=device)
@@ -95,26 +95,29 @@ def worn_strain(network: SpringNetwork, positions: FloatArray) -> WornStrain:
 
 
 def strain_energy(network: SpringNetwork, positions: FloatArray) -> float:
-    """Strain energy [J] of a layout (#V by 2 [m]), the sum of what `worn_strain` gives per face."""
+    """Return the strain energy of a layout (#V by 2 [m]), the sum of the faces' energies of `worn_strain` [J]."""
     if network.model == "membrane":
-        return float(worn_cells(network, positions, network.model)[2].numpy().sum())
+        return float(worn_cell_strain(network, positions, network.model)[2].numpy().sum())
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     energy = wp.empty(network.face_count, dtype=wp.float64, device=device)
-    given = [at, network.cells, membrane_of(network.fabric, network.grain_angle)]
+    given = [at, network.cells, make_membrane(network.fabric, network.grain_angle)]
     launch_each(compute_strain_energy, network.face_count, given, [energy], device=device)
     return float(energy.numpy().sum())
 
 
-def worn_cells(network: SpringNetwork, positions: FloatArray, law: Model) -> list[wp.array]:
-    """Strain and stress (#C by 3), energy [J] and area [m2] (#C), see `kernels.strain`; stress and energy by plane stress, or by the
-    membrane's law with the fabric's curves."""
+def worn_cell_strain(network: SpringNetwork, positions: FloatArray, law: Model) -> list[wp.array]:
+    """Return worn strain and stress (#C by 3), energy [J] and area [m2] (#C) of the cells; see `kernels.strain`.
+
+    Stress and energy are those of plane stress, or with `law` "membrane" those of the membrane with the fabric's
+    curves.
+    """
     device = network.device
     at = wp.array(np.ascontiguousarray(positions), dtype=wp.vec2d, device=device)
     cells = _worn_arrays(network.cell_count, device)
-    kernel, cloth = compute_worn_strain, membrane_of(network.fabric, network.grain_angle)
+    kernel, cloth = compute_worn_strain, make_membrane(network.fabric, network.grain_angle)
     if law == "membrane":
-        kernel, cloth = compute_membrane_strain, cloth_of(network.fabric, grain_axes(network.grain_angle), device)
+        kernel, cloth = compute_membrane_strain, make_cloth(network.fabric, grain_axes(network.grain_angle), device)
     inputs = [at, network.cells, cloth]
     launch_each(kernel, network.face_count, inputs, cells, device=device)
     return cells
@@ -126,14 +129,14 @@ def _worn_arrays(count: int, device: wp.Device) -> list[wp.array]:
 
 @dataclass(frozen=True, kw_only=True)
 class LayoutErrors:
-    """How far a layout is from an isometry.
+    """The errors of a layout against an isometry.
 
     Attributes:
         length_error: sum |l2 - L3| / sum L3 over the mesh edges (Wang 2002, E_c).
         area_error: sum |a2 - A3| / sum A3 over the faces (Wang 2002, E_s).
         boundary_error: |border length in the plane - in space| / in space.
-        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed, to less than a
-            billionth of its area on the body.
+        flipped_faces: faces of which a cell (a triangle; a quad's corner triangle) is mirrored or collapsed, to less
+            than a billionth of its area on the body.
     """
 
     length_error: float
@@ -143,7 +146,7 @@ class LayoutErrors:
 
 
 def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArray) -> LayoutErrors:
-    """Errors of a layout (#V by 2 [m]) of the network's surface."""
+    """Return the errors of a layout (#V by 2 [m]) of the network's surface."""
     he = half_edges_of(surface)
     edges = he.edges
     in_space, in_plane = _lengths(surface.vertices, edges), _lengths(positions, edges)
@@ -161,7 +164,7 @@ def layout_errors(surface: Surface, network: SpringNetwork, positions: FloatArra
 
 
 def face_areas(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """#F each, the faces' areas in a layout (#V by 2 [m]), negative where mirrored, and on the body [m2]."""
+    """Return the faces' areas in a layout (#V by 2 [m]), negative where mirrored, and on the body, #F each [m2]."""
     cells = network.cell_arrays
     corner, face, weight = corner_triangles(cells.faces)
     faces = len(network.surface.faces)

@@ -1,8 +1,9 @@
-"""How a garment is meant to be worn: stretch along its threads, and pressure on the skin."""
+"""The intended wear of a garment: stretch along its threads, and pressure on the skin."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,7 +20,7 @@ from warpflat.surface.curvature import curvature_tensors
 from warpflat.surface.energy_map import smooth_to_vertices
 from warpflat.surface.mesh import Surface
 
-__all__ = ["SKIN_LENGTH", "Wear", "meant_stretch", "unused_stretch"]
+__all__ = ["SKIN_LENGTH", "Wear", "intended_stretch", "unused_stretch"]
 
 # Cloth bridges what is smaller than this, and a scan is rough below it: curvature is taken over such lengths [m].
 SKIN_LENGTH = 0.01
@@ -27,12 +28,12 @@ SKIN_LENGTH = 0.01
 
 @dataclass(frozen=True, kw_only=True)
 class Wear:
-    """How a garment is meant to be worn.
+    """The intended wear of a garment.
 
     Attributes:
-        stretch_warp, stretch_weft: so much longer the cloth is on the body than flat; 0.2 for 20 %.
-        pressure: on the skin [Pa], if that is what is asked for; the threads that run around the body, across its stronger
-            curvature, get the stretch that gives it, face by face, and the other ones the stretch given here.
+        stretch_warp, stretch_weft: elongation of the cloth on the body over its flat length; 0.2 for 20 %.
+        pressure: intended pressure on the skin [Pa], if any. The threads around the body, along its stronger curvature,
+            get the stretch that gives it, face by face; the others get the stretch given here.
     """
 
     stretch_warp: float = 0.0
@@ -53,54 +54,55 @@ class Wear:
                 )
         if self.pressure and self.stretch_warp > 0.0 and self.stretch_weft > 0.0:
             raise InputError(
-                "wear: a pressure sets the stretch of the threads that run around the body: give stretch_warp or stretch_weft, that of "
-                "the other threads, not both"
+                "wear: a pressure sets the stretch of the threads that run around the body: give stretch_warp or "
+                "stretch_weft, that of the other threads, not both"
             )
 
     @property
     def is_tight(self) -> bool:
-        """Whether anything but the body's own size is asked for."""
+        """Whether the garment is to be smaller than the body."""
         return self.stretch_warp > 0.0 or self.stretch_weft > 0.0 or bool(self.pressure)
 
 
-def curvature_along(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """#C each: curvature of the body along the worn warp, along the worn weft, and the twist between them [1/m]."""
+def thread_curvatures(network: SpringNetwork, positions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return the body's curvature along the worn warp and weft, and the twist between them, #C each [1/m]."""
     cells, surface = network.cell_arrays, network.surface
     warp, weft = (wp.vec2d(*axis) for axis in grain_axes(network.grain_angle))
     along = np.empty((len(cells.laid), 4))
     body = [surface.vertices, cells.corner, cells.laid, curvature_tensors(surface)]
     launch_each(bend_threads, len(along), [np.asarray(positions, dtype=np.float64), *body, warp, weft], [along])
     if float(along[:, 3] @ cells.area) < 0.0:
-        # Wound the other way round: a body is convex on the whole.
+        # The surface is oriented inwards: a body is convex on the whole.
         along = -along
     return along[:, 0], along[:, 1], along[:, 2]
 
 
-def smoothed_along(surface: Surface, values: FloatArray, length: float) -> FloatArray:
+def smooth_face_values(surface: Surface, values: FloatArray, length: float) -> FloatArray:
+    """Return face values (#F) smoothed over a length on the surface [m], #F."""
     at_vertices = smooth_to_vertices(surface, values, smoothing_length=length)
     used = surface.faces >= 0
     corners = np.where(used, at_vertices[np.maximum(surface.faces, 0)], 0.0)
     return np.asarray(corners.sum(axis=1) / used.sum(axis=1))
 
 
-def meant_stretch(
+def intended_stretch(
     surface: Surface, fabric: Fabric, positions: FloatArray, wear: Wear, *, grain_angle: float = 0.0
 ) -> tuple[FloatArray | None, tuple[str, ...]]:
-    """Length worn over length flat that is meant, per face along warp and weft, and notes.
+    """Return the intended length worn over length flat along warp and weft, #F by 2, and notes.
 
-    For a pressure, p = T_warp k_warp / s_weft + T_weft k_weft / s_warp is solved for the stretch s of the threads that run
-    across the stronger curvature k, with the fabric's own curve for their tension T; k is that along the threads of the
-    layout, averaged over 10 mm. No stretch goes beyond the fabric's limit.
+    For a pressure, p = T_warp k_warp / s_weft + T_weft k_weft / s_warp is solved for the stretch s of the threads that
+    run along the stronger curvature k, with the fabric's own curve for their tension T; k is that along the threads of
+    the layout, averaged over 10 mm. No stretch goes beyond the fabric's limit.
 
     Args:
         surface: the piece on the body.
         fabric: the cloth.
         positions: #V by 2, a layout, for the directions of the threads [m].
-        wear: what is meant.
+        wear: what is intended.
         grain_angle: of the warp against +y, degrees.
 
     Returns:
-        #F by 2, or None where the pattern is to be of the body's own size.
+        #F by 2, or None for a pattern of the body's own size; sentences for the maker.
     """
     if not wear.is_tight:
         return None, ()
@@ -111,30 +113,17 @@ def meant_stretch(
     area = network.cell_arrays.area
     face_area = np.maximum(np.bincount(network.cell_arrays.face, area, minlength=len(surface.faces)), 1e-300)
     curved = [
-        smoothed_along(
+        smooth_face_values(
             surface,
             np.bincount(network.cell_arrays.face, area * k, minlength=len(surface.faces)) / face_area,
             SKIN_LENGTH,
         )
-        for k in curvature_along(network, positions)[:2]
+        for k in thread_curvatures(network, positions)[:2]
     ]
     around = int(np.abs(curved[1]) @ face_area >= np.abs(curved[0]) @ face_area)
     thread = ("warp", "weft")[around]
     other = 1 - around
-    still = stretch[:, other]
-    c_warp, c_weft, c_cross = plane_stress(fabric)
-    beyond = (c_warp - fabric.stiffness_warp, c_weft - fabric.stiffness_weft)
-
-    def pull(along: int, e: FloatArray, across: FloatArray) -> FloatArray:
-        return fabric.tension(e, "weft" if along else "warp") + beyond[along] * e + c_cross * across
-
-    low, high = np.zeros(len(stretch)), np.full(len(stretch), fabric.strain_limit)
-    for _ in range(60):
-        middle = 0.5 * (low + high)
-        pressure = pull(around, middle, still - 1.0) * curved[around] / still
-        pressure += pull(other, still - 1.0, middle) * curved[other] / (1.0 + middle)
-        enough = pressure >= wear.pressure
-        high, low = np.where(enough, middle, high), np.where(enough, low, middle)
+    low, high = _stretch_for_pressure(fabric, wear.pressure, curved, around, stretch[:, other])
     stretch[:, around] = 1.0 + 0.5 * (low + high)
     short = float(face_area[low > fabric.strain_limit - 1e-6].sum() / face_area.sum())
     notes = [f"pressure {wear.pressure:g} Pa by stretch along {thread}, which runs around the body"]
@@ -142,14 +131,47 @@ def meant_stretch(
         notes.append(unused)
     if short > 0.001:
         notes.append(
-            f"{wear.pressure:g} Pa cannot be reached within {fabric.name}'s limit of {100 * fabric.strain_limit:.3g} % on "
-            f"{100 * short:.0f} % of the piece: too flat, or the cloth too soft"
+            f"{wear.pressure:g} Pa cannot be reached within {fabric.name}'s limit of {100 * fabric.strain_limit:.3g} % "
+            f"on {100 * short:.0f} % of the piece: too flat, or the cloth too soft"
         )
     return stretch, tuple(notes)
 
 
+def _stretch_for_pressure(
+    fabric: Fabric, pressure: float, curved: Sequence[FloatArray], around: int, across: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Solve for the strain along the threads around the body by bisection.
+
+    Args:
+        fabric: the cloth.
+        pressure: intended [Pa].
+        curved: #F each, curvature along warp and weft [1/m].
+        around: 0 if the warp runs around the body, 1 if the weft does.
+        across: #F, length worn over length flat along the other threads.
+
+    Returns:
+        Lower and upper bounds of the strain, #F each; the fabric's limit where the pressure cannot be reached.
+    """
+    c_warp, c_weft, c_cross = plane_stress(fabric)
+    excess = (c_warp - fabric.stiffness_warp, c_weft - fabric.stiffness_weft)
+    other = 1 - around
+
+    def tension(thread: int, strain: FloatArray, strain_across: FloatArray) -> FloatArray:
+        own = fabric.tension(strain, "weft" if thread else "warp")
+        return own + excess[thread] * strain + c_cross * strain_across
+
+    low, high = np.zeros(len(across)), np.full(len(across), fabric.strain_limit)
+    for _ in range(60):
+        middle = 0.5 * (low + high)
+        reached = tension(around, middle, across - 1.0) * curved[around] / across
+        reached += tension(other, across - 1.0, middle) * curved[other] / (1.0 + middle)
+        enough = reached >= pressure
+        high, low = np.where(enough, middle, high), np.where(enough, low, middle)
+    return low, high
+
+
 def unused_stretch(wear: Wear, around: str) -> str:
-    """What is said of a stretch that a pressure overrides, along the threads ("warp" or "weft") around the body; "" if there is none."""
+    """Return the note on a stretch along the threads `around` the body, which a pressure overrides, or ""."""
     value = wear.stretch_warp if around == "warp" else wear.stretch_weft
     if not (wear.pressure and value > 0.0):
         return ""

@@ -1,4 +1,4 @@
-"""What a relaxation reports: its energies, its convergence from check to check, and its outcome."""
+"""The report of a relaxation: energies, convergence from check to check, and outcome."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ class ConvergenceStatus:
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """How a relaxation ended; for several pieces, the sum of their energies and the worst of their residuals.
+    """The outcome of a relaxation; for several pieces, the sum of their energies and the worst of their residuals.
 
     Attributes:
         converged: false if it ran into its step limit.

@@ -8,7 +8,7 @@ import warp as wp
 from warpflat.kernels.membrane import bound_membrane
 from warpflat.model.membrane import corner_sums
 from warpflat.model.network import SpringNetwork
-from warpflat.model.springs import springs_of_sides
+from warpflat.model.springs import springs_along_cells
 
 __all__ = ["TangentMatrix"]
 
@@ -24,7 +24,7 @@ class TangentMatrix:
     def __init__(self, network: SpringNetwork) -> None:
         """Prepare updates of this network; nothing is changed before `update` is called."""
         self._network = network
-        self._side = springs_of_sides(network.spring_arrays, network.cell_arrays)
+        self._side = springs_along_cells(network.spring_arrays, network.cell_arrays)
         self._weight = wp.zeros(3 * network.cell_count, dtype=wp.float64, device=network.device)
 
     def update(self, position: wp.array) -> None:
@@ -40,5 +40,5 @@ class TangentMatrix:
         )
         weight = np.array(self._weight.numpy())
         stiffness = np.bincount(self._side, weight, minlength=network.spring_count).astype(np.float64)
-        network.weigh(stiffness)
+        network.update_stiffness(stiffness)
         network.cloth.held.assign(corner_sums(weight.reshape(-1, 3)).ravel())

@@ -21,7 +21,7 @@ from warpflat.core.sums import range_offsets
 from warpflat.kernels.implicit import count_braked, stop_braked
 from warpflat.kernels.prolongation import inject
 from warpflat.kernels.reduce import subtract
-from warpflat.kernels.rigid_motion import MOMENTS, Turn, strongest_of_blocks, sum_moments, turn_pieces
+from warpflat.kernels.rigid_motion import MOMENTS, Turn, largest_force_of_blocks, sum_moments, turn_pieces
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Iterate
 from warpflat.solver.grain_alignment import GrainAlignment
@@ -105,7 +105,7 @@ class DevicePieceSums:
     def _record_largest_force(self, rotation: _PieceRotation, least: wp.array) -> Launch:
         buffers, weight, blocks = self._buffers, self._network.spring_stiffness, self._over_vertices.blocks
         given = [buffers.position, buffers.force, buffers.load, weight, rotation.piece, rotation.turn, blocks]
-        return record(strongest_of_blocks, dim=len(least), inputs=given, outputs=[least], device=self._device)
+        return record(largest_force_of_blocks, dim=len(least), inputs=given, outputs=[least], device=self._device)
 
     def hold_grain(self, alignments: Sequence[GrainAlignment]) -> None:
         rotation = self._rotation_of(alignments)

@@ -20,8 +20,8 @@ from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import range_offsets
 from warpflat.kernels.constraints import evaluate_seams
 from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
-from warpflat.kernels.line_solve import go_along_lines, solve_lines
-from warpflat.kernels.springs import compute_spring_energy, compute_spring_pull
+from warpflat.kernels.line_solve import move_along_lines, solve_lines
+from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.smoother import IMPLICIT_STEP, SmootherCoefficients
 
@@ -248,7 +248,7 @@ class StepBuffers:
             least=_LEAST_LINES,
         )
         move = record(
-            go_along_lines,
+            move_along_lines,
             dim=net.vertex_count,
             inputs=[*displacements, self.reach, net.bonds.freedom],
             outputs=[self.position],
@@ -279,7 +279,7 @@ class StepBuffers:
     def measure_tension(self) -> Launch:
         """The tensions of the springs, into `vertex_tension`."""
         return record(
-            compute_spring_pull,
+            compute_spring_tension,
             dim=self.network.vertex_count,
             inputs=[self.position, self.network.springs],
             outputs=[self.vertex_tension],

@@ -2,10 +2,10 @@
 
 The vertices of the coarser mesh are vertices of the finer one. A rectangular grid of quads keeps every second row and
 column; quads on any other lattice, with concave corners, holes or cracks, also keep all rows and columns in which the
-border turns. Any other mesh loses
-vertices by edge collapses, an independent set of them in each pass, until about a quarter is left: a vertex collapses
-    into the neighbour that leaves the best triangles, and a border vertex only along the border. So corners, holes and
-    cracks remain: the two sides of a crack have different vertices, and nothing joins them.
+border turns. Any other mesh loses vertices by edge collapses, an independent set of them in each pass, until about a
+quarter is left: a vertex collapses into the neighbour that leaves the best triangles, and a border vertex only along
+the border. So corners, holes and cracks remain: the two sides of a crack have different vertices, and nothing joins
+them.
 
 In a pass vertices collapse one after the other, and the rings of the neighbours that stay are kept up to date. A vertex
 looks for its best neighbour only if no neighbour of it has collapsed in the pass. At the end the triangles with three
@@ -30,8 +30,8 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import record
 from warpflat.core.sums import range_offsets
 from warpflat.core.threads import thread_count
-from warpflat.kernels.coarsen import Ring, collapse, compose_rows, order_rings, place, sort_corners
-from warpflat.model.springs import unweighed_springs
+from warpflat.kernels.coarsen import Ring, collapse, compose_rows, locate, order_rings, sort_corners
+from warpflat.model.springs import spring_geometry
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation
 from warpflat.solver.multigrid.grid_coarsening import (
     CoarsenedGrid,
@@ -235,7 +235,7 @@ def _prepare_levels(surface: Surface) -> None:
     for step in coarsenings_of(surface):
         if step.smooth_interpolation is None:
             cells_of(step.surface)
-            unweighed_springs(step.surface)
+            spring_geometry(step.surface)
             _ = step.transfer.transpose
 
 
@@ -285,7 +285,7 @@ def _collapse_edges(surface: Surface, layout: FloatArray | None) -> Coarsening |
         return None
     parent = wp.empty(count, dtype=wp.vec3i, device="cpu")
     weight = wp.empty(count, dtype=wp.vec3d, device="cpu")
-    record(place, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
+    record(locate, dim=count, inputs=[ring, gone, target], outputs=[parent, weight], device="cpu").launch()
     kept = np.flatnonzero(gone.numpy() == 0).astype(np.int32)
     corners = _final_vertices(gone.numpy(), parent.numpy()[:, 0])[triangles]
     whole = (corners[:, 0] != corners[:, 1]) & (corners[:, 1] != corners[:, 2]) & (corners[:, 2] != corners[:, 0])

@@ -77,7 +77,7 @@ def _calibrate(network: SpringNetwork, layout: FloatArray, fine: SpringNetwork, 
     s, stiffness = network.spring_arrays, network.spring_arrays.listed_stiffness.copy()
     given = [layout, s.around.offset, s.around.neighbor, wp.vec3d(*factor), *_FACTOR_BOUNDS]
     launch_each(weigh_by_direction, network.vertex_count, given, [stiffness])
-    network.make_springs(stiffness)
+    network.replace_stiffness(stiffness)
 
 
 def make_coarse_levels(
@@ -118,7 +118,7 @@ def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) ->
         for made in (network, *(level.network for level in coarse_levels)):
             drop_result(made.surface, half_edges_of)
             if made.surface.is_quad.all():
-                made.spring_arrays.around.forget_numbers()
+                made.spring_arrays.around.drop_numbers()
         if row_major_grid(network.surface) is None:
             # Make the transfers now, so that the memory they need on the way is returned, too.
             for level in coarse_levels:
@@ -132,7 +132,7 @@ def _is_lowest(network: SpringNetwork) -> bool:
     On a small grid of a stiff cloth steps take less time than another level below it would. In a soft cloth, or beside
     a crack that opens, they would be too many.
     """
-    few = network.vertex_count <= _LOWEST_GRID and network.model == "springs" and not network.goes_along_lines
+    few = network.vertex_count <= _LOWEST_GRID and network.model == "springs" and not network.uses_line_relaxation
     return (few and rows_and_columns(network.surface) is not None) or is_coarsest(network.surface)
 
 
@@ -186,7 +186,7 @@ def make_cascade_start(network: SpringNetwork, layout: FloatArray, max_vertices:
 
 
 def _resampling_kind(network: SpringNetwork) -> ResamplingKind:
-    if network.goes_along_lines:
+    if network.uses_line_relaxation:
         return "fine"
     return "thirds" if network.is_stiff else "halves"
 
@@ -234,8 +234,8 @@ def _make_network(
         device=fine.device,
         model=fine.model,
         stretch=None if fine.stretch is None else fine.stretch[face_of],
-        # Only the finest mesh tells how its springs hold the threads.
-        hold=float(fine.shear_hold),
+        # Measured on the finest mesh only.
+        buckling_stiffness=float(fine.buckling_stiffness),
     )
     return network, layout
 

@@ -20,6 +20,7 @@ from warpflat.solver.multigrid.acceleration import SubspaceAcceleration
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation
 from warpflat.solver.multigrid.hierarchy import CoarseLevel, drop_caches, identity_coarsening, make_coarse_levels
 from warpflat.solver.multigrid.level_transfer import LevelTransfer, make_level_transfer, set_displacement
+from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 
@@ -124,23 +125,17 @@ class Levels:
         self.check_interval = _check_interval(finest.network)
         steps = _STEPS_SOFT if self.is_soft else _STEPS
         self.all = [Level(finest, steps=_STEPS_SMOOTH_START if self.is_lattice or not repair else steps)]
-        ready = {tuple(map(id, level.state.network.pieces)): level for level in known}
+        ready = {_identity(level.state.network.pieces): level for level in known}
         for coarse_levels in zip(*hierarchies, strict=True):
-            networks = [each.network for each in coarse_levels]
-            coarse = ready.get(tuple(map(id, networks)))
-            if coarse is not None:
-                coarse.steps = steps
-            else:
-                layouts = [each.layout for each in coarse_levels]
-                start = layouts[0] if len(layouts) == 1 else np.concatenate(layouts)
-                coarse = Level(Relaxation(join_networks(networks), finest.options, start=start), steps=steps)
+            coarse = ready.get(_identity([each.network for each in coarse_levels]))
+            coarse = coarse or Level(_join_states(coarse_levels, finest.options), steps=steps)
+            coarse.steps = steps
             fine = self.all[-1]
             if fine.transfer is None:
-                fine.transfer = make_level_transfer(
-                    fine.state, [each.coarsening for each in coarse_levels], coarse.state
-                )
+                coarsenings = [each.coarsening for each in coarse_levels]
+                fine.transfer = make_level_transfer(fine.state, coarsenings, coarse.state)
             self.all.append(coarse)
-        if finest.network.goes_along_lines:
+        if finest.network.uses_line_relaxation:
             for level in self.all:
                 _use_lines(level)
         self.update_matrices()
@@ -330,6 +325,18 @@ class Levels:
         base = wp.empty_like(state.position) if transfer is None else transfer.base
         wp.copy(base, state.position)
         return self.line_search(level, base, state.scratch, energy, found, least_fraction=least_fraction)
+
+
+def _identity(networks: Sequence[SpringNetwork]) -> tuple[int, ...]:
+    """Return a key of these very networks."""
+    return tuple(map(id, networks))
+
+
+def _join_states(coarse_levels: Sequence[CoarseLevel], options: RelaxOptions) -> Relaxation:
+    """Return the state of the pieces' coarse levels side by side."""
+    layouts = [each.layout for each in coarse_levels]
+    start = layouts[0] if len(layouts) == 1 else np.concatenate(layouts)
+    return Relaxation(join_networks([each.network for each in coarse_levels]), options, start=start)
 
 
 def _use_lines(level: Level) -> None:
