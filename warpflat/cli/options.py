@@ -1,4 +1,4 @@
-"""What commands have in common: exit codes, options, and the check for memory."""
+"""Parts that commands share: exit codes, options, and the check for memory."""
 
 from __future__ import annotations
 

@@ -202,7 +202,7 @@ def atomic_path(final: str | os.PathLike[str], *, sources: Iterable[Path] = ()) 
 
 
 class _Run:
-    """What is being written into a folder: new files in a hidden folder, and later those aside which they replace.
+    """The files that a run writes into a folder: new ones in a hidden folder, and later the old ones that they replace.
 
     Attributes:
         folder: where the files belong.

@@ -16,15 +16,16 @@ from warpflat.kernels.reduce import dot_blocks, least_of_blocks, sum_blocks
 __all__ = ["DeviceSums"]
 
 
-# So many values one thread goes through.
+# Values that one thread adds up.
 _BLOCK = 64
 
 
 class DeviceSums:
-    """Sums, least values and scalar products of each of several ranges, one after the other, of arrays on a device.
+    """Sums, least values and scalar products over consecutive ranges of arrays on a device.
 
     Attributes:
-        blocks: where the blocks begin that a first launch goes through, and the last one ends. first_block: of each range the first.
+        blocks: first value of each block that a thread of the first launch reduces, and the end of the last block.
+        first_block: number of the first block of each range, and the count of blocks.
     """
 
     def __init__(self, counts: Sequence[int], device: wp.Device) -> None:
@@ -47,32 +48,32 @@ class DeviceSums:
 
     @property
     def result(self) -> wp.array:
-        """#P, where the last result is on the device."""
+        """#P, the last result, on the device."""
         return self._rooms[-1]
 
     def sums(self, values: wp.array) -> FloatArray:
-        """#P, of float64; the array is to be there as long as this is."""
+        """Return the sum of each range of float64, #P; the array must live as long as this object."""
         return self._of(("sum", id(values)), lambda: self.summing(values))
 
     def least(self, values: wp.array) -> FloatArray:
-        """#P, the least of each; likewise."""
+        """Return the least value of each range, #P; the array must live as long as this object."""
         return self._of(("least", id(values)), lambda: self._launches(least_of_blocks, [values], least_of_blocks))
 
     def dots(self, a: wp.array, b: wp.array) -> FloatArray:
-        """#P, sums of the scalar products of vec2d; likewise."""
+        """Return the sum of scalar products of vec2d in each range, #P; the arrays must live as long as this object."""
         return self._of(("dot", id(a), id(b)), lambda: self._launches(dot_blocks, [a, b], sum_blocks))
 
     def least_after(self, first: Callable[[wp.array], Launch]) -> LaunchSequence:
-        """What puts the least of each range where `result` is, of values for each block, which a launch puts where it is told to."""
+        """Return launches that leave the least value of each range in `result`; `first` makes the one that fills the blocks."""
         return LaunchSequence([first(self._rooms[0]), *self._rest(least_of_blocks)])
 
     def of(self, what: LaunchSequence) -> FloatArray:
-        """#P, the result of this."""
+        """Launch a sequence and return its result, #P."""
         what.launch()
         return self._fetched()
 
     def summing(self, values: wp.array) -> list[Launch]:
-        """What puts the sums where `result` is."""
+        """Return launches that leave the sums in `result`."""
         return self._launches(sum_blocks, [values], sum_blocks)
 
     def _of(self, key: Hashable, make: Callable[[], list[Launch]]) -> FloatArray:
@@ -88,7 +89,7 @@ class DeviceSums:
         return np.array(self._host.numpy())
 
     def _launches(self, kernel: wp.Kernel, given: Sequence[wp.array], on: wp.Kernel) -> list[Launch]:
-        """The kernel over blocks of the values, and what goes on with its results."""
+        """Return the launch of a kernel over blocks of the values, and those that reduce its results."""
         at, room = self._chain[0], self._rooms[0]
         begun = record(kernel, dim=len(room), inputs=[*given, at], outputs=[room], device=self._device)
         return [begun, *self._rest(on)]
@@ -101,7 +102,7 @@ class DeviceSums:
 
 
 def _blocks_of(begin: IntArray) -> tuple[IntArray, IntArray]:
-    """Where the blocks of ranges begin, and the last one ends; of each range the first block, and how many there are."""
+    """Return the ends of the blocks of ranges, and the number of each range's first block followed by the count."""
     counts = -(-np.diff(begin) // _BLOCK)
     first = range_offsets(counts)
     inside = np.arange(first[-1]) - np.repeat(first[:-1], counts)

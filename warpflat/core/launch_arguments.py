@@ -109,7 +109,8 @@ class _Form:
         rooms = np.diff([*begins, ctypes.sizeof(self._arguments)]).tolist()
         self._first_at = begins[first]
         ways = [
-            _way(arg.type, kind, room, self._device) for arg, kind, room in zip(args, self._kinds, rooms, strict=True)
+            _packer(arg.type, kind, room, self._device)
+            for arg, kind, room in zip(args, self._kinds, rooms, strict=True)
         ]
         self._ways = [way for way in ways if way is not None]
         self.fits = self.fits and len(self._ways) == len(ways)
@@ -155,9 +156,18 @@ _LINE = struct.Struct("=QQiiiiiiiiHH4x")
 _INT = struct.Struct("=i")
 
 
-def _way(of: Any, kind: type, room: int, device: wp.Device) -> Callable[[Any], Any] | None:
-    """How a value for an argument of this type becomes bytes, as many as there is room for, or something that lies so in memory. kind: the
-    C value that Warp packed it into. None where arrays are laid out otherwise than they are taken to be here."""
+def _packer(of: Any, kind: type, room: int, device: wp.Device) -> Callable[[Any], Any] | None:
+    """Return a function that packs the value of an argument into bytes, or into an object laid out like them.
+
+    Args:
+        of: the argument's type.
+        kind: the C value into which Warp packed it.
+        room: bytes of the argument.
+        device: that of the launch.
+
+    Returns:
+        the function; None where this release of Warp lays arrays out in another way.
+    """
     if isinstance(of, wp.array):
         scalar = getattr(of.dtype, "_wp_scalar_type_", of.dtype)
         inner = tuple(getattr(of.dtype, "_shape_", ()))

@@ -1,4 +1,4 @@
-"""What native code writes straight to the file descriptor of standard error, past Python's `sys.stderr`."""
+"""Output that native code writes straight to the file descriptor of standard error, past Python's `sys.stderr`."""
 
 from __future__ import annotations
 

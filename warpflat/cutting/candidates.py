@@ -69,7 +69,7 @@ class Candidate:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Peaks:
-    """Where the energy of a piece is highest, away from its border.
+    """Maxima of the energy density inside a piece, away from its border.
 
     Attributes:
         map: of the uncut surface, see `warpflat.surface.energy_map`.

@@ -84,7 +84,7 @@ class LedgerEntry:
 
     @property
     def overlaps(self) -> bool:
-        """Whether the sides of the widest dart overlap, so that it could not be sewn."""
+        """True if the sides of the widest dart overlap, so that it could not be sewn."""
         return self.angle < 0
 
     def as_dict(self) -> dict[str, Any]:

@@ -56,7 +56,7 @@ class Paper:
 
     @property
     def tiled(self) -> bool:
-        """Whether the paper is so small that a piece spreads over several sheets."""
+        """True if the paper is so small that a piece spreads over several sheets."""
         return self.width < 0.5
 
 

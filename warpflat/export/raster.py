@@ -68,7 +68,7 @@ def rasterise(points: FloatArray, triangles: IntArray, shape: tuple[int, int]) -
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lighting:
-    """How faces are lit.
+    """Light on the faces of a picture.
 
     Attributes:
         normals: of any length, towards the viewer where the face's front is seen; None for no light.

@@ -44,7 +44,7 @@ class EdgePlan:
 
 @dataclass(frozen=True, kw_only=True)
 class FormPlan:
-    """What a form becomes as a pattern.
+    """The edges, seams and mirror pairs of a form as a pattern.
 
     Attributes:
         edges: by piece, counter-clockwise.

@@ -88,7 +88,7 @@ class Garment:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """What was completed, repaired or chosen, one sentence each."""
+        """Notes on completions, repairs and choices, one sentence each."""
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 

@@ -34,7 +34,7 @@ FORMATS = ("dxf", "svg", "pdf", "json")
 
 @dataclass(frozen=True, kw_only=True)
 class PatternOptions:
-    """Which files of a pattern are written, and how.
+    """The formats of a pattern, and options of the drawing.
 
     Attributes:
         formats: some of "dxf", "svg", "pdf", "json".

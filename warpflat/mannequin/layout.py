@@ -66,7 +66,7 @@ class Strips:
 
     @property
     def mirror(self) -> IntArray:
-        """For each vertex its mirror image at the midplane."""
+        """#V, the mirror image of each vertex at the midplane."""
         out = np.full(self.vertex_count, -1, np.int32)
         n = self.rings.shape[1]
         out[self.rings] = self.rings[:, -np.arange(n) % n]

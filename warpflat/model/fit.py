@@ -105,7 +105,7 @@ class WornFit:
 
     @property
     def fits(self) -> bool:
-        """Whether at most 1 % of the cloth is strained beyond the fabric's limit, stretched or slack."""
+        """True if at most 1 % of the cloth is strained beyond the fabric's limit, stretched or slack."""
         return self.outside <= TOLERATED
 
     def as_dict(self) -> dict[str, Any]:

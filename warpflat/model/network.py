@@ -243,12 +243,12 @@ class SpringNetwork:
 
     @property
     def uses_line_relaxation(self) -> bool:
-        """Whether smoothing uses line relaxation on lattices."""
+        """True if smoothing uses line relaxation on lattices."""
         return self.model == "springs" and self.fabric.softness >= _SOFT
 
     @property
     def is_stiff(self) -> bool:
-        """Whether smoothing alone brings a layout to rest that was interpolated from a relaxed coarser grid."""
+        """True if smoothing alone brings a layout to rest that was interpolated from a relaxed coarser grid."""
         return self.model == "springs" and self.fabric.softness < _STIFF
 
     @property

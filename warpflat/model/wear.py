@@ -60,7 +60,7 @@ class Wear:
 
     @property
     def is_tight(self) -> bool:
-        """Whether the garment is to be smaller than the body."""
+        """True if the garment is to be smaller than the body."""
         return self.stretch_warp > 0.0 or self.stretch_weft > 0.0 or bool(self.pressure)
 
 

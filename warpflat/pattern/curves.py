@@ -174,7 +174,7 @@ def _lengths_inside(points: FloatArray, depth: float) -> FloatArray:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _FitGoal:
-    """What the curve of one stretch is measured by.
+    """The lengths and tolerances that the curve of one stretch has to meet.
 
     Attributes:
         points: #P by 2 [m], what it runs along.

@@ -28,7 +28,7 @@ DartPlaces = tuple[int, int, int]
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class MeshFeatures:
-    """What is known of a flat mesh besides its faces.
+    """Features of a flat mesh: lines, kinds of edges, darts, grain.
 
     Attributes:
         lines: feature lines by name, vertex indices along mesh edges.

@@ -29,7 +29,7 @@ OVERLAP = 1e-8
 
 @dataclass(frozen=True, kw_only=True)
 class Cloth:
-    """What a fabric allows on the cutting table.
+    """Width of the cloth, and how pieces may lie on it.
 
     Attributes:
         width: usable width between the selvedges [m].

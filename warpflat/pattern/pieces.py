@@ -195,7 +195,7 @@ class Piece:
 
     @property
     def on_fold(self) -> bool:
-        """Whether it is the half of a symmetric piece."""
+        """True for the half of a symmetric piece."""
         return any(edge.kind == "fold" for edge in self.edges)
 
     @property

@@ -58,7 +58,7 @@ def adjust_lengths(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class _Fit:
-    """How well a spline fits.
+    """The errors of a fitted spline.
 
     Attributes:
         control: #control by 2 [m].

@@ -144,7 +144,7 @@ class FrameSchedule:
 
     @property
     def wanted(self) -> bool:
-        """Whether there are frames at all."""
+        """True if any frame is written."""
         return self._number > 0
 
     def is_due(self, step: int, max_steps: int) -> bool:

@@ -175,7 +175,7 @@ class SeamTable(Table):
 
 
 class ConstraintTable(Table):
-    """What is asked of an edge or a feature line, in one piece or in all that have it.
+    """A constraint on an edge or a feature line, in one piece or in all that have it.
 
     `straight` lays it on a straight line: of any direction ("free"), parallel to the grain ("warp") or at right angles to it
     ("weft"). `length_mm` keeps every mesh edge at its length on the body ("body") or at its share of a length,
@@ -202,7 +202,7 @@ class ConstraintTable(Table):
 
 
 class WearTable(Table):
-    """How the garment is meant to be worn (see `warpflat.model.wear.Wear`); an empty table asks how it sits, no more."""
+    """The intended fit of the garment (see `warpflat.model.wear.Wear`); an empty table asks how it sits, no more."""
 
     stretch_warp: float = 0.0
     stretch_weft: float = 0.0
@@ -210,7 +210,7 @@ class WearTable(Table):
 
 
 class OutputTable(Table):
-    """What is written besides `metrics.json` and `NAME.obj`."""
+    """Files written besides `metrics.json` and `NAME.obj`."""
 
     frames: Annotated[int, Field(ge=0, le=100_000)] = 60
     """About how many frames, close together at first, when the pattern moves most; 0 for no `frames.usdc`."""

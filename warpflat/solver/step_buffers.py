@@ -263,7 +263,7 @@ class StepBuffers:
 
     @cached_property
     def stop(self) -> list[Launch]:
-        """For each piece, velocities set to zero."""
+        """Velocities of single pieces, set to zero."""
         return [
             record(
                 stop,

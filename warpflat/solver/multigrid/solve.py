@@ -82,7 +82,7 @@ class _CycledPieces:
 
     @property
     def finished(self) -> BoolArray:
-        """Whether each piece is at rest, or its cycles gain too little, #P."""
+        """#P, true for pieces at rest and for those whose cycles gain too little."""
         return self.state.status.at_rest | [piece.gains_little for piece in self.progress]
 
     def without_finished(self) -> _CycledPieces | None:
