@@ -29,8 +29,8 @@ def segment_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
 
 
 def polyline_length(points: FloatArray, *, closed: bool = False) -> float:
-    """The length of a polyline."""
-    return float(segment_lengths(points, closed=closed).sum())
+    """Return the length of a polyline, the last of its arc lengths bit for bit."""
+    return float(arc_lengths(points, closed=closed)[-1])
 
 
 def arc_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
