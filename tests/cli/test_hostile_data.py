@@ -17,8 +17,8 @@ import pytest
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import checked_label, plain_label
-from warpflat.core.text import one_line, shown
+from warpflat.core.file_names import check_label, plain_label
+from warpflat.core.text import one_line, quote_value
 from warpflat.core.toml_file import read_toml
 from warpflat.export.dxf import write_dxf
 from warpflat.export.pattern_json import pattern_json
@@ -62,13 +62,13 @@ def test_a_path_is_told_whole():
 
 
 def test_a_long_value_is_shown_by_its_ends():
-    assert shown("waist") == "'waist'"
-    assert shown("a" + "x" * 3000 + "b") == "'a" + "x" * 26 + "..." + "x" * 26 + "b'"
-    assert shown(16**5000) == "a value too long to be shown"
+    assert quote_value("waist") == "'waist'"
+    assert quote_value("a" + "x" * 3000 + "b") == "'a" + "x" * 26 + "..." + "x" * 26 + "b'"
+    assert quote_value(16**5000) == "a value too long to be shown"
     deep: list[Any] = []
     for _ in range(100_000):
         deep = [deep]
-    assert len(shown(deep)) <= 60
+    assert len(quote_value(deep)) <= 60
 
 
 def test_valid_words_are_listed_as_far_as_they_are_read():
@@ -85,7 +85,7 @@ def test_valid_words_are_listed_as_far_as_they_are_read():
 def test_no_name_has_a_control_character(control: str):
     name = f"centre{control}front"
     with pytest.raises(InputError, match="control character"):
-        checked_label(name, "line")
+        check_label(name, "line")
     assert plain_label(name) == "centre_front"
     dome = make_shape("dome", resolution=5)
     with pytest.raises(InputError, match="control character"):
@@ -101,12 +101,12 @@ def test_no_name_has_a_control_character(control: str):
 @pytest.mark.parametrize("name", ["", " ", 3, None])
 def test_an_edge_has_a_name(name: Any):
     with pytest.raises(InputError, match="is no name"):
-        checked_label(name, "edge")
+        check_label(name, "edge")
 
 
 @pytest.mark.parametrize("name", ["centre front", "Saumlänge", "دامن", "نمی‌خواهم", "裁片", "x" * 3000])
 def test_letters_of_every_script_are_no_control_characters(name: str):
-    assert checked_label(name, "line") == plain_label(name) == name
+    assert check_label(name, "line") == plain_label(name) == name
 
 
 @pytest.mark.parametrize("control", CONTROLS)

@@ -63,9 +63,9 @@ def test_a_signal_while_the_process_ends_changes_nothing(number: signal.Signals,
 
 def test_a_signal_in_a_destructor_is_not_lost(tmp_path: Path):
     code = (
-        "import os, signal, sys, time; from warpflat.cli.signals import Stopped, raised_by_signals\n"
+        "import os, signal, sys, time; from warpflat.cli.signals import Stopped, stop_on_signals\n"
         "class Ends:\n    def __del__(self): os.kill(os.getpid(), signal.SIGTERM); time.sleep(0)\n"
-        "try:\n    with raised_by_signals():\n        Ends()\n        time.sleep(30)\n"
+        "try:\n    with stop_on_signals():\n        Ends()\n        time.sleep(30)\n"
         "except Stopped as stopped: sys.exit(stopped.code)"
     )
     assert ended(code, tmp_path) == (143, "")
@@ -76,8 +76,8 @@ def test_a_signal_in_a_module_that_swallows_all_exceptions_is_not_lost(tmp_path:
         "import os, signal\ntry:\n    os.kill(os.getpid(), signal.SIGTERM)\nexcept BaseException:\n    pass\n"
     )
     code = (
-        "import sys, time; from warpflat.cli.signals import Stopped, raised_by_signals; sys.path.insert(0, '.')\n"
-        "try:\n    with raised_by_signals():\n        import swallowing\n        time.sleep(30)\n"
+        "import sys, time; from warpflat.cli.signals import Stopped, stop_on_signals; sys.path.insert(0, '.')\n"
+        "try:\n    with stop_on_signals():\n        import swallowing\n        time.sleep(30)\n"
         "except Stopped as stopped: sys.exit(stopped.code)"
     )
     assert ended(code, tmp_path) == (143, "")

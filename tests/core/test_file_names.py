@@ -11,7 +11,7 @@ import pytest
 import warpflat
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import checked_name, fitted_name
+from warpflat.core.file_names import check_file_name, make_file_name
 from warpflat.garment.pattern_files import export_patterns
 from warpflat.mannequin.forms import form_from_mapping
 from warpflat.scene.load import make_scene
@@ -46,20 +46,20 @@ GOOD = ("front_bodice", "devant é", "裁 片", "a.b", "back (lining), 2 of 'sil
 @pytest.mark.parametrize(("name", "words"), BAD.items())
 def test_names_that_no_file_can_bear_are_refused_in_one_line(name: str, words: str):
     with pytest.raises(InputError, match=words) as refused:
-        checked_name(name)
+        check_file_name(name)
     assert "\n" not in str(refused.value)
     assert len(str(refused.value)) < 200
 
 
 @pytest.mark.parametrize("name", GOOD)
 def test_other_names_stay_as_they_are(name: str):
-    assert checked_name(name) == fitted_name(name) == name
+    assert check_file_name(name) == make_file_name(name) == name
 
 
 @pytest.mark.parametrize("name", BAD)
 def test_names_that_nobody_chose_are_made_to_fit(name: str):
-    fitted = fitted_name(name)
-    assert checked_name(fitted) == fitted
+    fitted = make_file_name(name)
+    assert check_file_name(fitted) == fitted
 
 
 @pytest.mark.parametrize("piece", ["../evil", "/tmp/absolute", "", "a\nb"])

@@ -29,7 +29,7 @@ from warpflat.scene.schema import CutTable
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface import half_edges as mesh_half_edges
-from warpflat.surface.cells import cells_of, creases_of
+from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.cut.pieces import apply_cut
 from warpflat.surface.io.read import read_surface
@@ -238,13 +238,13 @@ def test_what_a_cut_knows_of_its_faces_is_not_worked_out_again(
 def test_a_cut_has_the_creases_and_cells_that_its_own_surface_tells(bodice: Flattening, bust_cut: Flattening):
     surface = bust_cut.network.surface
     afresh = replace(surface)
-    assert cells_of(surface).laid is cells_of(bodice.surface).laid
-    assert np.array_equal(creases_of(surface), creases_of(afresh))
-    for name, values in vars(cells_of(afresh)).items():
+    assert make_cells(surface).laid is make_cells(bodice.surface).laid
+    assert np.array_equal(face_creases(surface), face_creases(afresh))
+    for name, values in vars(make_cells(afresh)).items():
         if name != "around":
-            assert np.array_equal(getattr(cells_of(surface), name), values), name
-    for name, values in vars(cells_of(afresh).around).items():
-        assert np.array_equal(getattr(cells_of(surface).around, name), values), name
+            assert np.array_equal(getattr(make_cells(surface), name), values), name
+    for name, values in vars(make_cells(afresh).around).items():
+        assert np.array_equal(getattr(make_cells(surface).around, name), values), name
 
 
 def test_the_relaxation_goes_on_from_the_present_layout(bodice: Flattening):

@@ -14,7 +14,7 @@ from warpflat.export.geometry import corner_average, face_areas, outline_edges
 from warpflat.export.labels import (
     LabelRoom,
     Spot,
-    leader_of,
+    leader_line,
     points_on,
     space_out,
     spots_along,
@@ -30,7 +30,7 @@ from warpflat.surface.half_edges import border_edges
 from warpflat.surface.triangles import triangulate
 
 
-def piece_of(shape, density=None, **options) -> PicturePiece:
+def find_piece(shape, density=None, **options) -> PicturePiece:
     count = len(shape.faces)
     given = {
         "name": shape.name,
@@ -55,7 +55,9 @@ def near(pixels: np.ndarray, colour: np.ndarray, tolerance: float = 0.02) -> int
 
 def test_picture_shows_both_views_in_the_colours_of_the_scale(tmp_path: Path) -> None:
     shape = dome(9)
-    write_picture(tmp_path / "a.png", [piece_of(shape, datum="centre front", captions={"fabric": "poplin"})], scale=1.0)
+    write_picture(
+        tmp_path / "a.png", [find_piece(shape, datum="centre front", captions={"fabric": "poplin"})], scale=1.0
+    )
     pixels = pixels_of(tmp_path / "a.png")
     height, width, _ = pixels.shape
     assert width == 1875
@@ -75,7 +77,7 @@ def test_a_name_that_no_font_can_write_is_a_number_in_pictures(tmp_path: Path) -
     for file, names in (("a.png", ("front", *nameless)), ("b.png", ("front", "piece", "piece 2"))):
         with warnings.catch_warnings():
             warnings.simplefilter("error")
-            write_picture(tmp_path / file, [piece_of(dome(5), name=name) for name in names])
+            write_picture(tmp_path / file, [find_piece(dome(5), name=name) for name in names])
     assert (tmp_path / "a.png").read_bytes() == (tmp_path / "b.png").read_bytes()
     assert titles(["piece", *nameless], is_drawn) == {"piece": "piece", nameless[0]: "piece 2", nameless[1]: "piece 3"}
     assert note_on_names(["front", "devant é", "Ωмега"]) == ()
@@ -90,7 +92,7 @@ def test_fonts_for_other_scripts_are_used_where_they_are_installed(monkeypatch: 
 
 
 def test_pieces_are_rows_and_share_the_scale(tmp_path: Path) -> None:
-    whole, half = piece_of(dome(5), np.full(16, 1.0)), piece_of(dome(5, "half"), np.full(16, 0.5))
+    whole, half = find_piece(dome(5), np.full(16, 1.0)), find_piece(dome(5, "half"), np.full(16, 0.5))
     write_picture(tmp_path / "two.png", [whole, half])
     two = pixels_of(tmp_path / "two.png")
     upper, lower = np.split(two[:, : int(0.87 * two.shape[1])], [two.shape[0] // 2])
@@ -113,14 +115,14 @@ def test_all_kinds_of_pieces_can_be_drawn(tmp_path: Path) -> None:
         whole.vertices, np.delete(whole.faces, [20, 21, 28], axis=0), "holed", across=whole.lines["bust line"]
     )
     pieces = [
-        piece_of(strip, positions=flat_strip, datum="fold"),
-        piece_of(quad, np.zeros(1)),
-        piece_of(mixed(), np.array([1.0, 2.0, 1e9])),
-        piece_of(
+        find_piece(strip, positions=flat_strip, datum="fold"),
+        find_piece(quad, np.zeros(1)),
+        find_piece(mixed(), np.array([1.0, 2.0, 1e9])),
+        find_piece(
             whole, faces=faces, positions=whole.vertices[to_surface, :2], lines={"dart $x_1": crack}, datum="none"
         ),
-        piece_of(ground, positions=ground.vertices[:, [0, 2]]),
-        piece_of(holed, datum="across"),
+        find_piece(ground, positions=ground.vertices[:, [0, 2]]),
+        find_piece(holed, datum="across"),
     ]
     write_picture(tmp_path / "a.png", pieces)
     assert (pixels_of(tmp_path / "a.png").min(axis=-1) < 0.9).mean() > 0.05
@@ -375,7 +377,7 @@ def test_a_leader_runs_over_no_text_but_over_passable_lines() -> None:
         assert room.place(led, 0.5, 0.1, page) == expected
         # A text stands on neither.
         assert room.place([Spot(x=0.8, y=0.8, angle=0.0)], 0.5, 0.1, page) is None
-    ends = leader_of(led[0], 0.5)
+    ends = leader_line(led[0], 0.5)
     assert ends is not None
     np.testing.assert_allclose(ends, [[0.2, 1.0], [1.21, 1.0]])
 
@@ -426,7 +428,7 @@ def test_names_across_a_narrow_piece_stand_beside_it(tmp_path: Path, monkeypatch
         write(self, x, y, text, size, **options)
 
     monkeypatch.setattr(Pen, "write", told)
-    write_picture(tmp_path / "strip.png", [piece_of(strip, lines=lines, surface_lines=lines)])
+    write_picture(tmp_path / "strip.png", [find_piece(strip, lines=lines, surface_lines=lines)])
     assert sorted(text for text, _, _ in written) == sorted([*lines, *lines])
     for view in (written[:5], written[5:]):
         by_height = sorted(view, key=lambda label: label[2])

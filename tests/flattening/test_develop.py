@@ -10,7 +10,7 @@ from warpflat.core.errors import InputError
 from warpflat.flattening.datum import choose_and_name_datum, choose_datum
 from warpflat.flattening.develop import _winds_twice, develop, flat_layout, geodesic_layout, profile_layout
 from warpflat.flattening.harmonic_layout import harmonic_layout
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.half_edges import mesh_edges
 from warpflat.surface.mesh import Surface
@@ -25,7 +25,7 @@ FloatArray = NDArray[np.float64]
 
 
 def mirrored(surface: Surface, positions: FloatArray) -> int:
-    return int((signed_cell_areas(cells_of(surface).corner, positions) <= 0).sum())
+    return int((signed_cell_areas(make_cells(surface).corner, positions) <= 0).sum())
 
 
 def edge_errors(surface: Surface, positions: FloatArray) -> FloatArray:
@@ -308,7 +308,7 @@ def test_whatever_the_mesh_the_first_layout_is_unfolded_and_says_how_it_came_abo
 
 
 def crushed_faces(surface: Surface, positions: FloatArray) -> int:
-    cells = cells_of(surface)
+    cells = make_cells(surface)
     crushed = signed_cell_areas(cells.corner, positions) * cells.weight <= 0.01 * cells.area
     return len(np.unique(cells.face[crushed]))
 
@@ -341,14 +341,14 @@ def fan(turns: float, *, closed: bool) -> tuple[Surface, FloatArray]:
 def test_faces_that_go_around_a_vertex_twice_are_found(turns: float, closed: bool, twice: bool):
     surface, positions = fan(turns, closed=closed)
     assert mirrored(surface, positions) == 0
-    assert _winds_twice(surface, cells_of(surface), positions) == twice
+    assert _winds_twice(surface, make_cells(surface), positions) == twice
 
 
 @pytest.mark.parametrize("turns", [0.9, 1.05, 1.6, 2.4])
 def test_faces_that_go_around_a_border_vertex_by_more_than_a_turn_are_found(turns: float):
     surface, positions = fan(turns, closed=False)
     assert mirrored(surface, positions) == 0
-    assert _winds_twice(surface, cells_of(surface), positions) == (turns > 1)
+    assert _winds_twice(surface, make_cells(surface), positions) == (turns > 1)
 
 
 # --- rings and tubes

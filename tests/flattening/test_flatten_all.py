@@ -28,7 +28,7 @@ from warpflat.solver.multigrid.solve import _CycledPieces, _PieceProgress, multi
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -233,7 +233,7 @@ def test_a_joined_network_is_listed_as_that_of_the_joined_surface():
     joined = join_networks(parts)
     surface = join_surfaces([part.surface for part in parts])
     np.testing.assert_array_equal(joined.surface.faces, surface.faces)
-    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), cells_of(surface)
+    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), make_cells(surface)
     np.testing.assert_array_equal(joined.springs.offset.numpy(), springs.around.offset)
     np.testing.assert_array_equal(joined.springs.neighbor.numpy(), springs.around.neighbor)
     np.testing.assert_array_equal(joined.springs.rest_length.numpy(), springs.listed_length)

@@ -11,7 +11,7 @@ from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.edge_rules import EdgeRules
-from warpflat.garment.fullness import FullEdge, fullness_of, give_fullness
+from warpflat.garment.fullness import FullEdge, give_fullness, measure_fullness
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import FormResult
@@ -189,16 +189,16 @@ def test_fullness_fades_towards_an_edge_that_is_sewn_plainly():
     piece = flatten(make_shape("strip", resolution=9), datum="centre", fabric="woven")
     lines = piece.surface.lines
     gathered = FullEdge(vertices=lines["top"], factor=1.6, gathered=True)
-    through = fullness_of(piece, [gathered], [lines["left"], lines["right"]])
+    through = measure_fullness(piece, [gathered], [lines["left"], lines["right"]])
     np.testing.assert_allclose(through, np.tile([1.0, 1.6], (len(through), 1)), atol=1e-9)
-    fading = fullness_of(piece, [gathered], [lines["bottom"], lines["left"], lines["right"]])
+    fading = measure_fullness(piece, [gathered], [lines["bottom"], lines["left"], lines["right"]])
     np.testing.assert_allclose(fading[lines["bottom"], 1], 1.0)
     np.testing.assert_allclose(fading[lines["top"], 1], 1.6)
     upwards = lines["left"][np.argsort(piece.positions[lines["left"], 1])]
     inner = fading[upwards, 1]
     assert np.all(np.diff(inner) > 0.0)
     assert inner[len(inner) // 2] == pytest.approx(np.sqrt(1.6), rel=0.02), "halfway, in its logarithm"
-    near = fullness_of(piece, [FullEdge(vertices=lines["top"], factor=1.05, gathered=False)], [])
+    near = measure_fullness(piece, [FullEdge(vertices=lines["top"], factor=1.05, gathered=False)], [])
     np.testing.assert_allclose(near[lines["top"]], 1.05)
     np.testing.assert_allclose(near[lines["bottom"]], 1.0)
     np.testing.assert_allclose(near[:, 0], near[:, 1])

@@ -17,7 +17,7 @@ from warpflat.core.launch import launch_each
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import measure_buckling_stiffness, quad_stiffness, springs_along_cells, springs_of
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
 
@@ -105,7 +105,7 @@ def test_springs_are_listed_around_each_vertex_as_a_sort_has_them(name: str):
 @pytest.mark.parametrize("name", ["triangles", "mixed", "dome"])
 def test_each_side_of_a_cell_has_the_spring_between_its_ends(name: str):
     surface = SURFACES[name]()
-    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), cells_of(surface)
+    springs, cells = springs_of(surface, CLOTH, surface.vertices[:, :2]), make_cells(surface)
     side = springs_along_cells(springs, cells)
     wished = np.stack([cells.corner, np.roll(cells.corner, -1, axis=1)], axis=-1).reshape(-1, 2)
     np.testing.assert_array_equal(np.sort(springs.ends[side], axis=1), np.sort(wished, axis=1))
@@ -115,7 +115,7 @@ def test_each_side_of_a_cell_has_the_spring_between_its_ends(name: str):
 def test_hold_is_the_lower_quartile_of_what_springs_store_in_shear(name: str):
     surface = SURFACES[name]()
     positions, (warp, weft) = surface.vertices[:, :2] * [1.0, 0.9], grain_axes(20.0)
-    springs, cells = springs_of(surface, CLOTH, positions, grain_angle=20.0), cells_of(surface)
+    springs, cells = springs_of(surface, CLOTH, positions, grain_angle=20.0), make_cells(surface)
     d = positions[springs.ends[:, 1]] - positions[springs.ends[:, 0]]
     share = (d @ warp) * (d @ weft) / (norm(d) ** 2)
     half = 0.5 * springs.stiffness * springs.rest_length**2 * share**2

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from warpflat.kernels.unfold import measure_triangles
 
 from warpflat.core.launch import launch_each
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import coincident_vertices
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -159,7 +159,7 @@ def test_cells_are_those_of_numpy(name: str):
     twice = norm(np.cross(a, b))
     edges = np.zeros((len(corner), 2, 2))
     edges[:, 0, 0], edges[:, 0, 1], edges[:, 1, 1] = norm(a), dot(a, b) / norm(a), twice / norm(a)
-    cells = cells_of(surface)
+    cells = make_cells(surface)
     for have, wished in ((cells.corner, corner), (cells.face, face), (cells.weight, weight)):
         np.testing.assert_array_equal(have, wished)
     np.testing.assert_allclose(cells.edges, edges, rtol=1e-13, atol=1e-13 * edges.max())

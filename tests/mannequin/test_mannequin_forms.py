@@ -7,7 +7,7 @@ import pytest
 from self_intersections import self_intersections
 
 from warpflat.core.errors import InputError
-from warpflat.mannequin.blend import blended
+from warpflat.mannequin.blend import blend_forms
 from warpflat.mannequin.forms import form_from_mapping, form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.profiles import convex_girth
@@ -123,7 +123,7 @@ def test_weighted_blend_lies_between(body: Mannequin) -> None:
     assert np.allclose(mixed.vertices, 0.75 * a.vertices + 0.25 * b.vertices)
     assert list(mixed.pieces) == list(a.pieces)
     with pytest.raises(InputError, match="one resolution"):
-        blended(a.vertices, b.vertices[:-1], 0.5)
+        blend_forms(a.vertices, b.vertices[:-1], 0.5)
 
 
 def test_sizes_of_one_form_correspond(body: Mannequin) -> None:

@@ -20,7 +20,7 @@ from warpflat.model.network import SpringNetwork, _repeated
 from warpflat.model.springs import quad_stiffness, springs_of
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -270,7 +270,7 @@ def test_every_spring_once_with_positive_stiffness_and_the_sum_around_each_verte
 @pytest.mark.parametrize("triangles", [False, True])
 def test_masses_add_up_to_the_cloth_and_none_is_zero(triangles: bool):
     surface = make_shape("dome", resolution=9, triangles=triangles)
-    cells = cells_of(surface)
+    cells = make_cells(surface)
     mass = SpringNetwork.build(surface, cloth(), surface.vertices[:, :2], device=DEVICE).mass.numpy()
     assert (mass > 0).all()
     assert mass.sum() == pytest.approx(0.15 * cells.area.sum(), rel=1e-12)

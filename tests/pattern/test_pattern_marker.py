@@ -13,7 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.export.svg import write_marker_svg
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.layout import lay_out, nests
-from warpflat.pattern.marker import Cloth, make_marker, unfolded
+from warpflat.pattern.marker import Cloth, make_marker, unfold_piece
 from warpflat.pattern.pieces import Edge, Garment, Hole, Piece
 
 
@@ -110,7 +110,7 @@ def test_names_stay_on_their_pieces():
 
 def test_a_half_on_the_fold_is_cut_whole(dress):
     (front,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
-    whole = shapely.Polygon(unfolded(front))
+    whole = shapely.Polygon(unfold_piece(front))
     assert whole.area == pytest.approx(2 * shapely.Polygon(front.cut_line).area, rel=1e-4)
     assert whole.bounds[0] == pytest.approx(-whole.bounds[2], abs=1e-5)
 

@@ -27,7 +27,7 @@ from warpflat.solver.multigrid.coarsen import (
     resampled_surface,
 )
 from warpflat.solver.multigrid.grid_coarsening import ResamplingKind
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic, non_manifold_vertices
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.grid import rows_and_columns
@@ -471,7 +471,7 @@ def test_cells_and_springs_of_levels_between_triangles_are_made_meanwhile(monkey
     for made_once in ("surface.cells.lay_cells", "model.springs.measure_edges"):
         monkeypatch.setattr(f"warpflat.{made_once}", None)
     for step in coarsenings_of(piece):
-        assert cells_of(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
+        assert make_cells(step.surface).area.sum() == pytest.approx(0.79 * 0.69)
         assert spring_geometry(step.surface).edge_count == len(half_edges_of(step.surface).edges)
 
 

@@ -127,9 +127,9 @@ def test_face_of_20000_corners_is_cut_into_triangles_that_are_no_slivers():
 
 
 def test_face_with_too_many_corners_beside_many_faces_is_named():
-    from warpflat.surface.repair.polygons import filled_up
+    from warpflat.surface.repair.polygons import pad_corners
 
     sizes = np.full(100_000, 3)
     sizes[7] = 50_000
     with pytest.raises(InputError, match=r"face 7 \(counted from 0\) has 50,000 corners"):
-        filled_up(np.zeros(sizes.sum(), dtype=np.int64), sizes)
+        pad_corners(np.zeros(sizes.sum(), dtype=np.int64), sizes)

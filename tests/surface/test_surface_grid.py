@@ -13,7 +13,7 @@ from warpflat.solver.multigrid.coarsen import coarsen, coarsenings_of
 from warpflat.solver.multigrid.cubic_interpolation import LatticeProlongation
 from warpflat.surface.connectivity import border_loops, components, euler_characteristic
 from warpflat.surface.cut.cut_mesh import cut_along
-from warpflat.surface.grid import Lattice, cut_lattice, lattice_of, rows_and_columns
+from warpflat.surface.grid import Lattice, cut_lattice, find_lattice, rows_and_columns
 from warpflat.surface.half_edges import non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -68,7 +68,7 @@ PIECES = {
 @pytest.mark.parametrize("name", PIECES)
 def test_rows_and_columns_are_found_however_the_mesh_is_numbered(name: str) -> None:
     surface = PIECES[name]
-    lattice = lattice_of(surface)
+    lattice = find_lattice(surface)
     assert lattice is not None
     # Up to a turn of the whole by quarters.
     places = np.column_stack([lattice.column, lattice.row, np.ones(len(lattice.row))])
@@ -89,10 +89,10 @@ def test_rows_and_columns_are_found_however_the_mesh_is_numbered(name: str) -> N
 
 def test_border_turns_at_corners_and_tips() -> None:
     # Four corners, both sides of the mouth of the crack, and its tip.
-    lattice = lattice_of(PIECES["crack"])
+    lattice = find_lattice(PIECES["crack"])
     assert lattice is not None
     assert np.count_nonzero(lattice.bends) == 7
-    ell_lattice = lattice_of(PIECES["L"])
+    ell_lattice = find_lattice(PIECES["L"])
     assert ell_lattice is not None
     assert np.count_nonzero(ell_lattice.bends) == 6
 
@@ -121,7 +121,7 @@ def corner_of_a_box() -> Surface:
 
 @pytest.mark.parametrize("surface", [ring(), corner_of_a_box(), make_shape("dome", resolution=9, triangles=True)])
 def test_what_lies_on_no_lattice(surface: Surface) -> None:
-    assert lattice_of(surface) is None
+    assert find_lattice(surface) is None
     assert rows_and_columns(surface) is None
 
 
@@ -140,7 +140,7 @@ def test_a_coarser_lattice_has_the_same_border_and_half_the_rows(name: str) -> N
     # A flat piece has the area and the length of border that it had.
     for measure in (area, border_length):
         assert measure(coarse) == pytest.approx(measure(fine))
-    lattice = lattice_of(fine)
+    lattice = find_lattice(fine)
     assert lattice is not None
     assert lattice.bends[step.kept].sum() == lattice.bends.sum()
     # One of the faces of the finer level that lie in it.
@@ -170,7 +170,7 @@ def test_cubics_are_carried_up_whole(name: str) -> None:
     assert isinstance(step.smooth_interpolation, LatticeProlongation)
     x, y = 10.0 * fine.vertices[:, 0], 10.0 * fine.vertices[:, 1]
     layout = np.column_stack([x**3 - x * y + 0.5, x * x * y**2 - y**3 + x])
-    lattice = lattice_of(fine)
+    lattice = find_lattice(fine)
     assert lattice is not None
     exact = np.ones(len(layout), dtype=bool)
     if name in ("L", "hole", "crooked crack"):
@@ -221,7 +221,7 @@ def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level()
     assert len(steps) >= 3
     for step in steps:
         assert step.surface.is_quad.all()
-        lattice = lattice_of(step.surface)
+        lattice = find_lattice(step.surface)
         assert lattice is not None
         for line in (lattice.row, lattice.column):
             assert np.diff(np.unique(line[lattice.bends])).min() >= 2
@@ -231,7 +231,7 @@ def walked(surface: Surface, monkeypatch: pytest.MonkeyPatch) -> Lattice | None:
     """The lattice found by a walk over the faces, whatever is known of them."""
     with monkeypatch.context() as blind:
         blind.setattr("warpflat.surface.grid.row_major_grid", lambda _: None)
-        return lattice_of(replace(surface, of_faces={}))
+        return find_lattice(replace(surface, of_faces={}))
 
 
 def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
@@ -248,7 +248,7 @@ def test_coarser_lattices_are_known_from_the_finer_ones(name: str, monkeypatch: 
     lattices = [step for step in steps if step.surface.is_quad.all()]
     assert len(lattices) > 0
     for step in lattices:
-        assert_same(lattice_of(step.surface), walked(step.surface, monkeypatch))
+        assert_same(find_lattice(step.surface), walked(step.surface, monkeypatch))
 
 
 @pytest.mark.parametrize(("turn", "mirrored"), [(turn, mirrored) for turn in range(4) for mirrored in (False, True)])
@@ -257,13 +257,13 @@ def test_the_lattice_of_a_grid_numbered_row_by_row_is_that_of_a_walk(
 ) -> None:
     surface = grid(6, 9, turn, mirrored=mirrored)
     assert row_major_grid(surface) is not None
-    assert_same(lattice_of(surface), walked(surface, monkeypatch))
+    assert_same(find_lattice(surface), walked(surface, monkeypatch))
 
 
 @pytest.mark.parametrize("name", ["rectangle", "L", "hole", "numbered"])
 def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     whole = grid(12, 15, 1) if name == "numbered" else PIECES[name]
-    lattice = lattice_of(whole)
+    lattice = find_lattice(whole)
     assert lattice is not None
     at = {(int(i), int(j)): v for v, (i, j) in enumerate(zip(lattice.row, lattice.column, strict=True))}
     made = cut_along(whole.faces, [at[row, 4] for row in range(6)], vertex_count=len(whole.vertices))

@@ -24,7 +24,7 @@ from warpflat.surface.half_edges import (
     half_edges_of,
     mesh_edges,
     non_manifold_edges,
-    twins_of,
+    opposite_half_edges,
 )
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import corner_triangles, triangulate, unfold_quad_diagonals
@@ -313,7 +313,7 @@ def test_the_two_sides_of_a_crack_are_at_one_place():
 def test_twins_run_along_the_same_edge_the_other_way():
     faces = np.array([[0, 1, 4, 3], [1, 2, 5, 4], [3, 4, 6, -1]])
     he = half_edges(faces)
-    twin = twins_of(he)
+    twin = opposite_half_edges(he)
     inner = np.flatnonzero(twin >= 0)
     assert len(inner) == 4
     assert np.array_equal(he.tail[twin[inner]], he.head[inner])

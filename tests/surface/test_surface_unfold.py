@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from warpflat.fabric.library import find_fabric
 from warpflat.model.springs import springs_of
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.shapes import make_shape
@@ -83,7 +83,7 @@ def test_creased_quads_keep_their_sides_and_cells_and_springs_agree():
     for k in (0, 1):
         np.testing.assert_allclose(diagonals[k], laid[k, k + 2], rtol=1e-12)
     # The four cells of a quad at half weight are the quad: by Bretschneider's formula, of its sides and diagonals.
-    cells = cells_of(surface)
+    cells = make_cells(surface)
     assert (np.linalg.det(cells.edges) > 0.0).all()
     across = laid[0, 1] ** 2 - laid[1, 2] ** 2 + laid[2, 3] ** 2 - laid[0, 3] ** 2
     whole = 0.25 * np.sqrt(4.0 * laid[0, 2] ** 2 * laid[1, 3] ** 2 - across**2)

@@ -12,7 +12,7 @@ from surface_meshes import check_invariants, cylinder, grid, scattered
 from warpflat.core.errors import InputError
 from warpflat.surface.connectivity import border_loops
 from warpflat.surface.io.read import read_surface
-from warpflat.surface.repair.polygons import _quad_corners, crossed_quads
+from warpflat.surface.repair.polygons import _quad_corners, find_crossed_quads
 from warpflat.surface.repair.slivers import degenerate_faces
 from warpflat.surface.repair.validate import make_surface
 from warpflat.surface.triangles import triangulate
@@ -447,4 +447,4 @@ def test_crossed_quads_are_those_that_a_look_at_every_quad_finds(spread: float):
     quads = np.flatnonzero(faces[:, 3] >= 0)
     expected = quads[_quad_corners(vertices[faces[quads]], 1e-3)[3]]
     assert len(expected) or spread < 0.1
-    np.testing.assert_array_equal(crossed_quads(vertices, faces), expected)
+    np.testing.assert_array_equal(find_crossed_quads(vertices, faces), expected)

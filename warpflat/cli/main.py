@@ -21,7 +21,7 @@ from warpflat.cli.flatten import flatten
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.run import run
-from warpflat.cli.signals import INTERRUPTED, Stopped, raised_by_signals, signal_message
+from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import one_line
@@ -36,7 +36,7 @@ class _Interrupted(Exception):
 class _Group(click.Group):
     def invoke(self, ctx: click.Context) -> Any:
         try:
-            with raised_by_signals():
+            with stop_on_signals():
                 return super().invoke(ctx)
         except KeyboardInterrupt as error:
             # Click would print an empty line of its own.

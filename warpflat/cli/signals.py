@@ -13,7 +13,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
-__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "raised_by_signals", "signal_message"]
+__all__ = ["HUNG_UP", "INTERRUPTED", "TERMINATED", "Stopped", "end_at_once", "signal_message", "stop_on_signals"]
 
 HUNG_UP, INTERRUPTED, TERMINATED = 129, 130, 143
 _WORDS = {INTERRUPTED: "warpflat: interrupted", TERMINATED: "warpflat: terminated"}
@@ -58,7 +58,7 @@ def end_at_once(code: int | None = None) -> None:
 
 
 @contextmanager
-def raised_by_signals() -> Iterator[None]:
+def stop_on_signals() -> Iterator[None]:
     """Let the first signal raise `Stopped` in the body, and a second one end the process at once.
 
     Where Python or a library would swallow the exception, in a destructor or while a module is imported, it is raised a little later.

@@ -25,7 +25,7 @@ from contextvars import ContextVar
 from pathlib import Path
 
 from warpflat.core.errors import InputError, expect
-from warpflat.core.file_names import checked_name
+from warpflat.core.file_names import check_file_name
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
 
 __all__ = [
@@ -54,7 +54,7 @@ def file_in(folder: Path, name: str, ending: str) -> Path:
     Raises:
         InputError: `name` leads out of the folder, or cannot name a file for another reason.
     """
-    return folder / f"{checked_name(name)}{ending}"
+    return folder / f"{check_file_name(name)}{ending}"
 
 
 @contextmanager

@@ -6,9 +6,9 @@ import re
 import unicodedata
 
 from warpflat.core.errors import InputError
-from warpflat.core.text import control_in, plain_letters, shown
+from warpflat.core.text import control_in, plain_letters, quote_value
 
-__all__ = ["checked_label", "checked_name", "fitted_name", "plain_label", "plain_name", "same_file"]
+__all__ = ["check_file_name", "check_label", "make_file_name", "plain_label", "plain_name", "same_file"]
 
 # Hidden beginnings, separators and drives lead elsewhere; the others Windows refuses.
 _FORBIDDEN = '/\\:*?"<>|'
@@ -17,7 +17,7 @@ _DEVICES = re.compile(r"(con|prn|aux|nul|com\d|lpt\d)", re.IGNORECASE)
 _MOST_BYTES = 200
 
 
-def checked_name(name: str) -> str:
+def check_file_name(name: str) -> str:
     """Return a name if a file can have it on any system.
 
     Raises:
@@ -25,21 +25,23 @@ def checked_name(name: str) -> str:
     """
     if reason := _refused(name):
         raise InputError(
-            f"{shown(name)} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
+            f"{quote_value(name)} cannot name a file: {reason}; letters of any language, digits, spaces, - and _ can"
         )
     return name
 
 
-def checked_label(label: str, what: str) -> str:
+def check_label(label: str, what: str) -> str:
     """Return the name of a line, an edge or a size if it is text in one line, which every format can hold.
 
     Raises:
         InputError: it is no text, empty, or has a control character in it; `what` says of what it is the name.
     """
     if not isinstance(label, str) or not label.strip():
-        raise InputError(f"{what}: {shown(label)} is no name; a name is a text that is not empty")
+        raise InputError(f"{what}: {quote_value(label)} is no name; a name is a text that is not empty")
     if letter := control_in(label):
-        raise InputError(f"{what}: the name {shown(label)} has the control character {letter!r} in it; leave it out")
+        raise InputError(
+            f"{what}: the name {quote_value(label)} has the control character {letter!r} in it; leave it out"
+        )
     return label
 
 
@@ -48,7 +50,7 @@ def plain_label(label: str) -> str:
     return "".join("_" if control_in(letter) else letter for letter in label)
 
 
-def fitted_name(name: str, otherwise: str = "piece") -> str:
+def make_file_name(name: str, otherwise: str = "piece") -> str:
     """Return a name that was not chosen for a file, such as that of a node in a scene, changed so that a file can have it."""
     plain = "".join("_" if _is_forbidden(letter) else letter for letter in name).strip().lstrip(".")
     short = plain.encode()[:_MOST_BYTES].decode(errors="ignore")
@@ -64,9 +66,9 @@ def plain_name(name: str, others: str = " _.-") -> str:
     if re.fullmatch(rf"[A-Za-z0-9][A-Za-z0-9{re.escape(others)}]*", name):
         return name
     better = re.sub(rf"[^A-Za-z0-9{re.escape(others)}]+", "_", plain_letters(name)).strip(others)
-    hint = f"; {shown(better)} would do" if better else ""
+    hint = f"; {quote_value(better)} would do" if better else ""
     raise ValueError(
-        f"{shown(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
+        f"{quote_value(name)} cannot name files: it must begin with one of a to z, A to Z, 0 to 9, and may have besides them only "
         f"{'spaces and ' if ' ' in others else ''}{' '.join(others.strip())}{hint}"
     )
 

@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 import warp as wp
 
-from warpflat.core.launch_arguments import Command, commands_of
+from warpflat.core.launch_arguments import Command, launch_commands
 from warpflat.core.threads import thread_count
 
 __all__ = ["Launch", "Sequence", "launch_each", "record", "record_copy", "record_zero", "split_range"]
@@ -123,11 +123,11 @@ def record(
     least = _LEAST_RANGE if least is None else max(least, 1)
     if where.is_cuda or dim < 2 * least:
         return Launch(
-            commands_of(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where
+            launch_commands(kernel, [(0, dim)] if dim > 0 else [], inputs, outputs, where), (inputs, outputs), where
         )
     threads = thread_count() if threads is None else threads
     ranges = split_range(dim, threads * _fair_turns(dim, threads, turns, least), least=least)
-    commands = commands_of(kernel, ranges, inputs, outputs, where)
+    commands = launch_commands(kernel, ranges, inputs, outputs, where)
     if len(commands) > threads:
         commands = [partial(_run_all, commands[i::threads]) for i in range(threads)]
     return Launch(commands, keep=(inputs, outputs), device=where)

@@ -20,7 +20,7 @@ import warp as wp
 
 from warpflat.core.compile import compile_common_modules, kernel_cache_errors
 
-__all__ = ["Command", "commands_of"]
+__all__ = ["Command", "launch_commands"]
 
 Command = Callable[[], None]
 
@@ -28,7 +28,7 @@ Command = Callable[[], None]
 _RELEASES = ("1.19.",)
 
 
-def commands_of(
+def launch_commands(
     kernel: wp.Kernel,
     ranges: Sequence[tuple[int, int]],
     given: Sequence[Any],

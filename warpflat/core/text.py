@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import unicodedata
 
-__all__ = ["MADE_TO_MEASURE", "control_in", "counted", "one_line", "plain_letters", "shown", "size_words"]
+__all__ = ["MADE_TO_MEASURE", "control_in", "format_count", "one_line", "plain_letters", "quote_value", "size_words"]
 
 #: Letters of a message, of one of its words (a path may be one), and of the user's own words in it, at most.
 LONGEST_LINE, LONGEST_WORD, LONGEST_SHOWN = 1500, 300, 60
@@ -20,7 +20,7 @@ _LETTERS = str.maketrans(
 )
 
 
-def counted(number: int, what: str) -> str:
+def format_count(number: int, what: str) -> str:
     """Return a number with its noun: "1 piece", "2 pieces", "1,200 pieces"."""
     return f"{number:,} {what}" + ("" if number == 1 else "s")
 
@@ -47,7 +47,7 @@ def _is_control(letter: str) -> bool:
     return unicodedata.category(letter) in ("Cc", "Cs", "Zl", "Zp")
 
 
-def shown(value: object) -> str:
+def quote_value(value: object) -> str:
     """Return a value as messages quote it: in one line, control characters escaped, a long one without its middle."""
     try:
         return _shortened(repr(value), LONGEST_SHOWN)

@@ -13,7 +13,7 @@ from pydantic_core import ErrorDetails
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.input_files import note_read
-from warpflat.core.text import control_in, shown
+from warpflat.core.text import control_in, quote_value
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -86,9 +86,11 @@ def _check_values(tables: dict[str, Any], path: Path) -> None:
         elif isinstance(value, list):
             todo += [(key, depth + 1, below) for below in value]
         elif isinstance(value, int) and not -(2**63) <= value < 2**63:
-            raise InputError(f"{path}: {key}: {shown(value)} is too large; {_RIGHT_NUMBER}")
+            raise InputError(f"{path}: {key}: {quote_value(value)} is too large; {_RIGHT_NUMBER}")
         elif isinstance(value, str) and (letter := control_in(value, _BLANKS)):
-            raise InputError(f"{path}: {key}: {shown(value)} has the control character {letter!r} in it; leave it out")
+            raise InputError(
+                f"{path}: {key}: {quote_value(value)} has the control character {letter!r} in it; leave it out"
+            )
 
 
 def check_table(model: type[Model], data: Mapping[str, Any], where: str = "") -> Model:
@@ -120,7 +122,7 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     if kind == "extra_forbidden":
         key = str(location[-1])
         path = ".".join([*parents, key])
-        return f"{path}: unknown key {shown(key)}; {nearest(key, _keys(parent))}"
+        return f"{path}: unknown key {quote_value(key)}; {nearest(key, _keys(parent))}"
     if kind == "missing":
         return f"{'.'.join([*parents, str(location[-1])])}: is missing"
     path = ".".join(parents)
@@ -129,7 +131,7 @@ def _describe(model: type[BaseModel], data: Mapping[str, Any], problem: ErrorDet
     if kind == "value_error" or isinstance(given, (dict, list)):
         words = message
     else:
-        words = f"{message}, got {shown(given)}"
+        words = f"{message}, got {quote_value(given)}"
         if kind in ("literal_error", "enum"):
             words += _guess(given, parent)
     return f"{path}: {words}" if path else words

@@ -15,7 +15,7 @@ from warpflat.export.colours import energy_colours, energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
-from warpflat.export.picture_views import DrawnView, facets_of, surface_view
+from warpflat.export.picture_views import DrawnView, make_facets, surface_view
 
 if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger, LedgerEntry
@@ -56,7 +56,7 @@ def write_ledger_picture(path: str | os.PathLike[str], ledger: Ledger) -> None:
     require_writable(path)
     entries = ledger.entries[:_MOST]
     surface, density = ledger.result.surface, ledger.result.face_energy_density
-    view = surface_view(surface, facets_of(surface.faces), polylines_of({}))
+    view = surface_view(surface, make_facets(surface.faces), polylines_of({}))
     per_metre = min(_BODY / float(view.size[0]), 5.2 / float(view.size[1]))
     tall = max(float(view.size[1]) * per_metre + 0.7, _ROW * (len(entries) + 2))
     height = tall + 1.15

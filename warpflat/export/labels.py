@@ -16,7 +16,7 @@ __all__ = [
     "LabelRoom",
     "Spot",
     "in_batches",
-    "leader_of",
+    "leader_line",
     "points_on",
     "rectangles",
     "space_out",
@@ -107,7 +107,7 @@ class LabelRoom:
 
     def _leader_is_free(self, spot: Spot, width: float) -> bool:
         """Return whether a spot's leader runs over nothing; where it begins a line may have its own."""
-        leader = leader_of(spot, width)
+        leader = leader_line(spot, width)
         if leader is None:
             return True
         ink = points_on(leader, 0.03)[3:]
@@ -117,7 +117,7 @@ class LabelRoom:
         self._discs = np.concatenate([self._discs, discs])
 
 
-def leader_of(spot: Spot, width: float) -> FloatArray | None:
+def leader_line(spot: Spot, width: float) -> FloatArray | None:
     """Return the leader (2 by 2 [in]) from its point to a text of this width; None for a spot without one."""
     if spot.leader is None:
         return None

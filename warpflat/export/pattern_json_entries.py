@@ -10,8 +10,8 @@ from typing import Annotated, Literal
 import numpy as np
 from pydantic import AfterValidator, ConfigDict, Field, model_validator
 
-from warpflat.core.file_names import checked_label
-from warpflat.core.text import control_in, shown
+from warpflat.core.file_names import check_label
+from warpflat.core.text import control_in, quote_value
 from warpflat.core.toml_file import Table
 
 __all__ = ["DartEntry", "EdgeEntry", "LabelEntry", "NotchEntry", "PatternEntry", "PieceEntry", "SideEntry"]
@@ -23,7 +23,7 @@ SMALLEST_AREA = 1e-10
 
 def _text(text: str) -> str:
     if letter := control_in(text, "\n"):
-        raise ValueError(f"{shown(text)} has the control character {letter!r} in it")
+        raise ValueError(f"{quote_value(text)} has the control character {letter!r} in it")
     return text
 
 
@@ -37,7 +37,7 @@ def _ring(points: list[list[float]]) -> list[list[float]]:
 # A larger coordinate is an error of units, and its powers may overflow.
 Coordinate = Annotated[float, Field(ge=-10_000, le=10_000)]
 Length = Annotated[float, Field(ge=0, le=10_000)]
-Name = Annotated[str, AfterValidator(lambda name: checked_label(name, "name"))]
+Name = Annotated[str, AfterValidator(lambda name: check_label(name, "name"))]
 Text = Annotated[str, AfterValidator(_text)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
 Ends = Annotated[list[Point], Field(min_length=2, max_length=2)]

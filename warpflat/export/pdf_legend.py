@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.text import counted
+from warpflat.core.text import format_count
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment
@@ -89,7 +89,7 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 and not noted else 0.0)
     lines = [
         "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
-        f"the half diamonds meet, and glue. {counted(len(tiling.tiles), 'sheet')}; empty ones are left out.",
+        f"the half diamonds meet, and glue. {format_count(len(tiling.tiles), 'sheet')}; empty ones are left out.",
     ]
     for line in lines:
         _text(canvas, float(low[0]), y, line, 7.5)

@@ -19,7 +19,7 @@ from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
-from warpflat.export.picture_views import facets_of, pattern_view, surface_view
+from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
 __all__ = ["PicturePiece", "write_picture"]
@@ -105,8 +105,8 @@ def _prepared(piece: PicturePiece, title: str) -> Row:
     surface, positions = piece.surface, np.asarray(piece.positions, dtype=np.float64)
     faces = np.asarray(piece.faces, dtype=np.int32)
     in_space = surface.lines if piece.surface_lines is None else piece.surface_lines
-    in_plane = facets_of(faces)
-    on_body = in_plane if np.array_equal(faces, surface.faces) else facets_of(surface.faces)
+    in_plane = make_facets(faces)
+    on_body = in_plane if np.array_equal(faces, surface.faces) else make_facets(surface.faces)
     return Row(
         name=title,
         captions=piece.captions,

@@ -17,7 +17,7 @@ from warpflat.export.labels import (
     LabelRoom,
     Spot,
     in_batches,
-    leader_of,
+    leader_line,
     points_on,
     rectangles,
     space_out,
@@ -133,7 +133,7 @@ class _Names:
         width, height = self._size(name)
         spots = spots_beside([(float(end[0]), float(end[1]))], width, [side])
         out = next(self._spots_on_cloth(spots, width, height, covered=False), None)
-        leader = None if out is None else leader_of(out, width)
+        leader = None if out is None else leader_line(out, width)
         return np.inf if leader is None else polyline_length(leader)
 
     def place_outside(self, names: Iterable[str]) -> None:
@@ -184,7 +184,7 @@ class _Names:
         angle = float(np.degrees(spot.angle))
         options = {"ha": "center", "rotation": angle, "rotation_mode": "anchor", "color": colour}
         pen.write(spot.x, spot.y, name, LABEL_SIZE, halo=True, **options)
-        leader = leader_of(spot, width)
+        leader = leader_line(spot, width)
         if leader is not None:
             pen.line(leader, width=0.6, colour=colour)
             self._room.take_line(leader, 0.03)

@@ -16,7 +16,7 @@ from warpflat.export.raster import Lighting, Samples, rasterise, shade
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
-__all__ = ["DrawnView", "Facets", "View", "facets_of", "pattern_view", "surface_view"]
+__all__ = ["DrawnView", "Facets", "View", "make_facets", "pattern_view", "surface_view"]
 
 _FINE = 500_000  # triangles, about as many as pixels: from here on smooth light and smooth edges show no difference
 _SEGMENTS_TO_A_PATH = 500
@@ -45,7 +45,7 @@ class Facets:
     used: NDArray[np.int64]
 
 
-def facets_of(faces: IntArray) -> Facets:
+def make_facets(faces: IntArray) -> Facets:
     """Return the facets of faces (#F by 4)."""
     triangles, face = triangulate(faces)
     has_face = np.zeros(int(faces.max(initial=-1)) + 1, dtype=bool)

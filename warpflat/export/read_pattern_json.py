@@ -12,7 +12,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.core.text import shown
+from warpflat.core.text import quote_value
 from warpflat.core.toml_file import check_table
 from warpflat.export.pattern_json import SCHEMA
 from warpflat.export.pattern_json_entries import (
@@ -73,7 +73,9 @@ def pattern_from_json(data: Any) -> DraftedGarment:
     if not isinstance(data, Mapping) or "sizes" not in data:
         raise InputError('is no pattern of warpflat: it has no "sizes"')
     if data.get("schema") != SCHEMA:
-        raise InputError(f"has schema {shown(data.get('schema'))}; this version reads {SCHEMA}: run the scene again")
+        raise InputError(
+            f"has schema {quote_value(data.get('schema'))}; this version reads {SCHEMA}: run the scene again"
+        )
     try:
         return _garment(check_table(PatternEntry, data))
     except InputError as error:

@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path
-from warpflat.core.text import control_in, counted, size_words
+from warpflat.core.text import control_in, format_count, size_words
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.drawing import Drawing, Stroke, draw_nest, grain_strokes
@@ -83,7 +83,7 @@ def write_marker_svg(marker: Marker, path: str | os.PathLike[str]) -> None:
     """
     name = f"{marker.name.replace('_', ' ')} marker {marker.fabric}".strip()
     sizes = list(dict.fromkeys(copy.piece.size for copy in marker.placements if copy.piece.size))
-    cut = counted(len(marker.placements), "piece") + (f", {size_words(', '.join(sizes))}" if sizes else "")
+    cut = format_count(len(marker.placements), "piece") + (f", {size_words(', '.join(sizes))}" if sizes else "")
     cloth = f"{marker.length:.3f} m of cloth {marker.width:.3f} m wide, {marker.utilisation:.1%} used"
     rows = [name, cut, cloth]
     widest = max(text_width(text, 1.0, bold=row == 0) for row, text in enumerate(rows))

@@ -29,10 +29,10 @@ from warpflat.export.usd_piece import FIRST_FRAME, FramePiece, check_frame, dens
 from warpflat.export.usd_prims import (
     MeshSamples,
     SampledLines,
+    bounding_box,
     define_group,
     define_mesh,
     export_stage,
-    extent_of,
     usd_errors,
     valid_name,
 )
@@ -233,7 +233,7 @@ class FrameWriter:
 
         piece.frames += 1
         piece.last_density = density
-        low, high = extent_of(flat)
+        low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
         self._save_every_few_frames()

@@ -24,10 +24,10 @@ from warpflat.export.geometry import Polylines
 __all__ = [
     "MeshSamples",
     "SampledLines",
+    "bounding_box",
     "define_group",
     "define_mesh",
     "export_stage",
-    "extent_of",
     "usd_errors",
     "valid_name",
 ]
@@ -116,7 +116,7 @@ def define_mesh(stage: Any, path: str, normals: FloatArray, *, per_face: bool) -
     return mesh
 
 
-def extent_of(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
+def bounding_box(points: NDArray[Any], margin: float = 0.0) -> NDArray[Any]:
     """Return the corners (2 by #D) of the box around `points` (#P by #D) [m]."""
     # By columns: NumPy takes ten times as long for all of them at once.
     corners = np.array([[column.min() for column in points.T], [column.max() for column in points.T]])
@@ -142,7 +142,7 @@ class MeshSamples:
             self.mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(faces[used]), time)
         stored = self._padded(points)
         self.mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
-        self.mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(extent_of(stored)), time)
+        self.mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
         self._stored = len(stored)
 
     def _padded(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -211,7 +211,7 @@ class _Line:
         rows = np.concatenate([*parts, parts[-1][-1:]] if self._padding else parts)
         stored = np.ascontiguousarray(points[rows])
         self._curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
-        self._curves.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(extent_of(stored, self._margin)), time)
+        self._curves.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored, self._margin)), time)
         self._stored, self._shown = length + self._padding, True
 
     def hide(self, time: Any, *, start: float) -> None:

@@ -19,10 +19,10 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarsening, coarsenings_of
-from warpflat.surface.cells import CellArrays, cells_of
+from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.connectivity import border_of, coincident_vertices, euler_characteristic, non_manifold_vertices
 from warpflat.surface.grid import rows_and_columns
-from warpflat.surface.half_edges import half_edges, half_edges_of, twins_of
+from warpflat.surface.half_edges import half_edges, half_edges_of, opposite_half_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.geodesic import signed_distance_and_station
 from warpflat.surface.triangles import corner_triangles, triangulate
@@ -79,7 +79,7 @@ def develop(surface: Surface, datum: IntArray) -> Development:
         InputError: the surface is a closed tube (two borders around it), which no layout in the plane can be.
     """
     notes: list[str] = []
-    cells = cells_of(surface)
+    cells = make_cells(surface)
     flat = flat_layout(surface, datum)
     if flat is not None and len(_mirrored(cells, flat)) == 0:
         return Development(positions=flat, method="flat")
@@ -299,7 +299,7 @@ def _grid_lines(surface: Surface, start: IntArray) -> IntArray:
     he = half_edges_of(surface)
     here = np.arange(len(he.tail))
     # The last entry is where there is none, -1.
-    twin, tail, head = (np.append(index, -1) for index in (twins_of(he), he.tail, he.head))
+    twin, tail, head = (np.append(index, -1) for index in (opposite_half_edges(he), he.tail, he.head))
     some = np.empty(len(he.edges), dtype=np.int64)
     some[he.edge] = here
     size = np.int64(len(surface.vertices))

@@ -27,9 +27,9 @@ from warpflat.surface.cells import inherit_cells
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import path_length
-from warpflat.surface.repair.polygons import crossed_quads
+from warpflat.surface.repair.polygons import find_crossed_quads
 from warpflat.surface.repair.slivers import degenerate_faces
-from warpflat.surface.repair.validate import checked_positions
+from warpflat.surface.repair.validate import check_positions
 from warpflat.surface.repair.weld import weld_map
 
 __all__ = ["change_fabric", "change_surface", "relax_cut", "require_unsewn"]
@@ -137,7 +137,7 @@ def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
                 f"piece {surface.name!r} has another mesh ({len(surface.vertices):,} vertices, {len(surface.faces):,} faces) than "
                 f"{before.name!r} ({len(before.vertices):,}, {len(before.faces):,}): flatten it afresh, or keep the faces as they are"
             )
-        vertices = checked_positions(surface.vertices)
+        vertices = check_positions(surface.vertices)
         # Of a surface made by `replace(surface, vertices=...)` what was read has not moved with it.
         if not np.array_equal(given.input_vertices[given.input_index], vertices):
             surface = replace(given, input_vertices=_as_read(before, vertices), input_index=before.input_index)
@@ -146,7 +146,7 @@ def _moved(before: Surface, given: Surface | ArrayLike) -> Surface:
         vertices = surface.vertices
     collapsed = degenerate_faces(vertices, surface.faces, _COLLAPSED)
     _refuse_faces(surface, collapsed, "has collapsed to a line or a point", "faces need an area")
-    crossed = crossed_quads(vertices, surface.faces)
+    crossed = find_crossed_quads(vertices, surface.faces)
     _refuse_faces(
         surface,
         crossed,
@@ -165,7 +165,7 @@ def _refuse_faces(surface: Surface, wrong: NDArray[np.integer], what: str, right
 
 def _with_vertices(before: Surface, given: ArrayLike) -> Surface:
     try:
-        vertices = checked_positions(given)
+        vertices = check_positions(given)
     except InputError as error:
         raise InputError(
             f"piece {before.name!r}: {error}; give a Surface, or its {len(before.vertices):,} vertices by 3 [m]"

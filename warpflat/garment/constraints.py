@@ -26,7 +26,7 @@ from warpflat.surface.mirror import mirror_partners
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "equations_of_constraint", "piece_of"]
+__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "equations_of_constraint", "find_piece"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,7 +154,7 @@ def _line(constraint: Constraint, piece: Flattening) -> IntArray:
     return line
 
 
-def piece_of(constraint: Constraint, pieces: Mapping[str, Flattening]) -> Flattening:
+def find_piece(constraint: Constraint, pieces: Mapping[str, Flattening]) -> Flattening:
     """Return the piece that a constraint is about.
 
     Raises:

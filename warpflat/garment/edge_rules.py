@@ -9,7 +9,7 @@ from typing import Any
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS
 
-__all__ = ["HEMMED_LEVELS", "EdgeRules", "unused_name"]
+__all__ = ["HEMMED_LEVELS", "EdgeRules", "find_unused_name"]
 
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
 #: skirt, a band or a facing.
@@ -82,7 +82,7 @@ class EdgeRules:
         return self.allowances.get(f"{piece}.{edge}", self.allowances.get(edge, of_kind))
 
 
-def unused_name(name: str, taken: Mapping[str, Any] | set[str]) -> str:
+def find_unused_name(name: str, taken: Mapping[str, Any] | set[str]) -> str:
     """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
     number = 2
     while f"{name} {number}" in taken:

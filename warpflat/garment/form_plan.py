@@ -11,13 +11,13 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules, unused_name
+from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules, find_unused_name
 from warpflat.pattern.pieces import Seam, SeamSide
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["EdgePlan", "FormPlan", "Sides", "check_fold_grain", "folds_of", "plan_form"]
+__all__ = ["EdgePlan", "FormPlan", "Sides", "check_fold_grain", "find_fold_lines", "plan_form"]
 
 Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
 #: Names of a piece and of its edge.
@@ -118,7 +118,7 @@ def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRule
         # The edge's own name stays with what is sewn.
         keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
         for number, (first, last, sewn) in enumerate(parts):
-            part = edge if number == keeper else unused_name(edge, taken)
+            part = edge if number == keeper else find_unused_name(edge, taken)
             taken.add(part)
             kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if edge == lowest else "seam"
             plans.append(EdgePlan(name=part, source=edge, first=first, last=last, kind=rules.kind(name, part, kind)))
@@ -148,7 +148,7 @@ def check_fold_grain(folds: Mapping[str, str], grain_angle: float) -> None:
     )
 
 
-def folds_of(form: FormResult, plan: FormPlan) -> dict[str, str]:
+def find_fold_lines(form: FormResult, plan: FormPlan) -> dict[str, str]:
     """Return by half piece its edge on the fold, without edges to which the rules give another kind."""
     return {
         name: piece.fold

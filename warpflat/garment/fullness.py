@@ -32,7 +32,7 @@ from warpflat.surface.falloff import falloff_weights
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 
-__all__ = ["FullEdge", "fullness_of", "give_fullness"]
+__all__ = ["FullEdge", "give_fullness", "measure_fullness"]
 
 
 # The energy that a gathered piece's springs miss is worth a note if it exceeds what this strain along the softer thread
@@ -68,7 +68,7 @@ def give_fullness(
         options: of the relaxation.
     """
     options = given_options(options)
-    full = fullness_of(piece, edges, plain)
+    full = measure_fullness(piece, edges, plain)
     network = _widened_network(piece.network, piece.positions, full)
     warp, weft = grain_axes(piece.grain_angle)
     mean = full.mean(axis=0)
@@ -126,7 +126,7 @@ def _missed_energy(stage: Stage) -> float:
     return stage.strain_energy_j - stage.model_energy_j
 
 
-def fullness_of(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
+def measure_fullness(piece: Flattening, edges: Sequence[FullEdge], plain: Sequence[IntArray]) -> FloatArray:
     """Return by how much longer than on the body the cloth is meant to be along warp and weft (#V by 2)."""
     positions, faces = piece.positions, piece.faces
     axes = grain_axes(piece.grain_angle)

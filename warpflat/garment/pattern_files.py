@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import counted
+from warpflat.core.text import format_count
 from warpflat.garment.edge_rules import EdgeRules
 
 if TYPE_CHECKING:
@@ -313,6 +313,6 @@ def _marker(
     write_json(files[1], {"schema": 1, **measures, "placements": placements})
     remarks = (
         f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
-        f"{counted(len(placements), 'piece')}"
+        f"{format_count(len(placements), 'piece')}"
     )
     return [file.name for file in files], (remarks,), measures

@@ -24,7 +24,7 @@ from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.result import Flattening
-from warpflat.garment.constraints import Constraint, equations_of_constraint, piece_of
+from warpflat.garment.constraints import Constraint, equations_of_constraint, find_piece
 from warpflat.garment.sewing_network import SewingNetwork
 from warpflat.model.constraint_equations import (
     ConstraintEquations,
@@ -238,7 +238,7 @@ def _constraint_equations(
         kinds.append((seam.name, "seam"))
     for constraint in constraints:
         own, orients = equations_of_constraint(
-            constraint, piece_of(constraint, joined.pieces), folds.get(constraint.piece)
+            constraint, find_piece(constraint, joined.pieces), folds.get(constraint.piece)
         )
         equations.append(replace(own, ends=joined.numbers(constraint.piece, own.ends)))
         kinds.append((constraint.name, constraint.kind))

@@ -13,7 +13,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.applied_cut import seam_kind
-from warpflat.garment.edge_rules import EdgeRules, unused_name
+from warpflat.garment.edge_rules import EdgeRules, find_unused_name
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide
@@ -249,7 +249,7 @@ def _seams(
             against = not np.array_equal(curve, other)
             if len(curve) == len(other) and np.array_equal(curve, other[::-1] if against else other):
                 name = first.edge.removesuffix(".left").removesuffix(".right")
-                name = unused_name(name, {seam.name for seam in seams})
+                name = find_unused_name(name, {seam.name for seam in seams})
                 sides = ((first,), (replace(second, reversed=against),))
                 seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
     return tuple(seams)

@@ -14,12 +14,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.garment.edge_rules import EdgeRules, unused_name
+from warpflat.garment.edge_rules import EdgeRules, find_unused_name
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
     check_fold_grain,
-    folds_of,
+    find_fold_lines,
     plan_form,
 )
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
@@ -65,7 +65,7 @@ def pattern_of_garment(
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
     bent = _bent_folds(garments)
-    folds = {piece: edge for piece, edge in folds_of(form, plan).items() if piece not in bent}
+    folds = {piece: edge for piece, edge in find_fold_lines(form, plan).items() if piece not in bent}
     opened = {name: piece.fold for name, piece in form.pieces.items() if piece.fold and name not in folds}
     for flat in (garment.pieces[piece] for garment in garments.values() for piece in folds):
         check_fold_grain(folds, flat.grain_angle)
@@ -88,7 +88,7 @@ def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tu
     """Add a seam in the centre of each piece that is cut twice instead of on the fold."""
     for piece, edge in opened.items():
         side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=unused_name(edge, {seam.name for seam in seams}), sides=(side, side)))
+        seams = (*seams, Seam(name=find_unused_name(edge, {seam.name for seam in seams}), sides=(side, side)))
     return seams
 
 
@@ -161,7 +161,7 @@ def _inner_lines(lines: Mapping[str, Any], border: Sequence[IntArray], flat: Flo
     found: dict[str, FloatArray] = {}
     for name, line in lines.items():
         for stretch in inner_stretches(np.asarray(line), edges):
-            found[unused_name(name, found)] = flat[stretch]
+            found[find_unused_name(name, found)] = flat[stretch]
     return found
 
 

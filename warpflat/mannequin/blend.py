@@ -16,7 +16,7 @@ from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
-__all__ = ["Adjustment", "adjusted_vertices", "blended"]
+__all__ = ["Adjustment", "adjusted_vertices", "blend_forms"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,7 +50,7 @@ class Adjustment:
         }  # fmt: skip
 
 
-def blended(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
+def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
     """Return the surface between two forms of one layout; `weight` 0 is the first, 1 the second.
 
     Raises:

@@ -11,9 +11,9 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import checked_name, same_file
-from warpflat.core.text import shown
-from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blended
+from warpflat.core.file_names import check_file_name, same_file
+from warpflat.core.text import quote_value
+from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms
 from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
 
 if TYPE_CHECKING:
@@ -67,7 +67,7 @@ class Form:
         files: dict[str, str] = {}
         for piece in self.pieces:
             try:
-                checked_name(piece)
+                check_file_name(piece)
             except InputError as error:
                 raise InputError(f"form {self.name}: pieces: {error}") from None
             other = files.setdefault(same_file(piece), piece)
@@ -112,7 +112,7 @@ def shipped_form(name: str) -> Form:
         InputError: if there is none of that name.
     """
     if name not in _shipped():
-        raise InputError(f"form {shown(name)} is unknown: {nearest(name, form_names())}")
+        raise InputError(f"form {quote_value(name)} is unknown: {nearest(name, form_names())}")
     return form_from_mapping(name, _shipped()[name])
 
 
@@ -166,7 +166,9 @@ def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
 def _ruled_from(pairs: object, where: str) -> list[tuple[str, str]]:
     """Read the ``ruled`` pairs of levels of a form's table."""
     if not isinstance(pairs, (list, tuple)):
-        raise InputError(f"{where}: ruled = {shown(pairs)}: a list of pairs of levels is needed, as [['hip', 'knee']]")
+        raise InputError(
+            f"{where}: ruled = {quote_value(pairs)}: a list of pairs of levels is needed, as [['hip', 'knee']]"
+        )
     ruled = []
     for pair in pairs:
         levels = _strings(pair, f"{where}: ruled")
@@ -209,7 +211,7 @@ def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:
     if form.blend is None:
         return vertices
     other, weight = form.blend
-    return blended(vertices, _surface(layout, body, other), weight)
+    return blend_forms(vertices, _surface(layout, body, other), weight)
 
 
 def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:
@@ -217,13 +219,13 @@ def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:
     numbers = {k: _number(v, f"{where}: {k}", *ranges[k]) for k, v in values.items() if k in ranges}
     bridge = values.get("bridge", False)
     if not isinstance(bridge, bool):
-        raise InputError(f"{where}: bridge = {shown(bridge)}: true or false is needed")
+        raise InputError(f"{where}: bridge = {quote_value(bridge)}: true or false is needed")
     return Adjustment(like=str(values["like"]) if "like" in values else None, bridge=bridge, **numbers)
 
 
 def _number(value: object, where: str, low: float, high: float) -> float:
     if isinstance(value, bool) or not isinstance(value, (int, float)) or not low <= value <= high:
-        raise InputError(f"{where} = {shown(value)}: a number from {low:g} to {high:g} is needed")
+        raise InputError(f"{where} = {quote_value(value)}: a number from {low:g} to {high:g} is needed")
     return float(value)
 
 
@@ -231,17 +233,17 @@ def _strings(value: object, where: str) -> tuple[str, ...]:
     if isinstance(value, str):
         return (value,)
     if not isinstance(value, (list, tuple)) or not all(isinstance(v, str) for v in value):
-        raise InputError(f"{where} = {shown(value)}: a list of names is needed")
+        raise InputError(f"{where} = {quote_value(value)}: a list of names is needed")
     return tuple(value)
 
 
 def _table(value: object, where: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
-        raise InputError(f"{where} = {shown(value)}: a table is needed")
+        raise InputError(f"{where} = {quote_value(value)}: a table is needed")
     return value
 
 
 def _check_keys(data: Mapping[str, Any], known: set[str], where: str) -> None:
     for key in data:
         if key not in known:
-            raise InputError(f"{where}: key {shown(key)} is unknown: {nearest(key, known)}")
+            raise InputError(f"{where}: key {quote_value(key)} is unknown: {nearest(key, known)}")

@@ -15,7 +15,7 @@ from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms
-from warpflat.mannequin.scan_pose import ScanOptions, Slicer, upright
+from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
 from warpflat.mannequin.table_body import PRINCESS
 
 __all__ = ["ScanFound", "blueprint_from_scan"]
@@ -53,7 +53,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Raises:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk.
     """
-    points, triangles, notes = upright(vertices, faces, options)
+    points, triangles, notes = turn_scan_upright(vertices, faces, options)
     slicer = Slicer(points, triangles)
     trunk = trunk_sections(slicer)
     levels, more = find_levels(trunk, options.landmarks)

@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
-__all__ = ["ScanOptions", "Slice", "Slicer", "upright"]
+__all__ = ["ScanOptions", "Slice", "Slicer", "turn_scan_upright"]
 
 _UNITS = {"m": 1.0, "dm": 0.1, "cm": 0.01, "mm": 0.001, "in": 0.0254}
 _AXES = {s + a: sign * np.eye(3)["xyz".index(a)] for s, sign in (("+", 1.0), ("-", -1.0)) for a in "xyz"}
@@ -127,7 +127,7 @@ class Slicer:
         return [p for p in parts if len(p.points) > 3]
 
 
-def upright(
+def turn_scan_upright(
     vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
 ) -> tuple[FloatArray, NDArray[np.int64], list[str]]:
     """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.

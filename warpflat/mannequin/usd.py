@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.atomic_files import require_writable
-from warpflat.export.usd_prims import export_stage, extent_of, usd_errors, valid_name
+from warpflat.export.usd_prims import bounding_box, export_stage, usd_errors, valid_name
 from warpflat.mannequin.normals import vertex_normals
 
 if TYPE_CHECKING:
@@ -62,7 +62,7 @@ def _body(stage: Any, mannequin: Mannequin) -> None:
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
     mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
     mesh.CreateDoubleSidedAttr(True)
-    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent_of(points)))
+    mesh.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounding_box(points)))
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
     taken: set[str] = set()
     for index, name in enumerate(layout.bricks):
@@ -90,5 +90,5 @@ def _lines(stage: Any, mannequin: Mannequin) -> None:
         curve.CreateWrapAttr(UsdGeom.Tokens.periodic if closed else UsdGeom.Tokens.nonperiodic)
         curve.CreateWidthsAttr(Vt.FloatArray([_WIDTH]))
         curve.SetWidthsInterpolation(UsdGeom.Tokens.constant)
-        curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(extent_of(places, 0.5 * _WIDTH)))
+        curve.CreateExtentAttr(Vt.Vec3fArray.FromNumpy(bounding_box(places, 0.5 * _WIDTH)))
         curve.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_LINE)]))

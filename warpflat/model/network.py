@@ -50,7 +50,7 @@ from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
 from warpflat.model.membrane import Model, check_model, make_cloth, step_matrix
 from warpflat.model.springs import SpringArrays, measure_buckling_stiffness, shorten_springs, springs_of, with_stiffness
-from warpflat.surface.cells import CellArrays, cells_of
+from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
 from warpflat.surface.mesh import Surface
 
@@ -131,7 +131,7 @@ class SpringNetwork:
             InputError: an unknown model.
         """
         check_model(model)
-        springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), cells_of(surface)
+        springs, cells = springs_of(surface, fabric, positions, grain_angle=grain_angle), make_cells(surface)
         if stretch is not None:
             springs = shorten_springs(springs, surface, positions, grain_axes(grain_angle), stretch)
         held = None

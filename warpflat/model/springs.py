@@ -29,7 +29,7 @@ from warpflat.kernels.stiffness import (
     weigh_quads,
     weigh_triangles,
 )
-from warpflat.surface.cells import CellArrays, cells_of, creases_of, first_of_faces
+from warpflat.surface.cells import CellArrays, face_creases, first_of_faces, make_cells
 from warpflat.surface.half_edges import half_edges, half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
 from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
@@ -338,7 +338,7 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 def spring_geometry(surface: Surface) -> _SpringGeometry:
     """Return the springs of a surface without what depends on the fabric; made once for each surface."""
     vertices, around, numbered = surface.vertices, _springs_around(surface), row_major_grid(surface)
-    diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=creases_of(surface))
+    diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=face_creases(surface))
     if numbered is not None:
         lengths = numbered.listed_lengths(around.offset, vertices, diagonal)
         return read_only(_SpringGeometry(edge_count=numbered.edge_count, around=around, listed_length=lengths))
@@ -453,7 +453,7 @@ def measure_buckling_stiffness(
     hold = np.empty(count)
     layout = np.ascontiguousarray(positions, dtype=np.float64)
     lists = [around.offset, around.neighbor, springs.listed_length, springs.listed_stiffness]
-    given = [layout, *lists, cells_of(surface).vertex_areas, wp.vec2d(*warp)]
+    given = [layout, *lists, make_cells(surface).vertex_areas, wp.vec2d(*warp)]
     launch_each(measure_shear_stiffness, count, given, [hold])
     hold[surface.faces[is_quad].ravel()] = np.inf
     return _BUCKLING_SHARE * float(np.partition(hold, count // 4)[count // 4])

@@ -10,7 +10,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.text import size_words
-from warpflat.pattern.lettering import Words, text_width, wrapped
+from warpflat.pattern.lettering import Words, text_width, wrap_text
 from warpflat.pattern.pieces import Piece
 
 if TYPE_CHECKING:
@@ -205,7 +205,7 @@ def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Labe
         for share in (1.0, *BREAKS):
             rows = tuple(
                 # The size stays in one row: a nest replaces it by all sizes.
-                (text if text.startswith("Size ") else wrapped(text, h, share * widest * 1.001, bold=k == 0), h)
+                (text if text.startswith("Size ") else wrap_text(text, h, share * widest * 1.001, bold=k == 0), h)
                 for k, (text, h) in enumerate(plain)
             )
             if rows not in seen:
@@ -264,7 +264,7 @@ def _label_beside(cloth: Any, lines: tuple[tuple[str, float], ...]) -> Label:
 
     left, bottom, right, top = cloth.bounds
     rows = tuple(
-        (wrapped(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
+        (wrap_text(text, height * BESIDE_SIZE, BESIDE_WIDTH, bold=k == 0), height * BESIDE_SIZE)
         for k, (text, height) in enumerate(lines)
     )
     label = Label(at=np.zeros(2), lines=rows)

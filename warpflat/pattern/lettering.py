@@ -8,7 +8,7 @@ from pathlib import Path
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrapped"]
+__all__ = ["BOLD", "CAPITALS", "FONT", "Words", "font_file", "text_width", "wrap_text"]
 
 FONT, BOLD = "DejaVuSans", "DejaVuSans-Bold"
 #: Height of capitals over the font's size.
@@ -59,7 +59,7 @@ def _widths(name: str) -> dict[int, float]:
     return {code: width / 1000 for code, width in TTFontFile(str(font_file(name))).charWidths.items()}
 
 
-def wrapped(text: str, height: float, width: float, *, bold: bool = False) -> str:
+def wrap_text(text: str, height: float, width: float, *, bold: bool = False) -> str:
     """Turn spaces of a text into line breaks where a line would be wider than `width` [m]; words stay whole."""
     rows: list[str] = []
     for word in text.split():

@@ -169,7 +169,7 @@ def _nest(name: str, copies: list[tuple[DraftedPiece, bool]], cloth: Cloth, seco
     items, matrices, usable = [], [], cloth.width - 2 * cloth.gap
     for index, (piece, mirrored) in enumerate(copies):
         matrix = _onto_cloth(mirrored)
-        cut = unfolded(piece) @ matrix.T
+        cut = unfold_piece(piece) @ matrix.T
         across = float(np.ptp(cut[:, 1]))
         if across + SIMPLER > usable:
             size = f" {size_words(piece.size)}" if piece.size else ""
@@ -215,7 +215,7 @@ def _check(marker: Marker) -> None:
             raise RuntimeError(f"the nesting puts {copy.label} beyond the cloth")
 
 
-def unfolded(piece: DraftedPiece) -> FloatArray:
+def unfold_piece(piece: DraftedPiece) -> FloatArray:
     """Return the cut line of the whole piece (#P by 2 [m]): a half is joined to its mirror image along the fold."""
     import shapely
 
@@ -299,7 +299,7 @@ def _placed(
         mirrored=mirrored,
         turned=abs(np.cos(angle) + 1) < 1e-6,
         matrix=matrix,
-        cut_line=moved(unfolded(piece)),
+        cut_line=moved(unfold_piece(piece)),
         cutouts=tuple(moved(line) for line in _of_both_halves(piece, [c.cut_line for c in piece.cutouts.values()])),
         fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
         grain=moved(piece.grain),

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.file_names import checked_label
+from warpflat.core.file_names import check_label
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
@@ -175,7 +175,7 @@ class Piece:
 
     def __post_init__(self) -> None:
         where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
-        checked_label(self.name, "a piece, to which files and seams refer")
+        check_label(self.name, "a piece, to which files and seams refer")
         if self.quantity < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
@@ -374,7 +374,7 @@ def _check_names(piece: Piece, where: str) -> None:
         ("line", list(piece.internal_lines)),
     ):
         for name in names:
-            checked_label(name, f"{where}: {what}")
+            check_label(name, f"{where}: {what}")
         doubled = sorted({n for n in names if names.count(n) > 1})
         if doubled:
             raise InputError(f"{where}: {what} {doubled[0]!r} occurs twice; names are unique in a piece")

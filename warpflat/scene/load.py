@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import checked_name, fitted_name
+from warpflat.core.file_names import check_file_name, make_file_name
 from warpflat.core.toml_file import check_table, read_toml
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.file import FabricTable, fabric_from_table
@@ -87,8 +87,8 @@ def make_scene(data: Mapping[str, Any], *, name: str, folder: Path, where: str) 
     settings = check_table(SceneTable, data, where)
     if settings.name is not None:
         with errors_named(f"{where}: name"):
-            checked_name(settings.name)
-    return Scene(name=settings.name or fitted_name(name), settings=settings, folder=folder, where=where)
+            check_file_name(settings.name)
+    return Scene(name=settings.name or make_file_name(name), settings=settings, folder=folder, where=where)
 
 
 def scene_fabric(scene: Scene) -> Fabric:

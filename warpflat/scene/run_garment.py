@@ -14,7 +14,7 @@ from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.ease import SeamWish, seam_ratios
-from warpflat.garment.form_plan import check_fold_grain, folds_of, plan_form
+from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
@@ -106,7 +106,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
         drawing = pattern_options(settings.pattern, settings.marker)
         plan = plan_form(form, drawing.rules)
     with errors_named(f"{scene.where}: grain_angle"):
-        check_fold_grain(folds_of(form, plan), settings.grain_angle)
+        check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
         drawing = replace(drawing, rules=replace(drawing.rules, ease=seam_ratios(form, wishes).ease))

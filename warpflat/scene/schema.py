@@ -18,7 +18,7 @@ from pydantic import (
 
 from warpflat.core.errors import is_number
 from warpflat.core.file_names import plain_name
-from warpflat.core.text import shown
+from warpflat.core.text import quote_value
 from warpflat.core.toml_file import Table
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
@@ -67,7 +67,7 @@ class PlaneTable(Table):
 
 def _as_component(value: Any) -> Any:
     if value != "largest" and not (is_number(value, whole=True) and value >= 0):
-        raise ValueError(f'should be "largest" or a number from 0, largest first; got {shown(value)}')
+        raise ValueError(f'should be "largest" or a number from 0, largest first; got {quote_value(value)}')
     return value
 
 

@@ -16,7 +16,7 @@ from warpflat.surface.mesh import Surface, once_per_surface, read_only, store_re
 from warpflat.surface.triangles import corner_triangles
 from warpflat.surface.unfold import VertexLists, corners_of, lay_cells, quad_creases
 
-__all__ = ["CellArrays", "cells_of", "creases_of", "first_of_faces", "inherit_cells"]
+__all__ = ["CellArrays", "face_creases", "first_of_faces", "inherit_cells", "make_cells"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -90,7 +90,7 @@ class CellArrays:
 
 
 @once_per_surface
-def creases_of(surface: Surface) -> NDArray[np.int8]:
+def face_creases(surface: Surface) -> NDArray[np.int8]:
     """Return #F, the diagonal along which each quad is creased (see `quad_creases`), computed once per surface."""
     if not surface.is_quad.any():
         return quad_creases(surface.vertices, surface.faces)
@@ -101,17 +101,17 @@ def creases_of(surface: Surface) -> NDArray[np.int8]:
 
 
 @once_per_surface
-def cells_of(surface: Surface) -> CellArrays:
+def make_cells(surface: Surface) -> CellArrays:
     """Return the cells of a surface, computed once. The four cells of a creased quad come from the quad that it unfolds into."""
     faces, first = surface.faces, first_of_faces(surface, 4, 1)
-    laid = lay_cells(surface.vertices, faces, creases_of(surface), first)
+    laid = lay_cells(surface.vertices, faces, face_creases(surface), first)
     return read_only(CellArrays(faces=faces, first=first, laid=laid, around=corners_of(surface)))
 
 
 def inherit_cells(surface: Surface, whole: Surface) -> None:
     """Store the creases and cells of a surface for the one that a cut has made of it: the cut moves no face and keeps their order."""
-    cells = replace(cells_of(whole), faces=surface.faces, around=corners_of(surface))
-    store_results(surface, {creases_of: creases_of(whole), cells_of: read_only(cells)})
+    cells = replace(make_cells(whole), faces=surface.faces, around=corners_of(surface))
+    store_results(surface, {face_creases: face_creases(whole), make_cells: read_only(cells)})
 
 
 def first_of_faces(surface: Surface, of_quad: int, of_triangle: int) -> IntArray:

@@ -10,11 +10,11 @@ import warp as wp
 from warpflat.core.arrays import BoolArray, IntArray
 from warpflat.kernels.grid_lists import number_faces
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.half_edges import half_edges_of, twins_of
+from warpflat.surface.half_edges import half_edges_of, opposite_half_edges
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
 
-__all__ = ["Lattice", "cut_lattice", "lattice_of", "rows_and_columns"]
+__all__ = ["Lattice", "cut_lattice", "find_lattice", "rows_and_columns"]
 
 
 # Lattice places, per face, up to which the faces at each place are counted in an array.
@@ -48,7 +48,7 @@ class Lattice:
 
 
 @once_per_faces
-def lattice_of(surface: Surface) -> Lattice | None:
+def find_lattice(surface: Surface) -> Lattice | None:
     """Return the rows and columns of a mesh, computed once per array of faces.
 
     Columns count up along the first side of the first face, rows along its second side.
@@ -64,7 +64,7 @@ def lattice_of(surface: Surface) -> Lattice | None:
     if numbered is not None:
         return _from_numbers(faces, numbered)
     he = half_edges_of(surface)
-    twin = twins_of(he).astype(np.int32)
+    twin = opposite_half_edges(he).astype(np.int32)
     place, queue = (
         wp.empty(len(faces), dtype=wp.vec3i, device="cpu"),
         wp.empty(len(faces), dtype=wp.int32, device="cpu"),
@@ -112,7 +112,7 @@ def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice |
         whole: uncut.
         origin: #V, the vertex of `whole` at the place of each.
     """
-    lattice = lattice_of(whole)
+    lattice = find_lattice(whole)
     if lattice is None:
         return None
     corner = surface.faces
@@ -138,7 +138,7 @@ def rows_and_columns(surface: Surface) -> IntArray | None:
     numbered = row_major_grid(surface)
     if numbered is not None:
         return numbered.vertices
-    lattice = lattice_of(surface)
+    lattice = find_lattice(surface)
     if lattice is None:
         return None
     shape = int(lattice.row.max()) + 1, int(lattice.column.max()) + 1

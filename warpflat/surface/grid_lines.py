@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import IntArray
 from warpflat.surface.connectivity import join_labels
-from warpflat.surface.grid import lattice_of, rows_and_columns
+from warpflat.surface.grid import find_lattice, rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
 
@@ -40,7 +40,7 @@ def lines_of(surface: Surface) -> LineArrays | None:
         height, width = grid.shape
         steps = np.concatenate([np.full(height, width), np.full(width, height)])
         return _listed(steps, [grid.ravel(), grid.T.ravel()], height)
-    lattice = lattice_of(surface)
+    lattice = find_lattice(surface)
     if lattice is None:
         return None
     edges = half_edges_of(surface).edges

@@ -28,10 +28,10 @@ __all__ = [
     "half_edges_of",
     "mesh_edges",
     "non_manifold_edges",
+    "opposite_half_edges",
     "paired_half_edges",
     "read_only_view",
     "sides_of",
-    "twins_of",
 ]
 
 
@@ -119,7 +119,7 @@ def half_edges_of(surface: Surface) -> HalfEdges:
     return read_only(HalfEdges(faces=surface.faces.view(), edge=edge, edges=edges, count=count))
 
 
-def twins_of(he: HalfEdges) -> NDArray[np.int64]:
+def opposite_half_edges(he: HalfEdges) -> NDArray[np.int64]:
     """Return #H, the opposite half-edge of each; -1 on the border and at edges with more than two faces."""
     here = np.arange(len(he.edge))
     both = np.bincount(he.edge, here).astype(np.int64)
@@ -177,7 +177,7 @@ def border_edges(faces: ArrayLike) -> IntArray:
 def paired_half_edges(he: HalfEdges) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
     """Return pairs of half-edges that share an edge; n - 1 pairs around an edge with n faces."""
     if he.count.max(initial=0) <= 2:
-        twin = twins_of(he)
+        twin = opposite_half_edges(he)
         first = np.flatnonzero(twin > np.arange(len(twin)))
         return first, twin[first]
     order = stable_argsort(he.edge)

@@ -42,7 +42,7 @@ from warpflat.solver.multigrid.grid_coarsening import (
     coarsened_grid,
     resampled_grid,
 )
-from warpflat.surface.cells import cells_of, creases_of
+from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface, store_results
 from warpflat.surface.row_major_grid import row_major_grid
@@ -234,7 +234,7 @@ def hierarchy_in_background(surface: Surface) -> Iterator[None]:
 def _prepare_levels(surface: Surface) -> None:
     for step in coarsenings_of(surface):
         if step.smooth_interpolation is None:
-            cells_of(step.surface)
+            make_cells(step.surface)
             spring_geometry(step.surface)
             _ = step.transfer.transpose
 
@@ -242,7 +242,7 @@ def _prepare_levels(surface: Surface) -> None:
 def _coarse_quads(surface: Surface, vertices: FloatArray, faces: IntArray, of_faces: dict[str, Any]) -> Surface:
     """Return a coarser mesh of quads, without creases: these make no difference to a correction of the finer level."""
     part = _coarse_surface(surface, vertices, faces, of_faces)
-    store_results(part, {creases_of: np.full(len(faces), -1, dtype=np.int8)})
+    store_results(part, {face_creases: np.full(len(faces), -1, dtype=np.int8)})
     return part
 
 

@@ -23,7 +23,7 @@ from scipy.sparse import csr_array
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.solver.multigrid.cubic_interpolation import GridProlongation, LatticeProlongation, row_places
-from warpflat.surface.grid import Lattice, lattice_of, rows_and_columns
+from warpflat.surface.grid import Lattice, find_lattice, rows_and_columns
 from warpflat.surface.mesh import Surface, face_results, once_per_faces, once_per_surface, read_only
 from warpflat.surface.unfold import corners_of
 
@@ -239,7 +239,7 @@ def _line_places(surface: Surface) -> tuple[FloatArray, FloatArray]:
 
 @once_per_faces
 def _coarsened_lattice(surface: Surface) -> CoarsenedGrid | None:
-    lattice = lattice_of(surface)
+    lattice = find_lattice(surface)
     return None if lattice is None else _coarsen_lattice(lattice)
 
 
@@ -370,7 +370,7 @@ def _coarsen_lattice(lattice: Lattice) -> CoarsenedGrid | None:
         face_of=at_corner[0].copy(),
         transfer=Transfer(lambda: _bilinear_in_blocks(lattice, keep, block, blocks, faces)),
         make_interpolation=lambda surface: LatticeProlongation(surface.vertices, lattice, keep),
-        of_faces=face_results(faces, {lattice_of: read_only(coarse)}),
+        of_faces=face_results(faces, {find_lattice: read_only(coarse)}),
     )
 
 

@@ -16,7 +16,7 @@ from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.multigrid.coarsen import Coarsening, coarsen, is_coarsest, iterate_coarsenings, resampled_surface
 from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, drop_result, is_large
@@ -222,7 +222,7 @@ def _make_network(
         The network and its layout, repaired if need be; None where cells are mirrored.
     """
     layout = np.ascontiguousarray(layout)
-    if (cells_of(surface).least_shares(layout) <= 0.0).any():
+    if (make_cells(surface).least_shares(layout) <= 0.0).any():
         layout, left = untangle(surface, layout, least_area=_LEAST_AREA) if repair else (layout, 1)
         if left:
             return None

@@ -12,18 +12,18 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, expect, nearest
-from warpflat.core.file_names import checked_name, fitted_name, plain_label
+from warpflat.core.file_names import check_file_name, make_file_name, plain_label
 from warpflat.core.input_files import listening_to_reads, note_read
-from warpflat.core.text import shown
+from warpflat.core.text import quote_value
 from warpflat.surface.io.read_obj import read_obj
 from warpflat.surface.io.read_off import read_off
 from warpflat.surface.io.read_trimesh import GLTF, read_with_trimesh
 from warpflat.surface.io.read_usd import read_usd
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.lines import line_from_curve, with_lines
-from warpflat.surface.repair.polygons import distinct_corners, filled_up, split_polygons
+from warpflat.surface.repair.polygons import distinct_corners, pad_corners, split_polygons
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
-from warpflat.surface.repair.validate import checked_positions, make_surface
+from warpflat.surface.repair.validate import check_positions, make_surface
 
 __all__ = ["METRES_PER_UNIT", "SUFFIXES", "read_scan", "read_surface"]
 
@@ -87,7 +87,7 @@ def read_surface(
     sources = [file.absolute()]
     try:
         if name:
-            checked_name(name)
+            check_file_name(name)
         with listening_to_reads(sources.append):
             raw, scale = _read_with_unit(file, units, prim)
     except InputError as error:
@@ -99,7 +99,7 @@ def read_surface(
     surface = make_surface(
         raw.vertices * scale,
         raw.polygons,
-        name=name or fitted_name(raw.name or file.stem),
+        name=name or make_file_name(raw.name or file.stem),
         lines={plain_label(key): chain for key, chain in raw.chains.items()},
         component=component,
         weld=weld,
@@ -124,7 +124,7 @@ def read_scan(path: Path) -> tuple[FloatArray, IntArray]:
         _check_file(path)
         raw = _read(path, None, None)
         polygons, keep, _ = distinct_corners(raw.polygons)
-        return raw.vertices, split_polygons(checked_positions(raw.vertices), polygons[keep])[0]
+        return raw.vertices, split_polygons(check_positions(raw.vertices), polygons[keep])[0]
     except InputError as error:
         raise InputError(f"{path}: {error}") from error
     except OSError as error:
@@ -167,7 +167,7 @@ def _read(file: Path, units: str | None, prim: str | None) -> _Raw:
         mesh = read_usd(file, prim=prim, metres_per_unit=scale)
         return _Raw(
             vertices=mesh.vertices,
-            polygons=filled_up(mesh.corners, mesh.sizes),
+            polygons=pad_corners(mesh.corners, mesh.sizes),
             scale=1.0,
             name=mesh.name,
             curves=mesh.curves,
@@ -277,5 +277,5 @@ def _snap_curves(surface: Surface, curves: dict[str, FloatArray]) -> Surface:
             continue
         off, _ = cKDTree(curve).query(surface.vertices[lines[name]])
         if off.max() > 1e-6 * size:
-            notes.append(f"line {shown(name)} was drawn along the nearest edges")
+            notes.append(f"line {quote_value(name)} was drawn along the nearest edges")
     return replace(with_lines(surface, lines), notes=tuple(notes))

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.surface.repair.polygons import filled_up
+from warpflat.surface.repair.polygons import pad_corners
 
 __all__ = ["ObjMesh", "chain_lines", "read_obj"]
 
@@ -156,7 +156,7 @@ def _polygons(found: _Statements, total: int) -> NDArray[np.int64]:
         raise InputError(
             _face_message(found, face, f"refers to vertex {flat[wrong[0]]}, but the file has {total:,} (1 to {total})")
         )
-    return filled_up(index, count)
+    return pad_corners(index, count)
 
 
 def _face_message(found: _Statements, face: int, what: str) -> str:

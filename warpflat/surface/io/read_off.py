@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.surface.repair.polygons import filled_up
+from warpflat.surface.repair.polygons import pad_corners
 
 __all__ = ["read_off"]
 
@@ -100,4 +100,4 @@ def _polygons(rows: list[list[str]], count: int, points: int) -> NDArray[np.int6
         raise InputError(
             f"face {face} (counted from 0) refers to vertex {flat[wrong[0]]}, but there are {points:,} (0 to {points - 1})"
         )
-    return filled_up(flat, sizes)
+    return pad_corners(flat, sizes)

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.memory_limit import require_memory_for_usd
-from warpflat.core.text import shown
+from warpflat.core.text import quote_value
 
-__all__ = ["UNREADABLE", "UsdMesh", "answer", "read_stage"]
+__all__ = ["UNREADABLE", "UsdMesh", "answer", "read_usd_stage"]
 
 # Memory that reading may take beside the library's own, and more per byte of the file, since lists of corners pack tightly [bytes].
 _MEMORY, _MEMORY_PER_BYTE = 2**30, 200
@@ -53,7 +53,7 @@ class UsdMesh:
     layers: list[str] = field(default_factory=list)
 
 
-def read_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
+def read_usd_stage(path: Path, *, prim: str | None, metres_per_unit: float | None) -> UsdMesh:
     """Read one mesh prim of a stage.
 
     Args:
@@ -92,7 +92,7 @@ def answer() -> None:
         from pxr import UsdGeom, UsdUtils  # noqa: F401, as the limit counts what comes after it
 
         _limit(path.stat().st_size)
-        result: UsdMesh | str = read_stage(path, prim=prim, metres_per_unit=metres_per_unit)
+        result: UsdMesh | str = read_usd_stage(path, prim=prim, metres_per_unit=metres_per_unit)
     except InputError as error:
         result = str(error)
     pickle.dump(result, out, protocol=pickle.HIGHEST_PROTOCOL)
@@ -254,10 +254,10 @@ def _add_curves(out: UsdMesh, curves: Any, to_metres: Any) -> None:
     name = curves.GetPrim().GetName()
     points, counts = _value(curves.GetPointsAttr()), _value(curves.GetCurveVertexCountsAttr())
     if points is None or counts is None or len(points) != sum(counts):
-        out.notes.append(f"curves {shown(name)} have no points and were left out")
+        out.notes.append(f"curves {quote_value(name)} have no points and were left out")
         return
     if _value(curves.GetTypeAttr()) != UsdGeom.Tokens.linear:
-        out.notes.append(f"curves {shown(name)} are not linear and were left out: convert them to polylines")
+        out.notes.append(f"curves {quote_value(name)} are not linear and were left out: convert them to polylines")
         return
     periodic = _value(curves.GetWrapAttr()) == UsdGeom.Tokens.periodic
     place, _ = to_metres(points, curves.GetPrim())

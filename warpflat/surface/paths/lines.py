@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import checked_label
+from warpflat.core.file_names import check_label
 from warpflat.core.polyline import arc_lengths, polyline_length, segment_lengths
-from warpflat.core.text import shown
+from warpflat.core.text import quote_value
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, are_joined, as_vertex, path_in
@@ -230,7 +230,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
 
     curve = np.asarray(points, dtype=np.float64)
     if curve.ndim != 2 or curve.shape[1] != 3 or len(curve) < 2 or not np.isfinite(curve).all():
-        raise InputError(f"curve {shown(name)} must be at least two points of three finite numbers [m]")
+        raise InputError(f"curve {quote_value(name)} must be at least two points of three finite numbers [m]")
     graph = EdgeGraph(surface)
     edge = float(graph.length.mean())
     tree = cKDTree(surface.vertices)
@@ -238,7 +238,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
     if distance.max() > _OFF_PIECE * max(edge, float(graph.length.max())):
         far = int(np.argmax(distance))
         raise InputError(
-            f"curve {shown(name)} does not lie on the piece {surface.name!r}: its point {far} is {distance[far]:.3g} m off"
+            f"curve {quote_value(name)} does not lie on the piece {surface.name!r}: its point {far} is {distance[far]:.3g} m off"
         )
     on = distance <= _ON_VERTEX * edge
     on[[0, -1]] = True
@@ -254,7 +254,7 @@ def line_from_curve(surface: Surface, points: ArrayLike, *, name: str = "line") 
         line += _path_along(surface, graph, curve[i : j + 1], start, end, edge)
     line = _without_detours(line)
     if len(line) < 2:
-        raise InputError(f"curve {shown(name)} is shorter than the edges of {surface.name!r} around it")
+        raise InputError(f"curve {quote_value(name)} is shorter than the edges of {surface.name!r} around it")
     return np.array(line, dtype=np.int32)
 
 
@@ -295,9 +295,9 @@ def with_lines(surface: Surface, lines: Mapping[str, ArrayLike]) -> Surface:
     """
     checked = dict(surface.lines)
     for name, line in lines.items():
-        checked_label(name, "lines")
+        check_label(name, "lines")
         try:
             checked[name] = line_from_indices(surface, line)
         except InputError as error:
-            raise InputError(f"line {shown(name)}: {error}") from error
+            raise InputError(f"line {quote_value(name)}: {error}") from error
     return replace(surface, lines=checked)

@@ -13,11 +13,11 @@ from warpflat.core.errors import InputError
 from warpflat.surface.vectors import cross, dot, points_at
 
 __all__ = [
-    "crossed_quads",
     "distinct_corners",
-    "filled_up",
+    "find_crossed_quads",
     "list_some",
-    "padded_polygons",
+    "pad_corners",
+    "pad_polygons",
     "split_non_convex_quads",
     "split_polygons",
 ]
@@ -33,7 +33,7 @@ def list_some(indices: ArrayLike, most: int = 8) -> str:
     return shown if len(values) <= most else f"{shown} and {len(values) - most:,} more"
 
 
-def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
+def pad_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np.int64]:
     """Return #F by the largest corner count, vertex indices, filled up with -1 on the right.
 
     Raises:
@@ -45,7 +45,7 @@ def padded_polygons(polygons: ArrayLike | Sequence[Sequence[int]]) -> NDArray[np
         if not np.issubdtype(polygons.dtype, np.integer):
             raise InputError(f"faces must be integers (vertex indices), got {polygons.dtype}")
         return polygons.astype(np.int64)
-    return filled_up(*_from_lists(polygons))
+    return pad_corners(*_from_lists(polygons))
 
 
 def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
@@ -70,7 +70,7 @@ def _from_lists(polygons: ArrayLike | Sequence[Sequence[int]]) -> tuple[NDArray[
     return flat, count
 
 
-def filled_up(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
+def pad_corners(flat: NDArray[np.int64], count: NDArray[np.int64]) -> NDArray[np.int64]:
     """Return #F by the largest corner count, at least 4: corners one face after the other, filled up with -1 on the right.
 
     Raises:
@@ -210,7 +210,7 @@ def split_non_convex_quads(
     return np.insert(out, rows + 1, second, axis=0), np.insert(origin, rows + 1, origin[rows]), origin[rows]
 
 
-def crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
+def find_crossed_quads(vertices: FloatArray, faces: IntArray, tolerance: float = 1e-3) -> IndexArray:
     """Return the faces (of #F by 4) that are quads whose sides cross, or that are folded by more than 90 degrees."""
     quads = np.flatnonzero(faces[:, 3] >= 0)
     doubtful = quads[_may_cross(vertices, faces[quads], tolerance)]

@@ -16,22 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
-from warpflat.core.file_names import checked_label, checked_name
-from warpflat.core.text import counted, shown
+from warpflat.core.file_names import check_file_name, check_label
+from warpflat.core.text import format_count, quote_value
 from warpflat.surface.connectivity import border_loops, components, corner_fans, euler_characteristic, orient
 from warpflat.surface.half_edges import half_edges, mesh_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.polygons import (
     distinct_corners,
     list_some,
-    padded_polygons,
+    pad_polygons,
     split_non_convex_quads,
     split_polygons,
 )
 from warpflat.surface.repair.slivers import merge_degenerate_faces
 from warpflat.surface.repair.weld import t_junction, welding
 
-__all__ = ["checked_positions", "make_surface"]
+__all__ = ["check_positions", "make_surface"]
 
 # Bounds of coordinates, and of a whole surface [m]: areas and squares of areas beyond them are no numbers any more.
 _SMALLEST, _LARGEST = 1e-20, 1e20
@@ -90,7 +90,7 @@ def make_surface(
     Raises:
         InputError: with one line, if the input is no surface or no such part of one, or the name cannot name a file.
     """
-    checked_name(name)
+    check_file_name(name)
     try:
         return _checked_surface(
             vertices,
@@ -117,7 +117,7 @@ def _checked_surface(
     split_corners: bool,
     tolerance: float,
 ) -> Surface:
-    positions = checked_positions(vertices)
+    positions = check_positions(vertices)
     mesh = _checked_faces(positions, polygons)
     paths = {key: _checked_line(key, line, len(positions)) for key, line in lines.items()}
     place = _weld(mesh, weld, split_corners, component is not None)
@@ -126,7 +126,7 @@ def _checked_surface(
     _refuse_crowded_edges(mesh)
     mesh.faces, turned = orient(mesh.faces)
     if turned:
-        mesh.notes.append(f"the winding of {counted(turned, 'face')} was turned to agree with the others")
+        mesh.notes.append(f"the winding of {format_count(turned, 'face')} was turned to agree with the others")
     _separate_touching_fans(mesh)
     _drop_unused(mesh)
     kept_lines = _renumber_lines(mesh, {key: place[path] for key, path in paths.items()})
@@ -134,7 +134,7 @@ def _checked_surface(
     return _finish(mesh, kept_lines, name, positions, tolerance)
 
 
-def checked_positions(vertices: ArrayLike) -> FloatArray:
+def check_positions(vertices: ArrayLike) -> FloatArray:
     """Return vertices as #V by 3 numbers.
 
     Raises:
@@ -168,7 +168,7 @@ def checked_positions(vertices: ArrayLike) -> FloatArray:
 
 
 def _checked_faces(positions: FloatArray, polygons: ArrayLike | Sequence[Sequence[int]]) -> _Mesh:
-    padded = padded_polygons(polygons)
+    padded = pad_polygons(polygons)
     real = padded >= 0
     gaps = np.flatnonzero((~real[:, :3]).any(axis=1) | (np.diff(real.astype(np.int8), axis=1) > 0).any(axis=1))
     gaps = np.union1d(gaps, np.flatnonzero((padded < -1).any(axis=1)))
@@ -193,26 +193,28 @@ def _checked_faces(positions: FloatArray, polygons: ArrayLike | Sequence[Sequenc
     faces, of = split_polygons(positions, distinct[rows])
     many = len(np.unique(of[np.flatnonzero(of[1:] == of[:-1])]))
     if many:
-        notes.append(f"{counted(many, 'face')} of more than four corners cut into triangles")
+        notes.append(f"{format_count(many, 'face')} of more than four corners cut into triangles")
     index = np.arange(len(positions), dtype=np.int32)
     return _Mesh(positions, faces, rows[of].astype(np.int32), index, notes)
 
 
 def _note_repeated(notes: list[str], dropped: NDArray[np.integer], reduced: NDArray[np.integer]) -> None:
     if len(dropped):
-        notes.append(f"{counted(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
+        notes.append(f"{format_count(len(dropped), 'face')} with repeated vertices dropped: {list_some(dropped)}")
     if len(reduced):
-        notes.append(f"{counted(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
+        notes.append(f"{format_count(len(reduced), 'face')} with a doubled corner reduced by it: {list_some(reduced)}")
 
 
 def _checked_line(name: str, line: ArrayLike, size: int) -> NDArray[np.int64]:
-    checked_label(name, "lines")
+    check_label(name, "lines")
     path = np.asarray(line)
     if path.ndim != 1 or len(path) < 2 or not np.issubdtype(path.dtype, np.integer):
-        raise InputError(f"line {shown(name)} must be a list of at least two vertex indices")
+        raise InputError(f"line {quote_value(name)} must be a list of at least two vertex indices")
     wrong = path[(path < 0) | (path >= size)]
     if len(wrong):
-        raise InputError(f"line {shown(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})")
+        raise InputError(
+            f"line {quote_value(name)} refers to vertex {wrong[0]}, but there are {size:,} (0 to {size - 1})"
+        )
     return path.astype(np.int64)
 
 
@@ -240,7 +242,9 @@ def _drop_double_faces(mesh: _Mesh) -> None:
     keep = np.zeros(len(mesh.faces), dtype=bool)
     keep[first] = True
     doubled = mesh.origin[~keep]
-    mesh.notes.append(f"{counted(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}")
+    mesh.notes.append(
+        f"{format_count(len(doubled), 'face')} dropped that had the vertices of another: {list_some(doubled)}"
+    )
     mesh.keep(keep)
 
 
@@ -271,7 +275,7 @@ def _choose_component(mesh: _Mesh, component: int | Literal["largest"] | None) -
         keep = label == rank[component]
         mesh.keep(keep)
         mesh.notes.append(
-            f"component {component} of {len(sizes)} taken, {counted(int((~keep).sum()), 'face')} left out"
+            f"component {component} of {len(sizes)} taken, {format_count(int((~keep).sum()), 'face')} left out"
         )
 
 
@@ -289,7 +293,7 @@ def _refuse_crowded_edges(mesh: _Mesh) -> None:
         return
     a, b = he.edges[crowded[0]].tolist()
     at = mesh.origin[he.face[he.edge == crowded[0]]]
-    more = f" ({counted(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
+    more = f" ({format_count(len(crowded) - 1, 'more edge')} like it)" if len(crowded) > 1 else ""
     raise InputError(
         f"the edge between vertices {a} and {b} is not manifold: {len(at)} faces meet there ({list_some(at)}; counted "
         f"from 0){more}; cloth has at most two at an edge: delete the surplus faces or part the surface there"
@@ -345,7 +349,7 @@ def _renumber_lines(mesh: _Mesh, paths: Mapping[str, IntArray]) -> dict[str, lis
     for name, path in paths.items():
         rows = [row for i, row in enumerate(path.tolist()) if i == 0 or row != path[i - 1]]
         if not any(row in places for row in rows):
-            mesh.notes.append(f"line {shown(name)} does not lie on the piece and was left out")
+            mesh.notes.append(f"line {quote_value(name)} does not lie on the piece and was left out")
             continue
         lines[name] = _trace_line(name, rows, places, edges)
     return lines
@@ -356,7 +360,7 @@ def _trace_line(
 ) -> list[int]:
     missing = [row for row in rows if row not in places]
     if missing:
-        raise InputError(f"line {shown(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
+        raise InputError(f"line {quote_value(name)} leaves the piece at vertex {missing[0]} (counted from 0)")
     line: list[int] = []
     for i, row in enumerate(rows):
         choice = places[row]
@@ -364,7 +368,7 @@ def _trace_line(
             choice = [v for v in choice if (min(v, line[-1]), max(v, line[-1])) in edges]
             if not choice:
                 raise InputError(
-                    f"line {shown(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
+                    f"line {quote_value(name)} breaks between vertices {rows[i - 1]} and {row} (counted from 0): no edge there"
                 )
         elif len(choice) > 1 and len(rows) > 1:
             follow = places[rows[1]]
@@ -383,7 +387,7 @@ def _check_border(faces: IntArray) -> None:
     handles = (2 - len(loops) - euler_characteristic(faces)) // 2
     if handles:
         raise InputError(
-            f"the surface has {counted(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
+            f"the surface has {format_count(handles, 'handle')} (a tunnel, as where a strap joins two openings): cut it "
             "through there, or give a part without"
         )
 
@@ -393,13 +397,13 @@ def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: Floa
     mesh.faces, mesh.origin, cut = split_non_convex_quads(mesh.vertices, mesh.faces, mesh.origin, tolerance)
     if len(cut):
         mesh.notes.append(
-            f"{counted(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
+            f"{format_count(len(cut), 'quad')} with a straight or inward corner cut into triangles: {list_some(cut)}"
         )
     before = len(mesh.vertices)
     faces, of, lines, merged, left = merge_degenerate_faces(mesh.vertices, mesh.faces, lines, tolerance)
     if len(left):
         raise InputError(
-            f"{counted(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
+            f"{format_count(len(left), 'degenerate face')} (narrower than {tolerance:g} of the edges around) cannot be "
             f"merged without changing the piece: {list_some(np.unique(mesh.origin[left]))} (counted from 0); delete or "
             "redraw them"
         )
@@ -407,7 +411,7 @@ def _finish(mesh: _Mesh, lines: dict[str, list[int]], name: str, positions: Floa
         names = list_some(np.unique(mesh.origin[merged]))
         used = len(np.unique(faces[faces >= 0]))
         mesh.notes.append(
-            f"{counted(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
+            f"{format_count(len(merged), 'degenerate face')} (narrower than {tolerance:g} of the edges around) merged into "
             f"neighbours, {before - used} of their vertices fell away: {names}"
         )
         mesh.faces, mesh.origin = faces, mesh.origin[of]
