@@ -403,7 +403,7 @@ def test_caches_dropped_from_large_pieces_are_made_again_as_they_were(kind: str,
         return make_shape("dome", resolution=16) if kind == "grid" else cracked(16, triangles=kind == "triangles")
 
     kept = flatten(piece(), device=DEVICE)
-    monkeypatch.setattr(mesh, "_MUCH_IS_FREED", 100)
+    monkeypatch.setattr(mesh, "_LARGE", 100)
     surface = piece()
     flat = flatten(surface, device=DEVICE)
     np.testing.assert_array_equal(flat.positions, kept.positions)
