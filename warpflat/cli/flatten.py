@@ -43,6 +43,12 @@ __all__ = ["flatten"]
 )
 @click.option("--max-steps", type=int, metavar="N", help="Give up after the work of so many steps.")
 @click.option("--time-step", type=float, metavar="SECONDS", help="Of the approximate implicit integration.")
+@click.option(
+    "--gap",
+    type=float,
+    metavar="MM",
+    help="A piece that would lie over itself is parted where its border is nearer than this; 0: not.  [default: 0.5]",
+)
 @click.option("--frames", type=int, metavar="N", help="About how many frames, 0 for none.  [default: 60]")
 @click.option("--no-picture", is_flag=True, help="Write no picture.png.")
 @output_options()
@@ -68,6 +74,7 @@ def flatten(
         "solver": ("relax", "solver"),
         "max_steps": ("relax", "max_steps"),
         "time_step": ("relax", "time_step"),
+        "gap": ("relax", "gap_mm"),
         "frames": ("output", "frames"),
         "stretch_warp": ("wear", "stretch_warp"),
         "stretch_weft": ("wear", "stretch_weft"),

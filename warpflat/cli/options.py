@@ -18,7 +18,8 @@ DONE, NOT_CONVERGED, BAD_INPUT = 0, 1, 2
 EXIT_CODES = """\b
 Exit codes:
   0    done
-  1    done, but a piece did not converge or has flipped faces, in whatever size, or a pattern could not be drawn
+  1    done, but a piece did not converge, has flipped faces or lies over itself, in whatever size, or no
+       pattern could be drawn
   2    bad input; one line says what is wrong, where, and what would be right
   129  the terminal was closed
   130  interrupted

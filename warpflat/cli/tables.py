@@ -89,7 +89,7 @@ def _price(joules: float | None) -> str:
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
-    """Return a line for each piece, of every size, that did not converge or has flipped faces, and for a missing pattern or marker."""
+    """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for a missing pattern."""
     lines = []
     given_up = metrics.get("sewing", {}).get("contradictory", False)
     for name, piece in metrics["pieces"].items():
@@ -102,6 +102,9 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
             )
         if piece["flipped_faces"]:
             lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+        if piece.get("overlap_m2"):
+            area = 1e6 * piece["overlap_m2"]
+            lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
     if not metrics.get("sewing", {}).get("converged", True):
         amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
         amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]

@@ -136,13 +136,14 @@ class Ledger:
 
 
 def coarse_options(options: RelaxOptions | None = None) -> RelaxOptions:
-    """Return options for ranking: tolerances ten times looser, and few steps."""
+    """Return options for ranking: tolerances ten times looser, few steps, and no contact."""
     given = given_options(options)
     return replace(
         given,
         energy_tolerance=_LOOSER * given.energy_tolerance,
         residual_tolerance=_LOOSER * given.residual_tolerance,
         max_steps=min(_COARSE_STEPS, given.max_steps),
+        gap_mm=0.0,
     )
 
 

@@ -165,6 +165,7 @@ def _try(result: Flattening, remedy: Remedy) -> Remedy:
         energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
         residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
         max_steps=min(options.max_steps, result.stages[-1].steps + 2000),
+        gap_mm=0.0,
     )
     try:
         opened = cut(result, CutPlan(name="trial", paths=(remedy.path,)), relax=quick)

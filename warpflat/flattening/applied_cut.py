@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,7 +18,7 @@ from warpflat.surface.cut.dart import dart_measure, fish_eye_measure, mouth_firs
 from warpflat.surface.cut.dart_legs import are_curved, pull_back
 from warpflat.surface.mesh import Surface
 
-__all__ = ["AppliedCut", "measure_cut", "seam_kind"]
+__all__ = ["AppliedCut", "cut_sides", "measure_cut", "seam_kind"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -37,6 +38,12 @@ class AppliedCut:
     seams: tuple[Seam, ...]
     length: float
     tip_back: float = 0.0
+
+
+def cut_sides(cuts: Sequence[AppliedCut]) -> IntArray:
+    """Return the vertices of the pattern on the sides of cuts."""
+    sides = [side for cut in cuts for seam in cut.seams for side in (seam.left, seam.right)]
+    return np.unique(np.concatenate(sides)) if sides else np.empty(0, dtype=np.int32)
 
 
 def seam_kind(seam: Seam) -> str:

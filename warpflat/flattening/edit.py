@@ -16,10 +16,10 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, expect, expect_callback
 from warpflat.fabric.fabric import Fabric
 from warpflat.fabric.library import as_fabric
-from warpflat.flattening.applied_cut import AppliedCut
+from warpflat.flattening.applied_cut import AppliedCut, cut_sides
 from warpflat.flattening.datum import datum_extent
 from warpflat.flattening.progress import Progress
-from warpflat.flattening.relax_pieces import RelaxationTask, relax_pieces
+from warpflat.flattening.relax_pieces import RelaxationTask, keep_apart, relax_pieces
 from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.options import RelaxOptions, given_options
@@ -215,7 +215,7 @@ def relax_cut(
     """
     inherit_cells(surface, result.surface)
     task = _continuation_task(result, surface, result.fabric, stage, options, callback)
-    return replace(_continue(result, task, positions), cuts=tuple(cuts))
+    return _continue(replace(result, cuts=tuple(cuts)), task, positions)
 
 
 def _continuation_task(
@@ -249,11 +249,12 @@ def _continue(result: Flattening, task: RelaxationTask, positions: FloatArray) -
     (end,) = relax_pieces(
         [task], [task.build_network(positions)], [positions], direction_updates=[task.max_direction_updates()]
     )
+    apart, stages = keep_apart(task, end, positions, cut_sides(result.cuts))
     return replace(
         result,
         network=end.network,
-        positions=end.positions,
-        stages=(*result.stages, task.make_stage(end.network, end.positions, end.outcome)),
+        positions=apart,
+        stages=(*result.stages, *stages),
         history=np.concatenate([result.history.reshape(-1, 4), np.array(task.history).reshape(-1, 4)]),
         notes=(*result.notes, *(note for note in task.notes if note not in result.notes)),
         options=task.options,

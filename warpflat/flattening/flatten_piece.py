@@ -21,7 +21,7 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
 from warpflat.flattening.develop import Development, develop
 from warpflat.flattening.progress import Progress, Stage
-from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, relax_pieces
+from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, keep_apart, relax_pieces
 from warpflat.flattening.result import Flattening
 from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
@@ -225,6 +225,7 @@ def _flattening(piece: DevelopedPiece, end: RelaxedPiece) -> Flattening:
         converged=True,
         residual=None,
     )
+    positions, stages = keep_apart(task, end, development.positions, np.empty(0, dtype=np.int32))
     return Flattening(
         surface=task.surface,
         fabric=task.fabric,
@@ -233,8 +234,8 @@ def _flattening(piece: DevelopedPiece, end: RelaxedPiece) -> Flattening:
         grain_angle=task.grain_angle,
         network=end.network,
         development=development,
-        positions=end.positions,
-        stages=(developed, task.make_stage(end.network, end.positions, end.outcome)),
+        positions=positions,
+        stages=(developed, *stages),
         history=np.array(task.history),
         notes=(*task.surface.notes, *piece.notes, *development.notes, *task.notes),
         wear=task.wear,

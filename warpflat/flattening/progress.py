@@ -12,7 +12,10 @@ from warpflat.solver.convergence import Energies
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Progress", "Stage"]
+__all__ = ["CONTACT", "Progress", "Stage"]
+
+#: Name of the stage in which a piece that would lie over itself is kept from it.
+CONTACT = "contact"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,7 +23,7 @@ class Stage:
     """An entry of a piece's history: its energies at the end of a stage, and what the stage took.
 
     Attributes:
-        name: "develop", "relax", "cut:NAME" and so on.
+        name: "develop", "relax", "contact", "cut:NAME" and so on.
         model_energy_j: what is minimised: springs and guard, or membrane and guard [J].
         guard_energy_j: the part of it that keeps faces unfolded [J].
         strain_energy_j: strain energy of the cloth as worn, eq. (3) of the paper [J].

@@ -19,12 +19,14 @@ from warpflat.core.sums import range_offsets
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric, grain_axes
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.develop import Development
-from warpflat.flattening.progress import Progress, Stage
+from warpflat.flattening.harmonic_layout import harmonic_layout
+from warpflat.flattening.progress import CONTACT, Progress, Stage
 from warpflat.model.join import join_networks
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.model.wear import Wear, intended_stretch
+from warpflat.solver.contact import open_cracks, relax_with_contact
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
@@ -33,9 +35,10 @@ from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.injective import overlap_area
 from warpflat.surface.mesh import Surface
 
-__all__ = ["RelaxationTask", "RelaxedPiece", "relax_pieces"]
+__all__ = ["RelaxationTask", "RelaxedPiece", "keep_apart", "relax_pieces"]
 
 
 # Tolerances of all rounds but the last are looser by this factor: their layout only serves to update directions.
@@ -156,10 +159,12 @@ class RelaxationTask:
                 )
             )
 
-    def make_stage(self, network: SpringNetwork, positions: FloatArray, outcome: Outcome) -> Stage:
-        """Make the entry of the history for the stage that has ended with an outcome."""
+    def make_stage(
+        self, network: SpringNetwork, positions: FloatArray, outcome: Outcome, *, name: str | None = None
+    ) -> Stage:
+        """Make the entry of the history for the stage that has ended with an outcome, by default the task's own."""
         return Stage(
-            name=self.stage_name,
+            name=name or self.stage_name,
             model_energy_j=outcome.energies.potential,
             guard_energy_j=outcome.energies.guard,
             strain_energy_j=strain_energy(network, positions),
@@ -234,6 +239,42 @@ def relax_pieces(
         # The springs of earlier rounds are gone: only those that the pattern has count.
         task.notes += _grain_notes(relaxed[number].network)
     return [relaxed[number] for number in range(len(tasks))]
+
+
+def keep_apart(
+    task: RelaxationTask, end: RelaxedPiece, start: FloatArray, cut_sides: IntArray
+) -> tuple[FloatArray, tuple[Stage, ...]]:
+    """Relax a piece once more, with contact, if it has come to rest lying over itself; add a note.
+
+    Args:
+        task: of the piece.
+        end: the piece relaxed without contact.
+        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m].
+        cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
+
+    Returns:
+        The layout, #V by 2 [m], and the stages: that of the relaxation, and "contact" if there was one that succeeded.
+    """
+    surface, network, free = end.network.surface, end.network, end.positions
+    relaxed = task.make_stage(network, free, end.outcome)
+    if not (task.options.gap_mm and end.outcome.converged):
+        return free, (relaxed,)
+    overlap = overlap_area(surface, free, cut_sides)
+    if overlap == 0.0:
+        return free, (relaxed,)
+    words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
+    lower, upper = int(task.datum[0]), int(task.datum[-1])
+    grain = GrainAlignment(lower=lower, upper=upper, vertices=slice(0, network.vertex_count))
+    for first in (lambda: open_cracks(surface, start), lambda: harmonic_layout(surface)):
+        state = Relaxation(network, task.options, start=first(), alignments=[grain])
+        outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
+        if outcome is not None and outcome.converged:
+            before, after = relaxed.model_energy_j, outcome.energies.potential
+            share = f" ({100 * (after - before) / before:+.2g} %)" if before > 0.0 else ""
+            task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
+            return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+    task.notes.append(f"{words}, and contact could not part it: cut it apart there")
+    return free, (relaxed,)
 
 
 def _has_levels(task: RelaxationTask, network: SpringNetwork) -> bool:

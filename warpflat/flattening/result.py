@@ -15,10 +15,10 @@ import warp as wp
 from warpflat._version import __version__
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.fabric.fabric import Fabric
-from warpflat.flattening.applied_cut import AppliedCut, measure_cut
+from warpflat.flattening.applied_cut import AppliedCut, cut_sides, measure_cut
 from warpflat.flattening.develop import Development
 from warpflat.flattening.fit_report import Remedy, wear_measures
-from warpflat.flattening.progress import Stage
+from warpflat.flattening.progress import CONTACT, Stage
 from warpflat.flattening.stretched_faces import StretchedFaces, find_stretched_faces
 from warpflat.model.fit import WornFit, assess_fit
 from warpflat.model.network import SpringNetwork
@@ -26,6 +26,7 @@ from warpflat.model.strain import LayoutErrors, WornStrain, layout_errors, worn_
 from warpflat.model.wear import Wear
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.energy_map import energy_report
+from warpflat.surface.injective import overlap_area
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
 __all__ = ["Flattening", "run_metrics", "write_files"]
 
 # What is measured of a layout, and does not change with the advice on it.
-_MEASURED = ("vertex_origin", "_errors", "worn", "fit", "stretched_faces", "layout_measures")
+_MEASURED = ("vertex_origin", "_errors", "overlap", "worn", "fit", "stretched_faces", "layout_measures")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -98,6 +99,17 @@ class Flattening:
         return self._errors.flipped_faces
 
     @cached_property
+    def overlap(self) -> float:
+        """The area that the pattern covers more than once [m2], but for cuts whose sides lie over each other."""
+        return overlap_area(self.network.surface, self.positions, cut_sides(self.cuts))
+
+    @property
+    def contact_energy(self) -> float:
+        """The model energy that contact has cost where the piece would lie over itself [J]; 0 if the last stage is another one."""
+        before, last = self.stages[-2:] if len(self.stages) > 1 else (self.stages[-1], self.stages[-1])
+        return last.model_energy_j - before.model_energy_j if last.name == CONTACT else 0.0
+
+    @cached_property
     def _errors(self) -> LayoutErrors:
         return layout_errors(self.network.surface, self.network, self.positions)
 
@@ -144,6 +156,8 @@ class Flattening:
             "strain_energy_j": last.strain_energy_j,
             "model_energy_j": last.model_energy_j,
             "guard_energy_j": last.guard_energy_j,
+            "contact_energy_j": self.contact_energy,
+            "overlap_m2": self.overlap,
             "area_m2": float(self.worn.area.sum()),
             "converged": self.converged,
         }

@@ -16,7 +16,7 @@ SOLVERS: tuple[Solver, ...] = ("multilevel", "plain")
 
 @dataclass(frozen=True, kw_only=True)
 class RelaxOptions:
-    """Options of a relaxation: the time step, the tolerances, the solver.
+    """Options of a relaxation: the time step, the tolerances, the solver, the gap.
 
     Attributes:
         time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
@@ -30,6 +30,8 @@ class RelaxOptions:
         kinetic_damping: set velocities to zero when the forces begin to brake the motion.
         solver: "multilevel" (see `warpflat.solver.multigrid.solve`; sewn garments take plain steps all the same), or
             "plain", the paper's steps alone.
+        gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.solver.contact`), which acts where its border
+            comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
     """
 
     time_step: float = 0.01
@@ -39,6 +41,7 @@ class RelaxOptions:
     check_every: int = 10
     kinetic_damping: bool = True
     solver: Solver = "multilevel"
+    gap_mm: float = 0.5
 
     def validate(self) -> None:
         """Raise InputError, with its name, for a value out of its bounds."""
@@ -48,6 +51,7 @@ class RelaxOptions:
             ("residual_tolerance", 1e-12, 1e3),
             ("max_steps", 1, 10**9),
             ("check_every", 1, 10**6),
+            ("gap_mm", 0.0, 1e3),
         ):
             value = getattr(self, key)
             if not (is_number(value) and math.isfinite(value)):

@@ -1,0 +1,368 @@
+"""Contact in the plane: the border of a piece is kept from lying over itself, at the least price in energy.
+
+The model energy is minimised together with a barrier between border vertices and border edges (as in incremental potential contact,
+Li et al. 2020, and Smith and Schaefer 2015): b(r) = -k (r - g)^2 ln(r / g) below a gap g, where r is their distance. The gap is
+g = min(d, slope s), s the way along the border on the body, so that the sides of a notch may meet at its tip.
+
+The minimiser is L-BFGS over one sparse factor of the springs' Laplacian (Liu et al. 2017), to which the stiffness of the contacts is
+added exactly by Woodbury's formula. A step is halved until the energy falls and the border is simple. The energy of the guard is
+infinite where a face is mirrored. Hence every layout on the way is injective, and the last one is certified.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.convergence import Outcome
+from warpflat.solver.grain_alignment import GrainAlignment, align_grain, remove_rotation
+from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
+from warpflat.surface.mesh import Surface
+
+__all__ = ["open_cracks", "relax_with_contact"]
+
+# The gap between two places of the border is at most this share of the way between them along the border.
+_SLOPE = 0.02
+# The sides of cracks must not cross, but may lie as close as this share of the gap.
+_CRACK_GAP = 0.02
+# Stiffness of the barrier, and of the spring that keeps the grain upright, in median stiffnesses of the springs.
+_BARRIER_STIFFNESS, _GRAIN_STIFFNESS = 1.0, 1e3
+# Corrections that L-BFGS remembers; at most so many iterations.
+_MEMORY = 8
+_MOST_ITERATIONS = 2_000
+# A piece is at rest when so many iterations together have released less than the energy tolerance allows, each,
+_REST_INTERVAL = 10
+# and when the next one could release at most this share of the energy, by the metric.
+_NEGLIGIBLE_RELEASE = 1e-5
+# The first step that is tried is longer than the last one taken by at most this factor.
+_LONGER = 4.0
+_LEAST_FRACTION, _ARMIJO = 1e-7, 1e-4
+# Stiffness added to hold the piece as a whole, over the mean of the diagonal.
+_REGULARISATION = 1e-7
+# Sides of closed cracks are drawn apart by this share of the way to the middle of the faces around each vertex; less where that folds.
+_OPENINGS = (1e-2, 1e-3, 1e-4)
+
+
+def open_cracks(surface: Surface, positions: FloatArray) -> FloatArray:
+    """Return a layout (#V by 2 [m]) whose cracks gape a little where their sides coincide; as it was if that does not part them."""
+    edges, crack = border_edges_of(surface), crack_edges_of(surface)
+    sides = np.intersect1d(edges.tail[crack], edges.head[crack])
+    faces, used = surface.faces, surface.faces >= 0
+    corners = np.where(used[:, :, None], positions[faces], 0.0)
+    middle = corners.sum(axis=1) / used.sum(axis=1)[:, None]
+    face, vertex = np.nonzero(used)[0], faces[used]
+    count = np.bincount(vertex, minlength=len(positions))[sides]
+    mean = np.stack(
+        [np.bincount(vertex, middle[face, k], minlength=len(positions))[sides] / count for k in range(2)], 1
+    )
+    for share in _OPENINGS:
+        opened = positions.copy()
+        opened[sides] += share * (mean - opened[sides])
+        if is_injective(surface, opened):
+            return opened
+    return positions
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Touch:
+    """The contacts of a layout.
+
+    Attributes:
+        energy: of the barrier [J]; infinite where the border is not simple.
+        vertices: #C by 3, a vertex and the two ends of the edge near it.
+        lever: #C by 3 by 2, derivative of the distance by the places of these vertices.
+        slope, bend: #C, first and second derivative of the barrier by the distance [N], [N/m].
+    """
+
+    energy: float
+    vertices: IntArray
+    lever: FloatArray
+    slope: FloatArray
+    bend: FloatArray
+
+
+_CROSSED = _Touch(
+    energy=np.inf,
+    vertices=np.empty((0, 3), dtype=np.int32),
+    lever=np.empty((0, 3, 2)),
+    slope=np.empty(0),
+    bend=np.empty(0),
+)
+
+
+class _Barrier:
+    """The barrier between border vertices and border edges that are near in the plane and far along the border."""
+
+    def __init__(self, surface: Surface, gap: float, stiffness: float) -> None:
+        self._gap, self._stiffness = gap, stiffness
+        self._edges = edges = border_edges_of(surface)
+        self._crack = crack_edges_of(surface)
+        length = np.linalg.norm(surface.vertices[edges.head] - surface.vertices[edges.tail], axis=1)
+        ends = np.concatenate([[0.0], np.cumsum(length)])
+        self._length, self._station = length, ends[:-1] - ends[edges.first]
+        self._around = ends[edges.first + edges.count] - ends[edges.first]
+
+    def _gaps(self, v: IndexArray, e: IndexArray) -> FloatArray:
+        """Return the gap between vertices (rows of the border) and edges, #N [m]."""
+        around, edges = self._around[v], self._edges
+        to_tail = np.abs(self._station[v] - self._station[e])
+        to_head = np.abs(self._station[v] - self._station[e] - self._length[e])
+        way = np.minimum(np.minimum(to_tail, around - to_tail), np.minimum(to_head, np.abs(around - to_head)))
+        way = np.where(edges.first[v] == edges.first[e], way, np.inf)
+        most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
+        return np.minimum(most, _SLOPE * way)
+
+    def __call__(self, positions: FloatArray) -> _Touch:
+        """Return the contacts of a layout (#V by 2 [m])."""
+        edges = self._edges
+        i, j = near_edges(edges, positions, self._gap)
+        if len(crossings(edges, positions, (i, j))[0]):
+            return _CROSSED
+        v, e = np.concatenate([i, j]), np.concatenate([j, i])
+        apart = (edges.tail[v] != edges.tail[e]) & (edges.tail[v] != edges.head[e])
+        v, e = v[apart], e[apart]
+        gap = self._gaps(v, e)
+        vertices = np.stack([edges.tail[v], edges.tail[e], edges.head[e]], axis=1)
+        distance, along, away = _closest(*(positions[vertices[:, k]] for k in range(3)))
+        near = distance < gap
+        vertices, r, t, away, g = vertices[near], distance[near], along[near], away[near], gap[near]
+        if len(r) and not r.min() > 0.0:
+            return _CROSSED
+        log, short, k = np.log(r / g), r - g, self._stiffness
+        share = np.stack([np.ones_like(t), t - 1.0, -t], axis=1)
+        return _Touch(
+            energy=float((-k * short**2 * log).sum()),
+            vertices=vertices,
+            lever=share[:, :, None] * away[:, None],
+            slope=-k * (2 * short * log + short**2 / r),
+            bend=-k * (2 * log + 4 * short / r - (short / r) ** 2),
+        )
+
+
+def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Return distances [m] of points from edges (#N), the shares along the edges, and unit vectors away from them (#N by 2)."""
+    edge, spoke = b - a, v - a
+    t = np.clip(np.einsum("ij,ij->i", spoke, edge) / np.maximum(np.einsum("ij,ij->i", edge, edge), 1e-300), 0.0, 1.0)
+    away = spoke - t[:, None] * edge
+    distance = np.linalg.norm(away, axis=1)
+    return distance, t, away / np.maximum(distance, 1e-300)[:, None]
+
+
+class _Metric:
+    """The springs' Laplacian, factored once, plus rank-one stiffnesses of contacts."""
+
+    def __init__(self, network: SpringNetwork) -> None:
+        springs, n = network.spring_arrays, network.vertex_count
+        a, b = springs.ends.T
+        weight = coo_array((np.tile(springs.stiffness, 2), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
+        laplacian = diags_array(np.asarray(weight.sum(axis=1)).ravel()) - weight
+        held = csc_array(laplacian + diags_array(np.full(n, _REGULARISATION * laplacian.diagonal().mean())))
+        self._factor = splu(held, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        # The inverse's columns at vertices that have touched; most of the border never does.
+        self._column: dict[int, FloatArray] = {}
+        self._count = n
+
+    def _columns(self, vertices: IntArray) -> FloatArray:
+        new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
+        if new:
+            unit = np.zeros((self._count, len(new)))
+            unit[new, np.arange(len(new))] = 1.0
+            self._column |= zip(new, self._factor.solve(unit).T, strict=True)
+        return np.stack([self._column[vertex] for vertex in vertices.tolist()])
+
+    def solver(self, vertices: IntArray, lever: FloatArray) -> Callable[[FloatArray], FloatArray]:
+        """Return the solution by the Laplacian plus a row J^T J for each contact.
+
+        Args:
+            vertices: #C by 3.
+            lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
+        """
+        own, at = np.unique(vertices, return_inverse=True)
+        rows = np.zeros((2, len(vertices), len(own)))
+        number = np.repeat(np.arange(len(vertices)), 3)
+        for axis in range(2):
+            np.add.at(rows[axis], (number, at.ravel()), lever[:, :, axis].ravel())
+        columns = self._columns(own)
+        table = columns[:, own]
+        inner = np.eye(len(vertices)) + sum(row @ table @ row.T for row in rows)
+
+        def solve(force: FloatArray) -> FloatArray:
+            step = np.asarray(self._factor.solve(np.ascontiguousarray(force)))
+            pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
+            for axis in range(2):
+                step[:, axis] -= (rows[axis].T @ pull) @ columns
+            return step
+
+        return solve
+
+
+@dataclass(frozen=True, kw_only=True)
+class _Point:
+    """A layout (#V by 2 [m]), the energy there with contacts and grain [J], the contacts, and the energy of the cloth alone [J]."""
+
+    positions: FloatArray
+    energy: float
+    touch: _Touch
+
+
+class _Problem:
+    """The energy that is minimised: cloth, barrier, and a spring that keeps the grain upright."""
+
+    def __init__(self, state: Relaxation, grain: GrainAlignment, gap: float) -> None:
+        self.state, self._grain = state, grain
+        stiffness = float(np.median(state.network.spring_arrays.stiffness))
+        self._barrier = _Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
+        self._metric = _Metric(state.network)
+        self._upright = _GRAIN_STIFFNESS * stiffness
+
+    def at(self, positions: FloatArray) -> _Point:
+        """Evaluate a layout."""
+        touch = self._barrier(positions)
+        energy = touch.energy
+        if np.isfinite(energy):
+            self.state.position.assign(positions)
+            energy += float(self.state.potentials().sum()) + 0.5 * self._upright * self._lean(positions) ** 2
+        return _Point(positions=positions, energy=energy, touch=touch)
+
+    def _lean(self, positions: FloatArray) -> float:
+        return float(positions[self._grain.upper, 0] - positions[self._grain.lower, 0])
+
+    def gradient(self, point: _Point) -> FloatArray:
+        """Return the gradient of the energy, #V by 2 [N]."""
+        self.state.position.assign(point.positions)
+        gradient, touch = -self.state.forces(), point.touch
+        lean = self._upright * self._lean(point.positions)
+        gradient[self._grain.upper, 0] += lean
+        gradient[self._grain.lower, 0] -= lean
+        np.add.at(gradient, touch.vertices.ravel(), (touch.slope[:, None, None] * touch.lever).reshape(-1, 2))
+        return gradient
+
+    def solver(self, point: _Point) -> Callable[[FloatArray], FloatArray]:
+        """Return the solution by the metric at a point."""
+        lower, upper, root = self._grain.lower, self._grain.upper, np.sqrt(self._upright)
+        bend = np.sqrt(np.maximum(point.touch.bend, 0.0))
+        chord = np.array([[[root, 0.0], [-root, 0.0], [0.0, 0.0]]])
+        return self._metric.solver(
+            np.concatenate([[[upper, lower, lower]], point.touch.vertices]).astype(np.int32),
+            np.concatenate([chord, bend[:, None, None] * point.touch.lever]),
+        )
+
+    def residual(self, point: _Point) -> float:
+        """Return the largest force on a vertex over the mean force of the springs."""
+        springs, force = self.state.network.spring_arrays, -self.gradient(point)
+        a, b = (point.positions[springs.ends[:, k]] for k in range(2))
+        tension = springs.stiffness * np.abs(np.linalg.norm(b - a, axis=1) - springs.rest_length)
+        weight = np.bincount(springs.ends.ravel(), np.repeat(springs.stiffness, 2), minlength=len(force)).astype(
+            np.float64
+        )
+        remove_rotation([self._grain], point.positions, force, weight)
+        return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
+
+
+class _Memory:
+    """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4)."""
+
+    def __init__(self) -> None:
+        self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
+
+    def add(self, step: FloatArray, change: FloatArray) -> None:
+        """Remember a step and the change of the gradient along it, if the energy is convex there."""
+        curvature = float(np.vdot(step, change))
+        if curvature > 1e-12 * np.linalg.norm(step) * np.linalg.norm(change):
+            self._pairs = [*self._pairs, (step, change, 1.0 / curvature)][-_MEMORY:]
+
+    def direction(self, gradient: FloatArray, solve: Callable[[FloatArray], FloatArray]) -> FloatArray:
+        """Return the direction of descent."""
+        q, shares = gradient.copy(), []
+        for step, change, scale in reversed(self._pairs):
+            shares.append(scale * np.vdot(step, q))
+            q -= shares[-1] * change
+        z = solve(q)
+        for (step, change, scale), share in zip(self._pairs, reversed(shares), strict=True):
+            z += step * (share - scale * np.vdot(change, z))
+        return -z
+
+
+def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
+    """Minimise the energy of one piece with contact between stretches of its border.
+
+    Args:
+        state: one piece in an injective layout, its grain aligned; holds the relaxed layout afterwards.
+        gap: between stretches of the border that are far from each other along it [m].
+
+    Returns:
+        How it ended; the energies are those of the cloth alone. None if the start is not injective, in which case nothing is done.
+    """
+    began, (grain,), tried = time.perf_counter(), state.alignments, 0
+    start = state.positions()
+    align_grain([grain], start)
+    problem = _Problem(state, grain, gap)
+    point = problem.at(start)
+    if not np.isfinite(point.energy):
+        return None
+    gradient, memory, history = problem.gradient(point), _Memory(), [point.energy]
+    at_rest, fresh, fraction = False, True, 1.0
+    most = min(_MOST_ITERATIONS, state.options.max_steps)
+    while not at_rest and len(history) <= most:
+        direction = memory.direction(gradient, problem.solver(point))
+        descent = float(np.vdot(gradient, direction))
+        # Where steps are short, the next one seldom is much longer.
+        new, fraction, count = _line_search(problem, point, direction, descent, min(1.0, _LONGER * fraction))
+        tried += count
+        if new is None:
+            if fresh:
+                break
+            memory, fresh, fraction = _Memory(), True, 1.0
+            continue
+        after = problem.gradient(new)
+        memory.add(new.positions - point.positions, after - gradient)
+        point, gradient, fresh = new, after, False
+        history.append(point.energy)
+        gain = history[-1 - _REST_INTERVAL] - point.energy if len(history) > _REST_INTERVAL else np.inf
+        at_rest = (
+            gain <= _REST_INTERVAL * state.options.energy_tolerance * point.energy
+            and -0.5 * descent <= _NEGLIGIBLE_RELEASE * point.energy
+        )
+    residual = problem.residual(point)
+    end = point.positions.copy()
+    align_grain([grain], end)
+    state.position.assign(end)
+    change = abs(history[-2] - history[-1]) / max(history[-1], 1e-300) if len(history) > 1 else 0.0
+    state.steps += len(history) - 1
+    state.work_units += tried
+    return Outcome(
+        converged=at_rest and is_injective(state.network.surface, end),
+        steps=len(history) - 1,
+        work_units=float(tried),
+        restarts=0,
+        energy_change=change,
+        residual=residual,
+        energies=state.energies(),
+        seconds=time.perf_counter() - began,
+    )
+
+
+def _line_search(
+    problem: _Problem, point: _Point, direction: FloatArray, descent: float, fraction: float
+) -> tuple[_Point | None, float, int]:
+    """Halve a step from a fraction of it until the energy falls enough.
+
+    Returns:
+        Where it ends, if anywhere, the fraction taken, and how many layouts were tried.
+    """
+    tried = 0
+    while descent < 0.0 and fraction > _LEAST_FRACTION:
+        new = problem.at(point.positions + fraction * direction)
+        tried += 1
+        if new.energy <= point.energy + _ARMIJO * fraction * descent:
+            return new, fraction, tried
+        fraction *= 0.5
+    return None, fraction, tried
