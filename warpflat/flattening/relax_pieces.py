@@ -257,9 +257,7 @@ def keep_apart(
     """
     surface, network, free = end.network.surface, end.network, end.positions
     relaxed = task.make_stage(network, free, end.outcome)
-    if not (task.options.gap_mm and end.outcome.converged):
-        return free, (relaxed,)
-    overlap = overlap_area(surface, free, cut_sides)
+    overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm else 0.0
     if overlap == 0.0:
         return free, (relaxed,)
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
@@ -270,7 +268,7 @@ def keep_apart(
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
             before, after = relaxed.model_energy_j, outcome.energies.potential
-            share = f" ({100 * (after - before) / before:+.2g} %)" if before > 0.0 else ""
+            share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
             task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
             return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
     task.notes.append(f"{words}, and contact could not part it: cut it apart there")
