@@ -27,7 +27,7 @@ from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["open_cracks", "relax_with_contact"]
+__all__ = ["Barrier", "Contacts", "open_cracks", "relax_with_contact"]
 
 # The gap between two places of the border is at most this share of the way between them along the border.
 _SLOPE = 0.02
@@ -54,7 +54,7 @@ _OPENINGS = (1e-2, 1e-3, 1e-4)
 def open_cracks(surface: Surface, positions: FloatArray) -> FloatArray:
     """Return a layout (#V by 2 [m]) whose cracks gape a little where their sides coincide; as it was if that does not part them."""
     edges, crack = border_edges_of(surface), crack_edges_of(surface)
-    sides = np.intersect1d(edges.tail[crack], edges.head[crack])
+    sides = np.union1d(edges.tail[crack], edges.head[crack])
     faces, used = surface.faces, surface.faces >= 0
     corners = np.where(used[:, :, None], positions[faces], 0.0)
     middle = corners.sum(axis=1) / used.sum(axis=1)[:, None]
@@ -72,7 +72,7 @@ def open_cracks(surface: Surface, positions: FloatArray) -> FloatArray:
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Touch:
+class Contacts:
     """The contacts of a layout.
 
     Attributes:
@@ -89,7 +89,7 @@ class _Touch:
     bend: FloatArray
 
 
-_CROSSED = _Touch(
+_CROSSED = Contacts(
     energy=np.inf,
     vertices=np.empty((0, 3), dtype=np.int32),
     lever=np.empty((0, 3, 2)),
@@ -98,7 +98,7 @@ _CROSSED = _Touch(
 )
 
 
-class _Barrier:
+class Barrier:
     """The barrier between border vertices and border edges that are near in the plane and far along the border."""
 
     def __init__(self, surface: Surface, gap: float, stiffness: float) -> None:
@@ -120,7 +120,7 @@ class _Barrier:
         most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
         return np.minimum(most, _SLOPE * way)
 
-    def __call__(self, positions: FloatArray) -> _Touch:
+    def __call__(self, positions: FloatArray) -> Contacts:
         """Return the contacts of a layout (#V by 2 [m])."""
         edges = self._edges
         i, j = near_edges(edges, positions, self._gap)
@@ -138,7 +138,7 @@ class _Barrier:
             return _CROSSED
         log, short, k = np.log(r / g), r - g, self._stiffness
         share = np.stack([np.ones_like(t), t - 1.0, -t], axis=1)
-        return _Touch(
+        return Contacts(
             energy=float((-k * short**2 * log).sum()),
             vertices=vertices,
             lever=share[:, :, None] * away[:, None],
@@ -210,7 +210,7 @@ class _Point:
 
     positions: FloatArray
     energy: float
-    touch: _Touch
+    touch: Contacts
 
 
 class _Problem:
@@ -219,7 +219,7 @@ class _Problem:
     def __init__(self, state: Relaxation, grain: GrainAlignment, gap: float) -> None:
         self.state, self._grain = state, grain
         stiffness = float(np.median(state.network.spring_arrays.stiffness))
-        self._barrier = _Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
+        self._barrier = Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
         self._metric = _Metric(state.network)
         self._upright = _GRAIN_STIFFNESS * stiffness
 

@@ -17,7 +17,16 @@ from warpflat.surface.connectivity import coincident_vertices, components_of
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface
 
-__all__ = ["BorderEdges", "border_edges_of", "certify", "crack_edges_of", "is_injective", "near_edges", "overlap_area"]
+__all__ = [
+    "BorderEdges",
+    "border_edges_of",
+    "certify",
+    "crack_edges_of",
+    "is_injective",
+    "is_wound_once",
+    "near_edges",
+    "overlap_area",
+]
 
 # Edges of a border are looked for in runs of this many, whose bounding boxes are compared first.
 _RUN = 8
@@ -149,7 +158,7 @@ def _no_face_is_mirrored(surface: Surface, positions: FloatArray) -> bool:
     return bool(cells_of(surface).least_shares(positions).min() > 0.0)
 
 
-def _is_wound_once(surface: Surface, positions: FloatArray) -> bool:
+def is_wound_once(surface: Surface, positions: FloatArray) -> bool:
     """Return whether the faces go once around each inner vertex, where no face is mirrored.
 
     Around such a vertex, once is one corner through which a ray to the right passes.
@@ -173,7 +182,7 @@ def is_injective(surface: Surface, positions: FloatArray) -> bool:
     return (
         len(crossings(edges, positions)[0]) == 0
         and _no_face_is_mirrored(surface, positions)
-        and _is_wound_once(surface, positions)
+        and is_wound_once(surface, positions)
     )
 
 
@@ -191,7 +200,7 @@ def certify(surface: Surface, positions: FloatArray, cut_sides: IntArray) -> boo
     return (
         bool(len(i) == 0 or (len(cut_sides) > 0 and _of_one_cut(surface, cut_sides, i, j).all()))
         and _no_face_is_mirrored(surface, positions)
-        and _is_wound_once(surface, positions)
+        and is_wound_once(surface, positions)
     )
 
 
