@@ -165,6 +165,26 @@ def test_an_edit_of_a_parted_piece_is_parted_again():
     assert is_injective(dart.network.surface, dart.positions)
 
 
+def test_a_piece_that_contact_cannot_part_stays_as_it_is_with_a_note(monkeypatch: pytest.MonkeyPatch):
+    strip = curled_strip()
+    free = flatten(strip, relax=RelaxOptions(gap_mm=0.0), device=DEVICE)
+    monkeypatch.setattr("warpflat.solver.contact._MOST_ITERATIONS", 3)
+    piece = flatten(strip, device=DEVICE)
+    assert piece.positions.tobytes() == free.positions.tobytes()
+    assert piece.overlap == free.overlap > 0.0
+    assert piece.measures["contact_energy_j"] == 0.0
+    assert [stage.name for stage in piece.stages] == ["develop", "relax"]
+    told = [note for note in piece.notes if note not in free.notes]
+    assert len(told) == 1
+    assert re.search(r"lies over itself by .* mm2, and contact could not part it", told[0])
+
+
+def test_two_runs_agree_bit_for_bit():
+    first, second = (flatten(slit_disk(), device=DEVICE) for _ in range(2))
+    assert first.stages[-1].name == "contact"
+    assert first.positions.tobytes() == second.positions.tobytes()
+
+
 def test_the_command_line_takes_the_gap_and_warns_of_an_overlap(tmp_path: Path, capfd: pytest.CaptureFixture[str]):
     strip = curled_strip()
     lines = [

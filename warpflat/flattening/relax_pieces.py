@@ -35,6 +35,7 @@ from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.connectivity import components_of
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.mesh import Surface
 
@@ -263,7 +264,10 @@ def keep_apart(
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
     lower, upper = int(task.datum[0]), int(task.datum[-1])
     grain = GrainAlignment(lower=lower, upper=upper, vertices=slice(0, network.vertex_count))
-    for first in (lambda: open_cracks(surface, start), lambda: harmonic_layout(surface)):
+    starts = [lambda: open_cracks(surface, start)]
+    if not components_of(surface).any():
+        starts.append(lambda: harmonic_layout(surface))
+    for first in starts:
         state = Relaxation(network, task.options, start=first(), alignments=[grain])
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:

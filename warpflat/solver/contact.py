@@ -35,6 +35,8 @@ _SLOPE = 0.02
 _CRACK_GAP = 0.02
 # Stiffness of the barrier, and of the spring that keeps the grain upright, in median stiffnesses of the springs.
 _BARRIER_STIFFNESS, _GRAIN_STIFFNESS = 1.0, 1e3
+# Near edges are looked for anew once the border has moved by so many gaps.
+_MARGIN = 4.0
 # Corrections that L-BFGS remembers; at most so many iterations.
 _MEMORY = 8
 _MOST_ITERATIONS = 2_000
@@ -109,6 +111,8 @@ class Barrier:
         ends = np.concatenate([[0.0], np.cumsum(length)])
         self._length, self._station = length, ends[:-1] - ends[edges.first]
         self._around = ends[edges.first + edges.count] - ends[edges.first]
+        self._border = np.full((len(length), 2), np.inf)
+        self._near: tuple[IndexArray, IndexArray]
 
     def _gaps(self, v: IndexArray, e: IndexArray) -> FloatArray:
         """Return the gap between vertices (rows of the border) and edges, #N [m]."""
@@ -120,10 +124,17 @@ class Barrier:
         most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
         return np.minimum(most, _SLOPE * way)
 
+    def _near_edges(self, positions: FloatArray) -> tuple[IndexArray, IndexArray]:
+        """Return pairs of border edges within the gap and some more, looked for anew once the border has moved by that (Verlet)."""
+        border, margin = positions[self._edges.tail], _MARGIN * self._gap
+        if np.abs(border - self._border).max() > margin:
+            self._border, self._near = border, near_edges(self._edges, positions, self._gap + 2.0 * margin)
+        return self._near
+
     def __call__(self, positions: FloatArray) -> Contacts:
         """Return the contacts of a layout (#V by 2 [m])."""
         edges = self._edges
-        i, j = near_edges(edges, positions, self._gap)
+        i, j = self._near_edges(positions)
         if len(crossings(edges, positions, (i, j))[0]):
             return _CROSSED
         v, e = np.concatenate([i, j]), np.concatenate([j, i])
