@@ -274,7 +274,10 @@ def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_ex
     quads = np.stack([i[:-1, :-1], i[1:, :-1], i[1:, 1:], i[:-1, 1:]], axis=-1).reshape(-1, 4)
     lines = [f"v {x} {y} {z}" for x, y, z in ramp] + [f"f {a} {b} {c} {d}" for a, b, c, d in quads]
     (tmp_path / "ramp.obj").write_text("\n".join(lines))
-    arguments = ["flatten", str(tmp_path / "ramp.obj"), "--units", "m", "--out", str(tmp_path / "out")]
+    parted = ["flatten", str(tmp_path / "ramp.obj"), "--units", "m", "--out", str(tmp_path / "out")]
+    assert main([*parted, "--quiet"]) == 0
+    assert capfd.readouterr().err == ""
+    arguments = [*parted, "--gap", "0"]
     assert main([*arguments, "--json"]) == 1
     printed = capfd.readouterr()
     why = json.loads(printed.out)["pattern"]["not_drawn"]
@@ -283,7 +286,9 @@ def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_ex
         "there; cut it apart, so that no piece does",
         why,
     )
-    assert printed.err == f"warpflat: no pattern was drawn: {why}\n"
+    over, none = printed.err.splitlines()
+    assert re.fullmatch(r"warpflat: ramp lies over itself by [\d.e+]+ mm2; the pattern cannot be cut as it is", over)
+    assert none == f"warpflat: no pattern was drawn: {why}"
     assert json.loads((tmp_path / "out" / "metrics.json").read_text())["pattern"] == {"not_drawn": why}
     # Once, not as a note too.
     assert main(arguments) == 1

@@ -2,7 +2,7 @@
 
 The model energy is minimised together with a barrier between border vertices and border edges (as in incremental potential contact,
 Li et al. 2020, and Smith and Schaefer 2015): b(r) = -k (r - g)^2 ln(r / g) below a gap g, where r is their distance. The gap is
-g = min(d, slope s), s the way along the border on the body, so that the sides of a notch may meet at its tip.
+g = d min(1, s / s0), s the way along the border on the body, so that the sides of a notch may meet at its tip.
 
 The minimiser is L-BFGS over one sparse factor of the springs' Laplacian (Liu et al. 2017), to which the stiffness of the contacts is
 added exactly by Woodbury's formula. A step is halved until the energy falls and the border is simple. The energy of the guard is
@@ -29,8 +29,10 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["Barrier", "Contacts", "open_cracks", "relax_with_contact"]
 
-# The gap between two places of the border is at most this share of the way between them along the border.
-_SLOPE = 0.02
+# Two places of the border have the whole gap between them if the way between them along the border is at least this [m],
+_FULL_GAP_WAY = 0.025
+# and at least so many gaps; less on a shorter way, in proportion.
+_FULL_GAP_WAYS = 10.0
 # The sides of cracks must not cross, but may lie as close as this share of the gap.
 _CRACK_GAP = 0.02
 # Stiffness of the barrier, and of the spring that keeps the grain upright, in median stiffnesses of the springs.
@@ -46,7 +48,7 @@ _REST_INTERVAL = 10
 _NEGLIGIBLE_RELEASE = 1e-5
 # The first step that is tried is longer than the last one taken by at most this factor.
 _LONGER = 4.0
-_LEAST_FRACTION, _ARMIJO = 1e-7, 1e-4
+_LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
 # Stiffness added to hold the piece as a whole, over the mean of the diagonal.
 _REGULARISATION = 1e-7
 # Sides of closed cracks are drawn apart by this share of the way to the middle of the faces around each vertex; less where that folds.
@@ -105,6 +107,7 @@ class Barrier:
 
     def __init__(self, surface: Surface, gap: float, stiffness: float) -> None:
         self._gap, self._stiffness = gap, stiffness
+        self._slope = gap / max(_FULL_GAP_WAY, _FULL_GAP_WAYS * gap)
         self._edges = edges = border_edges_of(surface)
         self._crack = crack_edges_of(surface)
         length = np.linalg.norm(surface.vertices[edges.head] - surface.vertices[edges.tail], axis=1)
@@ -122,7 +125,7 @@ class Barrier:
         way = np.minimum(np.minimum(to_tail, around - to_tail), np.minimum(to_head, np.abs(around - to_head)))
         way = np.where(edges.first[v] == edges.first[e], way, np.inf)
         most = np.where(self._crack[v] & self._crack[e], _CRACK_GAP * self._gap, self._gap)
-        return np.minimum(most, _SLOPE * way)
+        return np.minimum(most, self._slope * way)
 
     def _near_edges(self, positions: FloatArray) -> tuple[IndexArray, IndexArray]:
         """Return pairs of border edges within the gap and some more, looked for anew once the border has moved by that (Verlet)."""
@@ -217,7 +220,7 @@ class _Metric:
 
 @dataclass(frozen=True, kw_only=True)
 class _Point:
-    """A layout (#V by 2 [m]), the energy there with contacts and grain [J], the contacts, and the energy of the cloth alone [J]."""
+    """A layout (#V by 2 [m]), the energy there with contacts and grain [J], and the contacts."""
 
     positions: FloatArray
     energy: float
