@@ -200,7 +200,7 @@ def _grain_notes(network: SpringNetwork) -> list[str]:
     if network.model != "springs" or excess < _NOTED_EXCESS:
         return []
     return [
-        f"the grain tasks aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
+        f"the grain runs aslant over the mesh's quads, whose springs are then {excess:.0f} times as stiff in shear as "
         f'{network.fabric.name}; model = "membrane" measures that exactly'
     ]
 

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core.arrays import BoolArray, FloatArray, IndexArray, IntArray
-from warpflat.surface.cells import cells_of
+from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import coincident_vertices, components_of
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface
@@ -155,7 +155,7 @@ def _of_one_cut(surface: Surface, cut_sides: IntArray, i: IndexArray, j: IndexAr
 
 
 def _no_face_is_mirrored(surface: Surface, positions: FloatArray) -> bool:
-    return bool(cells_of(surface).least_shares(positions).min() > 0.0)
+    return bool(make_cells(surface).least_shares(positions).min() > 0.0)
 
 
 def is_wound_once(surface: Surface, positions: FloatArray) -> bool:
