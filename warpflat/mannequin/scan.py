@@ -72,12 +72,20 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     )
 
 
-def _ray_radii(hull: FloatArray, middle: FloatArray, count: int) -> FloatArray:
-    """Return distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x."""
+def _ray_radii(hull: FloatArray, middle: FloatArray, count: int, height: float) -> FloatArray:
+    """Return distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x.
+
+    Raises:
+        InputError: if `middle` does not lie inside the hull; names its `height` [m].
+    """
     corners = hull - middle
     angle = np.arctan2(corners[:, 0], corners[:, 1]) % (2.0 * np.pi)
     order = np.argsort(angle)
     corners, angle = corners[order], angle[order]
+    if np.diff(angle, append=angle[0] + 2.0 * np.pi).max() >= np.pi:
+        raise InputError(
+            f"scan: the body at {height:.2f} m above the floor does not surround the midplane; its mesh is broken there"
+        )
     rays = np.arange(count) * 2.0 * np.pi / count
     after = np.searchsorted(angle, rays, side="right") % len(corners)
     a, b = corners[after - 1], corners[after]
@@ -97,7 +105,9 @@ def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float]
     middle_z = 0.5 * (t.front + t.back)[rows]
     # A row's rays start from a point that climbs smoothly, or the rows would be twisted against each other.
     start = gaussian_filter1d(middle_z, 3.0, mode="nearest")
-    radii = np.stack([_ray_radii(t.hulls[i], np.array([0.0, z]), count) for i, z in zip(rows, start, strict=True)])
+    radii = np.stack([
+        _ray_radii(t.hulls[i], np.array([0.0, z]), count, float(t.y[i])) for i, z in zip(rows, start, strict=True)
+    ])  # fmt: skip
     radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
     spectrum = np.fft.rfft(radii, axis=1)
     spectrum[:, _HARMONICS:] = 0.0

@@ -10,11 +10,15 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
-from warpflat.mannequin.scan_pose import Slicer
+from warpflat.mannequin.scan_pose import Slice, Slicer
 
 __all__ = ["TrunkSections", "find_levels", "trunk_sections"]
 
 _UP = np.array([0.0, 1.0, 0.0])
+# Trunk, head and legs have their middles within this distance of the midplane, as a share of the stature; arms do not.
+_REACH = 0.19
+# No crotch lies higher, as a share of the stature.
+_ABOVE_CROTCH = 0.58
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -66,18 +70,20 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     rows: list[list[float]] = []
     hulls: list[FloatArray] = []
     crotch = 0.0
-    reach = 0.13 * stature
     for y in heights:
-        parts = slicer.cut(_UP, float(y))
-        central = [p for p in parts if p.points[:, 0].min() < 0.0 < p.points[:, 0].max() and len(p.points) > 8]
-        if y > 0.38 * stature and central:
-            chosen = [max(central, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))]
-        else:
-            near = [p for p in parts if abs(p.points[:, 0].mean()) < reach + 0.06 * stature and len(p.points) > 8]
-            chosen = sorted(near, key=lambda p: -p.length)[:2]
-            crotch = float(y)
-        if not chosen:
+        near = [
+            p for p in slicer.cut(_UP, float(y)) if abs(_middle_x(p)) < _REACH * stature and len(p.points) > 8
+        ]  # fmt: skip
+        if not near:
             raise InputError(f"scan: nothing of the body at {y:.2f} m above the floor; its mesh is broken there")
+        near.sort(key=_box, reverse=True)
+        # The largest part is the trunk if it straddles the midplane. Else the two largest are the legs, and what hangs
+        # between them at the crotch belongs to neither.
+        if y > _ABOVE_CROTCH * stature or _straddles(near[0]):
+            chosen = near[:1]
+        else:
+            chosen = near[:2]
+            crotch = float(y)
         flat = np.concatenate([p.points for p in chosen])[:, [0, 2]]
         hull = ConvexHull(flat)
         centre = np.abs(flat[:, 0]) < 0.02 * stature
@@ -101,6 +107,20 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     )  # fmt: skip
 
 
+def _middle_x(part: Slice) -> float:
+    return 0.5 * float(part.points[:, 0].min() + part.points[:, 0].max())
+
+
+def _box(part: Slice) -> float:
+    """Return the area [m2] of the box around a horizontal section."""
+    return float(np.ptp(part.points[:, 0]) * np.ptp(part.points[:, 2]))
+
+
+def _straddles(part: Slice) -> bool:
+    """Return whether a section lies on both sides of the midplane."""
+    return bool(part.points[:, 0].min() < 0.0 < part.points[:, 0].max())
+
+
 def _armpit(
     slicer: Slicer, y: FloatArray, reach: FloatArray, side: float, stature: float
 ) -> tuple[float, float, float]:
@@ -114,16 +134,14 @@ def _armpit(
     point = np.zeros(3)
     for _ in range(8):
         middle = 0.5 * (low + high)
-        parts = [p for p in slicer.cut(_UP, middle) if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]
-        trunk = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2]))).points
+        trunk = max((p for p in slicer.cut(_UP, middle) if _straddles(p)), key=_box).points
         if float((side * trunk[:, 0]).max()) > 1.22 * reach[jump]:
             high = middle
         else:
             low = middle
             point = trunk[int(np.argmax(side * trunk[:, 0]))]
     if not point.any():
-        parts = [p for p in slicer.cut(_UP, low) if p.points[:, 0].min() < 0.0 < p.points[:, 0].max()]
-        trunk = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2]))).points
+        trunk = max((p for p in slicer.cut(_UP, low) if _straddles(p)), key=_box).points
         point = trunk[int(np.argmax(side * trunk[:, 0]))]
     return low, float(point[0]), float(point[2])
 
@@ -131,10 +149,10 @@ def _armpit(
 def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str, float], list[str]]:
     """Return heights [m] of the closed levels and of ``armpit``, ``front_neck``, ``side_neck``.
 
-    Waist: the smallest section between rib and hip bone; where a belly leaves none, the deepest hollow of the back.
-    Bust: the largest section between the waist and an inch below the armpits. Hip: where the seat, coming down from the
-    small of the back, first reaches seven eighths of its full prominence; further down a scan's girth only shows how
-    far apart the feet stand.
+    Waist: the narrowest girth between rib and hip bone; where a belly leaves none, the deepest hollow of the back.
+    Bust: the largest section between the waist and an inch below the armpits. Hip: where the seat stands out most;
+    further down a scan's girth only shows how far apart the feet stand. A level that the shape does not show is a guess,
+    and a note says so.
 
     Args:
         t: the sections.
@@ -149,7 +167,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     levels["armpit"] = min(t.armpits["left"][0], t.armpits["right"][0])
     levels["waist"] = given.get("waist") or _waist(t, levels["armpit"], notes)
     levels["bust"] = given.get("bust") or _bust(t, levels["waist"], levels["armpit"])
-    levels["hip"] = given.get("hip") or _hip(t, levels["waist"])
+    levels["hip"] = given.get("hip") or _hip(t, levels["waist"], notes)
     front = (t.y < levels["waist"] - 0.25 * (levels["waist"] - levels["hip"])) & (
         t.y > levels["waist"] - 0.75 * (levels["waist"] - levels["hip"])
     )
@@ -191,18 +209,21 @@ def _smooth(values: FloatArray, sigma: float) -> FloatArray:
 
 
 def _waist(t: TrunkSections, armpit: float, notes: list[str]) -> float:
+    """Return the height of the narrowest girth between rib and hip bone."""
     window = np.flatnonzero((t.y > 0.565 * t.stature) & (t.y < min(0.69 * t.stature, armpit - 0.06 * t.stature)))
-    area = _smooth(t.area, 2.0)[window]
-    low = int(np.argmin(area))
-    if 0 < low < len(window) - 1:
-        return float(t.y[window][low])
-    back = _smooth(t.back_centre, 2.0)[window]
-    hollow = int(np.argmax(back))
-    if 0 < hollow < len(window) - 1:
-        notes.append("the trunk has no narrowest section; the waist is where the back is hollow")
-        return float(t.y[window][hollow])
-    notes.append("neither girth nor back shows a waist; it is put at 0.62 of the stature")
-    return 0.62 * t.stature
+    for values, words in (
+        (_smooth(t.girth, 1.5), ""),
+        (-_smooth(t.back_centre, 2.0), "the trunk has no narrowest section; it is where the back is hollow"),
+    ):
+        row = int(window[np.argmin(values[window])])
+        if window[0] < row < window[-1]:
+            waist = _summit(t.y, values, row)
+            if words:
+                notes.append(f"waist = {waist:.3f} m is a guess: {words}")
+            return waist
+    guess = 0.62 * t.stature
+    notes.append(f"waist = {guess:.3f} m is a guess: neither girth nor back shows one; it is 0.62 of the stature")
+    return guess
 
 
 def _bust(t: TrunkSections, waist: float, armpit: float) -> float:
@@ -215,18 +236,30 @@ def _bust(t: TrunkSections, waist: float, armpit: float) -> float:
     return float(y[area >= 0.997 * area.max()].mean())
 
 
-def _hip(t: TrunkSections, waist: float) -> float:
-    y = np.arange(max(0.44 * t.stature, t.crotch), waist, 0.0005)
-    if len(y) < 50:
+def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:
+    """Return the height where the seat stands out most (ISO 8559-1)."""
+    low, high = t.crotch + 0.01 * t.stature, waist - 0.05 * t.stature
+    rows = np.flatnonzero((t.y > low) & (t.y < high))
+    if len(rows) < 9:
         raise InputError(
             f"scan: waist ({waist:.3f} m) does not lie above the crotch ({t.crotch:.3f} m); give landmarks"
         )
-    back = np.interp(y, t.y, t.back)
-    small = float(back[y > waist - 0.05 * t.stature].max())
-    seat = float(back.min())
-    if small - seat < 0.01 * t.stature:
-        return max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
-    return float(y[(small - back) >= 0.875 * (small - seat)].max())
+    # Not smoothed: the seat is rounder above than below, and smoothing would lower it.
+    seat = int(rows[np.argmin(t.back[rows])])
+    if rows[0] < seat < rows[-1] and t.back[rows].max() - t.back[seat] > 0.01 * t.stature:
+        return _summit(t.y, t.back, seat)
+    guess = max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
+    notes.append(f"hip = {guess:.3f} m is a guess: the seat does not stand out between crotch and waist")
+    return guess
+
+
+def _summit(y: FloatArray, values: FloatArray, row: int) -> float:
+    """Return the height where the parabola through `row` and its neighbours has its extreme [m]."""
+    a, b, c = values[row - 1 : row + 2]
+    bend = a - 2.0 * b + c
+    if abs(bend) < 1e-9:
+        return float(y[row])
+    return float(y[row] + np.clip(0.5 * (a - c) / bend, -1.0, 1.0) * (y[row + 1] - y[row]))
 
 
 def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:

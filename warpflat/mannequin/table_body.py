@@ -46,7 +46,7 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
 
 def _profiles(m: Measurements) -> Callable[[float], Profile]:
     """Return a function that gives the horizontal profile at any height [m] up to the bust."""
-    from scipy.interpolate import CubicSpline, PchipInterpolator
+    from scipy.interpolate import PchipInterpolator
 
     sections = size_tables()["bodies"][m.body]["sections"]
     h = [m.heights[level] for level in RING_LEVELS]
@@ -60,14 +60,16 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
         values = [sections[level][key] * scale for level in RING_LEVELS]
         return np.array([*values, values[-1] * top])
 
-    # Lengths in proportion to the girth, so that width, depth and girth swell together.
-    smooth = CubicSpline(
+    def lengths(key: str, top: float) -> FloatArray:
+        return column(key, top, 1.0) * np.array([*girth, girth[-1]])
+
+    # Monotone between levels: no girth, width or depth swells beyond those measured above and below.
+    smooth = PchipInterpolator(
         y,
         np.column_stack([
-            [*girth, girth[-1] * 0.985], column("width", 1.0, 1.0), column("depth", 0.96, 1.0),
+            [*girth, girth[-1] * 0.985], lengths("width", 0.985), lengths("depth", 0.96 * 0.985),
             column("area", 0.99, 1.0), column("front", 0.95, 1.0), column("shift", 0.0, size / 100.0),
         ]),
-        bc_type="natural",
     )  # fmt: skip
     local = PchipInterpolator(
         y, np.column_stack([column("front_bump", 0.55, size / 100.0), column("back_bump", 1.0, size / 100.0)])
@@ -80,7 +82,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
         front_bump, back_bump = local(height)
         front_x, back_x = places(height)
         section = Section(
-            width=width * g, depth=depth * g, area=float(round(area, 9)), front=front, shift=shift,
+            width=width, depth=depth, area=float(round(area, 9)), front=front, shift=shift,
             front_bump=front_bump, back_bump=back_bump, bump_x=1.08 * points, bump_width=0.043 * size,
         )  # fmt: skip
         curve = section_curve(section)
