@@ -79,7 +79,7 @@ def mannequin(
     elif not quiet:
         for note in body.notes:
             click.echo(f"warpflat: note: {note}", err=True)
-        click.echo(mannequin_table(body.source, body.levels()))
+        click.echo(mannequin_table(body.source, body.levels(), body.size_difference()))
         click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
     return DONE
 

@@ -12,6 +12,7 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC, GRADES, Fabric, Provenance, v
 if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger
     from warpflat.mannequin.mannequin import Level
+    from warpflat.mannequin.nearest_size import SizeDifference
 
 __all__ = [
     "fabric_data",
@@ -123,13 +124,31 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     return lines
 
 
-def mannequin_table(source: str, levels: Mapping[str, Level]) -> str:
-    """Return height and girths of every level as text, from the neck down."""
-    rows = []
-    for name, level in levels.items():
-        body = level.girth if level.section is None else level.section
-        rows.append((name, f"{100 * level.height:.1f} cm", f"{100 * body:.1f} cm", f"{100 * level.girth:.1f} cm"))
-    return f"{source}\n{_aligned(('level', 'height', 'girth', 'by tape'), rows)}"
+def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDifference | None = None) -> str:
+    """Return height and girth of every level as text, from the neck down.
+
+    Args:
+        source: of the body.
+        levels: by name.
+        difference: of a scan to the nearest size.
+    """
+    if difference is None:
+        rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
+        return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
+
+    def more(of: Mapping[str, float], name: str) -> str:
+        return f"{100 * of[name]:+.1f} cm" if name in of else ""
+
+    head = ("level", "height", "girth", "section", "height over size", "girth over size")
+    full = [
+        (
+            name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm",
+            "" if level.section is None else f"{100 * level.section:.1f} cm",
+            more(difference.heights, name), more(difference.girths, name),
+        )
+        for name, level in levels.items()
+    ]  # fmt: skip
+    return f"{source}; nearest size {difference.size}\n{_aligned(head, full)}"
 
 
 def ledger_table(ledger: Ledger) -> str:

@@ -159,21 +159,42 @@ def _move_rings(
     for pair in ruled:
         if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
             continue
-        _rule(out, layout.rings, layout.level_row, pair, RING_LEVELS)
+        _rule(out, layout, pair, body)
 
 
-def _rule(
-    out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], known: Sequence[str]
-) -> None:
+def _rule(out: FloatArray, layout: Layout, pair: tuple[str, str], body: FloatArray) -> None:
+    """Hang the rows between two levels of the trunk straight, over whatever of the body stands out between them."""
     for level in pair:
-        if level not in known:
-            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, known)}")
-    a, b = sorted((row_of[pair[0]], row_of[pair[1]]))
+        if level not in RING_LEVELS:
+            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, RING_LEVELS)}")
+    a, b = sorted(layout.level_row[level] for level in pair)
     if a == b:
         raise InputError(f"form: ruled: {pair[0]} and {pair[1]} are the same level")
-    first, last = out[grid[a]], out[grid[b]]
-    share = (out[grid[a : b + 1], 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
-    out[grid[a : b + 1]] = first + share[:, None, None] * (last - first)
+    ids = layout.rings[a : b + 1]
+    first, last = out[ids[0]], out[ids[-1]]
+    share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
+    straight = first + share[:, None, None] * (last - first)
+    between = body[ids[1:-1]].reshape(-1, 3)
+    if len(between):
+        ends = np.concatenate([first, last])
+        inner = straight[1:-1]
+        middles = inner.mean(axis=1, keepdims=True) * [1.0, 0.0, 1.0] + inner * [0.0, 1.0, 0.0]
+        rays = inner - middles
+        alone, over = (_hull_reach(points, middles, rays) for points in (ends, np.concatenate([ends, between])))
+        # Straight, except where the body pushes the hull out; the hull of the end rows alone is no straight line.
+        pushed = np.where(over > alone * (1.0 + 1e-9), np.maximum(over, 1.0), 1.0)
+        straight[1:-1] = middles + pushed[..., None] * rays
+    out[ids] = straight
+
+
+def _hull_reach(points: FloatArray, starts: FloatArray, rays: FloatArray) -> FloatArray:
+    """Return how many of its own lengths each ray, #R by #P by 3, runs from inside the convex hull of `points` to it."""
+    from scipy.spatial import ConvexHull
+
+    planes = ConvexHull(points).equations
+    rate = rays @ planes[:, :3].T
+    room = -(starts @ planes[:, :3].T + planes[:, 3])
+    return np.asarray(np.where(rate > 1e-12, room / np.where(rate > 1e-12, rate, 1.0), np.inf).min(axis=2))
 
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjustment | None) -> None:

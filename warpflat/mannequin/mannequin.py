@@ -16,6 +16,7 @@ from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
+from warpflat.mannequin.nearest_size import SizeDifference, nearest_size
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.table_body import blueprint_from_measurements
 from warpflat.surface.mesh import Surface
@@ -207,13 +208,30 @@ class Mannequin:
         return realise(self.layout, self.vertices, shipped_form(form) if isinstance(form, str) else form, half=half)
 
     def metrics(self) -> dict[str, Any]:
-        """Return the mannequin's entry of ``metrics.json``: its source, and each level's height and girths [m].
+        """Return the mannequin's entry of ``metrics.json``: its source, and each level's height and girth [m].
 
-        ``girth_m`` is the body's: of a scan the length of its section there, hollows followed. ``tape_m`` is what a tape
-        reads on the mannequin, which bridges hollows; without a scan the two are one.
+        ``girth_m`` is what a tape reads, which bridges hollows. A scan's trunk adds ``section_m``, the length of its section
+        there, hollows followed; a scan also adds ``nearest_size`` and, by level, what it has more than that size.
         """
+        found = self.levels()
         levels: dict[str, dict[str, float]] = {}
-        for name, level in self.levels().items():
-            body = level.girth if level.section is None else level.section
-            levels[name] = {"height_m": level.height, "girth_m": body, "tape_m": level.girth}
-        return {"source": self.source, "notes": list(self.notes), "levels": levels}
+        for name, level in found.items():
+            levels[name] = {"height_m": level.height, "girth_m": level.girth}
+            if level.section is not None:
+                levels[name]["section_m"] = level.section
+        told: dict[str, Any] = {"source": self.source, "notes": list(self.notes), "levels": levels}
+        difference = self.size_difference()
+        if difference is not None:
+            told["nearest_size"] = difference.size
+            for name, girth in difference.girths.items():
+                levels[name]["girth_over_size_m"] = girth
+            for name, height in difference.heights.items():
+                levels[name]["height_over_size_m"] = height
+        return told
+
+    def size_difference(self) -> SizeDifference | None:
+        """Return what a scan has more than the nearest size of the tables; None without a scan."""
+        if not self.sections:
+            return None
+        levels = self.levels()
+        return nearest_size({k: v.height for k, v in levels.items()}, {k: v.girth for k, v in levels.items()})

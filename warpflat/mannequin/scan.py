@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.scan_checks import check_girths
+from warpflat.mannequin.scan_legs import plumb_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
@@ -51,13 +54,15 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         options: what the user knows about the scan.
 
     Raises:
-        InputError: if the mesh is not a body that stands on two legs with its arms off the trunk.
+        InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
     points, triangles, notes = turn_scan_upright(vertices, faces, options)
     slicer = Slicer(points, triangles)
     trunk = trunk_sections(slicer)
     levels, more = find_levels(trunk, options.landmarks)
-    profile = _profiles(trunk, levels)
+    check_girths(trunk, levels)
+    plumb, apart = plumb_legs(slicer, trunk, levels["hip"])
+    profile = _profiles(plumb, levels)
     quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile)
     blueprint = Blueprint(
         profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
@@ -67,7 +72,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     return ScanFound(
         blueprint=blueprint,
         source=f"scan of a body {trunk.stature:.3f} m tall",
-        notes=(*notes, *more),
+        notes=(*notes, *more, *apart),
         sections=sections,
     )
 

@@ -12,13 +12,15 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.scan_pose import Slice, Slicer
 
-__all__ = ["TrunkSections", "find_levels", "trunk_sections"]
+__all__ = ["TrunkSections", "find_levels", "leg_sections", "trunk_sections"]
 
 _UP = np.array([0.0, 1.0, 0.0])
 # Trunk, head and legs have their middles within this distance of the midplane, as a share of the stature; arms do not.
 _REACH = 0.19
 # No crotch lies higher, as a share of the stature.
 _ABOVE_CROTCH = 0.58
+# How far below the armpits the bust may lie at most, as a share of the stature: the rows above it need this room.
+_BELOW_ARMPIT = 0.006
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -71,18 +73,10 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     hulls: list[FloatArray] = []
     crotch = 0.0
     for y in heights:
-        near = [
-            p for p in slicer.cut(_UP, float(y)) if abs(_middle_x(p)) < _REACH * stature and len(p.points) > 8
-        ]  # fmt: skip
-        if not near:
+        chosen = leg_sections(slicer, float(y), stature)
+        if not chosen:
             raise InputError(f"scan: nothing of the body at {y:.2f} m above the floor; its mesh is broken there")
-        near.sort(key=_box, reverse=True)
-        # The largest part is the trunk if it straddles the midplane. Else the two largest are the legs, and what hangs
-        # between them at the crotch belongs to neither.
-        if y > _ABOVE_CROTCH * stature or _straddles(near[0]):
-            chosen = near[:1]
-        else:
-            chosen = near[:2]
+        if len(chosen) == 2:
             crotch = float(y)
         flat = np.concatenate([p.points for p in chosen])[:, [0, 2]]
         hull = ConvexHull(flat)
@@ -105,6 +99,17 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
         front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], hulls=tuple(hulls),
         crotch=crotch, armpits=armpits,
     )  # fmt: skip
+
+
+def leg_sections(slicer: Slicer, y: float, stature: float) -> list[Slice]:
+    """Return the section of the trunk at a height `y` [m], or those of both legs; none where the mesh is broken.
+
+    Two parts of similar size are the legs; what hangs between them at the crotch is smaller and belongs to neither.
+    """
+    near = [p for p in slicer.cut(_UP, y) if abs(_middle_x(p)) < _REACH * stature and len(p.points) > 8]
+    near.sort(key=_box, reverse=True)
+    legs = y < _ABOVE_CROTCH * stature and len(near) > 1 and _box(near[1]) > 0.5 * _box(near[0])
+    return near[:2] if legs else near[:1]
 
 
 def _middle_x(part: Slice) -> float:
@@ -166,7 +171,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     levels: dict[str, float] = {}
     levels["armpit"] = min(t.armpits["left"][0], t.armpits["right"][0])
     levels["waist"] = given.get("waist") or _waist(t, levels["armpit"], notes)
-    levels["bust"] = given.get("bust") or _bust(t, levels["waist"], levels["armpit"])
+    levels["bust"] = given.get("bust") or _bust(t, levels["waist"], levels["armpit"], notes)
     levels["hip"] = given.get("hip") or _hip(t, levels["waist"], notes)
     front = (t.y < levels["waist"] - 0.25 * (levels["waist"] - levels["hip"])) & (
         t.y > levels["waist"] - 0.75 * (levels["waist"] - levels["hip"])
@@ -174,7 +179,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     belly = float(t.y[front][np.argmax(_smooth(t.front, 3)[front])])
     levels["abdomen"] = float(np.clip(belly, levels["waist"] - 0.62 * (levels["waist"] - levels["hip"]),
                                       levels["waist"] - 0.38 * (levels["waist"] - levels["hip"])))  # fmt: skip
-    levels["underbust"] = levels["bust"] - 0.40 * (levels["bust"] - levels["waist"])
+    levels["underbust"] = given.get("underbust") or _underbust(t, levels["waist"], levels["bust"], notes)
     levels["thigh"] = min(0.44 * h, t.crotch - 0.01 * h, levels["hip"] - 0.05 * h)
     levels["knee"], levels["ankle"] = 0.28 * h, 0.06 * h
     levels["front_neck"], levels["side_neck"] = _neck(t, levels["armpit"])
@@ -226,14 +231,31 @@ def _waist(t: TrunkSections, armpit: float, notes: list[str]) -> float:
     return guess
 
 
-def _bust(t: TrunkSections, waist: float, armpit: float) -> float:
-    limit = armpit - 0.014 * t.stature
-    y = np.arange(waist + 0.45 * (armpit - waist), limit, 0.0005)
-    if not len(y):
+def _bust(t: TrunkSections, waist: float, armpit: float, notes: list[str]) -> float:
+    """Return the height where the chest is fullest below the armpits (ISO 8559-1)."""
+    low, high = waist + 0.45 * (armpit - waist), armpit - _BELOW_ARMPIT * t.stature
+    rows = np.flatnonzero((t.y > low) & (t.y < high))
+    if len(rows) < 3:
         raise InputError(f"scan: no room for a bust between waist ({waist:.3f} m) and armpits ({armpit:.3f} m)")
-    area = np.interp(y, t.y, t.area)
-    # The fullest level is flat: its middle is steadier than its crest.
-    return float(y[area >= 0.997 * area.max()].mean())
+    row = int(rows[np.argmax(t.girth[rows])])
+    if row < rows[-1]:
+        return _summit(t.y, t.girth, row)
+    notes.append(f"bust = {high:.3f} m is a guess: the chest grows fuller up to the armpits at {armpit:.3f} m")
+    return high
+
+
+def _underbust(t: TrunkSections, waist: float, bust: float, notes: list[str]) -> float:
+    """Return the height of the fold under the bust: where the girth falls furthest below an even taper to the waist."""
+    y = np.arange(waist, bust, 0.0005)
+    girth = np.interp(y, t.y, t.girth)
+    even = np.linspace(girth[0], girth[-1], len(y))
+    row = int(np.argmax(even - girth))
+    least, most = waist + 0.3 * (bust - waist), bust - 0.01 * t.stature
+    if least < y[row] < most and even[row] - girth[row] > 0.03 * girth[-1]:
+        return float(y[row])
+    guess = bust - 0.40 * (bust - waist)
+    notes.append(f"underbust = {guess:.3f} m is a guess: no fold shows under the bust")
+    return guess
 
 
 def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:

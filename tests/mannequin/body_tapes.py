@@ -1,0 +1,69 @@
+"""Tapes laid around a body mesh with trimesh and SciPy alone, to check what the package measures."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import ConvexHull
+
+
+def section_parts(mesh: trimesh.Trimesh, height: float) -> list[np.ndarray]:
+    """Return the connected parts of a level section, each #P by 2 (x, z), largest box first."""
+    ends = np.asarray(trimesh.intersections.mesh_plane(mesh, [0, 1, 0], [0, height, 0])).reshape(-1, 3)
+    _, key = np.unique(np.round(ends * 1e7).astype(np.int64), axis=0, return_inverse=True)
+    key = key.ravel()
+    graph = coo_matrix((np.ones(len(key) // 2), (key[::2], key[1::2])), (key.max() + 1,) * 2)
+    label = connected_components(graph, directed=False)[1][key]
+    parts = [ends[label == i][:, [0, 2]] for i in range(label.max() + 1)]
+    return sorted(parts, key=lambda p: -np.prod(np.ptp(p, axis=0)))
+
+
+def _trunk(mesh: trimesh.Trimesh, height: float) -> np.ndarray:
+    parts = section_parts(mesh, height)
+    largest = parts[0]
+    return largest if largest[:, 0].min() < 0 < largest[:, 0].max() else np.concatenate(parts[:2])
+
+
+def tape(mesh: trimesh.Trimesh, height: float) -> float:
+    """Return the girth [m] of a level tape around trunk or both legs."""
+    return float(ConvexHull(_trunk(mesh, height)).area)
+
+
+def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:
+    """Return height above the floor and girth [m] of hip, waist, underbust and bust at the standard's places (ISO 8559-1).
+
+    Sections every 2 mm: hip where the trunk reaches furthest back, waist where it is narrowest, bust where it is fullest
+    below the armpits, underbust where two straight lines that fit the girth from waist to bust best meet.
+
+    Args:
+        points: #V by 3 [m], Y up, facing +Z, the midplane at x = 0.
+        faces: #F by 4, -1 in the last column for a triangle.
+    """
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    mesh = trimesh.Trimesh(points, triangles, process=False)
+    floor, stature = points[:, 1].min(), np.ptp(points[:, 1])
+    y = np.arange(0.48, 0.80, 0.002 / stature) * stature
+    trunks = [_trunk(mesh, floor + at) for at in y]
+    girth = np.array([ConvexHull(t).area for t in trunks])
+    back = np.array([t[:, 1].min() for t in trunks])
+    # Where the arms join, the section's width leaps.
+    width = np.array([np.ptp(t[:, 0]) for t in trunks])
+    chest = np.flatnonzero(y > 0.69 * stature)
+    armpit = next(i for i in chest if width[i + 1] > 1.2 * width[i])
+    hip = int(np.argmin(np.where(y < 0.57 * stature, back, np.inf)))
+    waist = int(np.argmin(np.where((y > 0.57 * stature) & (y < 0.68 * stature), girth, np.inf)))
+    bust = int(waist + np.argmax(girth[waist : armpit + 1]))
+    fold = waist + _bend(y[waist : bust + 1], girth[waist : bust + 1])
+    rows = {"hip": hip, "waist": waist, "underbust": fold, "bust": bust}
+    return {name: (float(y[i]), float(girth[i])) for name, i in rows.items()}
+
+
+def _bend(y: np.ndarray, values: np.ndarray) -> int:
+    """Return the sample where the two joined straight lines bend that fit `values` best."""
+    misses = []
+    for at in range(2, len(y) - 2):
+        lines = np.column_stack([np.ones_like(y), y - y[at], np.maximum(y - y[at], 0.0)])
+        misses.append(np.linalg.norm(lines @ np.linalg.lstsq(lines, values, rcond=None)[0] - values))
+    return 2 + int(np.argmin(misses))

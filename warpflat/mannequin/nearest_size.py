@@ -1,0 +1,57 @@
+"""Comparison of a body with the size tables."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.measurements import Measurements, measurements_from_size, size_tables
+
+__all__ = ["SizeDifference", "nearest_size"]
+
+_SIZED_BY = ("bust", "waist", "hip")
+# The measurement that a line of the mannequin is, by the line's name without its side.
+_MEASUREMENT = {
+    **{level: level for level in RING_LEVELS},
+    "neck": "neck", "shoulder": "shoulder", "chest front": "chest_width", "chest back": "back_width",
+    "biceps": "upper_arm", "elbow": "elbow", "wrist": "wrist",
+}  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class SizeDifference:
+    """Differences of a body to one size, positive where the body is higher or wider.
+
+    Attributes:
+        size: the size's name.
+        heights: by level [m]; the levels of the trunk.
+        girths: by level [m]; of shoulders and chest their lengths.
+    """
+
+    size: str
+    heights: Mapping[str, float]
+    girths: Mapping[str, float]
+
+
+def nearest_size(heights: Mapping[str, float], girths: Mapping[str, float]) -> SizeDifference:
+    """Return the differences to the size whose bust, waist and hip have the least sum of squared differences.
+
+    Args:
+        heights: of the body's levels [m].
+        girths: of the body's levels [m], bust, waist and hip among them.
+    """
+
+    def miss(size: Measurements) -> float:
+        return sum((girths[level] - size.lengths[level]) ** 2 for level in _SIZED_BY)
+
+    names = [f"{table['label']} {size}" for table in size_tables()["tables"].values() for size in table["sizes"]]
+    sizes = {name: measurements_from_size(name) for name in names}
+    name = min(sizes, key=lambda n: miss(sizes[n]))
+    size = sizes[name]
+    measured = {level: _MEASUREMENT.get(level.removesuffix(" left").removesuffix(" right")) for level in girths}
+    return SizeDifference(
+        size=name,
+        heights={k: heights[k] - size.heights[k] for k in girths if k in RING_LEVELS},
+        girths={k: girths[k] - size.lengths[m] for k, m in measured.items() if m is not None},
+    )
