@@ -11,9 +11,11 @@ import pytest
 from body_tapes import tapes
 from self_intersections import self_intersections
 
+from warpflat.cli.tables import mannequin_table
 from warpflat.core.errors import InputError
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.measurements import measurements_from_size
 from warpflat.mannequin.scan_pose import ScanOptions
 
 needs_bodies = pytest.mark.skipif(
@@ -307,3 +309,62 @@ def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
         mannequin_from_scan_file(file, options=ScanOptions(), resolution_mm=20.0)
     with pytest.raises(InputError, match=r"none\.obj: does not exist"):
         mannequin_from_scan_file(tmp_path / "none.obj", options=ScanOptions(), resolution_mm=20.0)
+
+
+@needs_bodies
+def test_a_trunk_that_is_no_body_is_refused_with_its_place() -> None:
+    points, faces = scan("male")
+    stature = np.ptp(points[:, 1])
+    share = (points[:, 1] - points[:, 1].min()) / stature
+    # A tyre around the waist, and a waist of a half: the hull leaps, or the girths go together on no body.
+    tyre = points.copy()
+    ring = (share > 0.66) & (share < 0.68) & (np.abs(points[:, 0]) < 0.2)
+    tyre[ring] *= [1.6, 1.0, 1.6]
+    with pytest.raises(InputError, match=r"leaps from .* m between 1\.1\d* and 1\.1\d* m above the floor"):
+        on_scan(tyre, faces)
+    thin = points.copy()
+    middle = points[(share > 0.6) & (share < 0.64) & (np.abs(points[:, 0]) < 0.2), 2].mean()
+    trunk = (np.abs(points[:, 0]) < 0.2) & (share > 0.5) & (share < 0.74)
+    factor = 1.0 - 0.5 * np.exp(-0.5 * ((share[trunk] - 0.665) / 0.02) ** 2)
+    thin[trunk, 0] *= factor
+    thin[trunk, 2] = middle + (thin[trunk, 2] - middle) * factor
+    with pytest.raises(InputError, match=r"at 1\.\d\d m above the floor does not go with waist"):
+        on_scan(thin, faces)
+
+
+@needs_bodies
+def test_a_scan_is_compared_with_the_nearest_size() -> None:
+    body = _plain("female")
+    told = body.metrics()
+    size = measurements_from_size(told["nearest_size"])
+    misses = {
+        name: sum((body.levels()[k].girth - measurements_from_size(name).lengths[k]) ** 2 for k in ("bust", "waist", "hip"))
+        for name in ("EU 36", "EU 38", "US 4", "JIS 9AR", "JIS 7AR", "men 46")
+    }  # fmt: skip
+    assert min(misses, key=lambda name: misses[name]) == told["nearest_size"]
+    for level in ("bust", "hip"):
+        found = told["levels"][level]
+        assert found["girth_over_size_m"] == pytest.approx(found["girth_m"] - size.lengths[level])
+        assert found["height_over_size_m"] == pytest.approx(found["height_m"] - size.heights[level])
+    text = mannequin_table(body.source, body.levels(), body.size_difference())
+    assert f"nearest size {told['nearest_size']}" in text
+    row = next(line for line in text.splitlines() if line.startswith("hip"))
+    assert f"{100 * told['levels']['hip']['girth_over_size_m']:+.1f} cm" in row
+
+
+@needs_bodies
+@pytest.mark.parametrize("sex", list(KNOWN))
+@pytest.mark.parametrize("form", ["basic_block", "a_line_skirt"])
+def test_skirts_hang_outside_the_body(sex: str, form: str) -> None:
+    import trimesh
+
+    body = _plain(sex)
+    quads = body.layout.faces
+    mesh = trimesh.Trimesh(body.vertices, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
+    made = body.form(form)
+    used = np.unique(np.concatenate([piece.grid_vertices for piece in made.pieces.values()]))
+    moved = used[np.linalg.norm(made.vertices[used] - body.vertices[used], axis=1) > 1e-6]
+    if len(moved):
+        place, distance, triangle = trimesh.proximity.closest_point_naive(mesh, made.vertices[moved])
+        out = np.einsum("nd,nd->n", made.vertices[moved] - place, mesh.face_normals[triangle])
+        assert (distance[out < 0.0] < 1e-4).all()
