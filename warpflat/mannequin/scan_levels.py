@@ -155,9 +155,8 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     """Return heights [m] of the closed levels and of ``armpit``, ``front_neck``, ``side_neck``.
 
     Waist: the narrowest girth between rib and hip bone; where a belly leaves none, the deepest hollow of the back.
-    Bust: the largest section between the waist and an inch below the armpits. Hip: where the seat stands out most;
-    further down a scan's girth only shows how far apart the feet stand. A level that the shape does not show is a guess,
-    and a note says so.
+    Bust: the fullest girth below the armpits. Underbust: the fold under it. Hip: where the seat stands out most. A level
+    that the shape does not show is a guess, and a note says so.
 
     Args:
         t: the sections.
@@ -165,6 +164,8 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
 
     Raises:
         InputError: if the levels do not come in a body's order.
+
+    Source: ISO 8559-1, which names the places of the tapes.
     """
     h = t.stature
     notes: list[str] = []
