@@ -20,7 +20,7 @@ import pytest
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.surface.shapes import make_shape
 
-KILLS = int(os.environ.get("WARPFLAT_KILLS", "6"))
+KILLS = int(os.environ.get("WARPFLAT_KILLS", "3"))
 
 SCENE = "[surface]\nshape = 'dome'\nresolution = 41\n[output]\nframes = 30\n"
 COMMANDS = {
