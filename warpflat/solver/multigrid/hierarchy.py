@@ -19,6 +19,7 @@ from warpflat.solver.multigrid.grid_coarsening import ResamplingKind, Transfer
 from warpflat.surface.cells import make_cells
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
+from warpflat.surface.injective import border_edges_of
 from warpflat.surface.mesh import Surface, drop_result, is_large
 from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.untangle import untangle
@@ -115,6 +116,7 @@ def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) ->
     measured again.
     """
     if is_large(network.surface):
+        border_edges_of(network.surface)  # The certificate of the result needs these, and makes them of half-edges.
         for made in (network, *(level.network for level in coarse_levels)):
             drop_result(made.surface, half_edges_of)
             if made.surface.is_quad.all():
