@@ -17,7 +17,6 @@ from warpflat.surface.grid import Lattice, cut_lattice, find_lattice, rows_and_c
 from warpflat.surface.half_edges import non_manifold_edges
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.shapes import make_shape
 
 BoolArray = NDArray[np.bool_]
@@ -227,11 +226,9 @@ def test_a_piece_with_narrow_strips_stays_a_lattice_down_to_its_coarsest_level()
             assert np.diff(np.unique(line[lattice.bends])).min() >= 2
 
 
-def walked(surface: Surface, monkeypatch: pytest.MonkeyPatch) -> Lattice | None:
+def walked(surface: Surface) -> Lattice | None:
     """The lattice found by a walk over the faces, whatever is known of them."""
-    with monkeypatch.context() as blind:
-        blind.setattr("warpflat.surface.grid.row_major_grid", lambda _: None)
-        return find_lattice(replace(surface, of_faces={}))
+    return find_lattice(replace(surface, of_faces={}))
 
 
 def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
@@ -243,25 +240,16 @@ def assert_same(ours: Lattice | None, theirs: Lattice | None) -> None:
 
 
 @pytest.mark.parametrize("name", PIECES)
-def test_coarser_lattices_are_known_from_the_finer_ones(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_coarser_lattices_are_known_from_the_finer_ones(name: str) -> None:
     steps = coarsenings_of(PIECES[name])
     lattices = [step for step in steps if step.surface.is_quad.all()]
     assert len(lattices) > 0
     for step in lattices:
-        assert_same(find_lattice(step.surface), walked(step.surface, monkeypatch))
-
-
-@pytest.mark.parametrize(("turn", "mirrored"), [(turn, mirrored) for turn in range(4) for mirrored in (False, True)])
-def test_the_lattice_of_a_grid_numbered_row_by_row_is_that_of_a_walk(
-    turn: int, mirrored: bool, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    surface = grid(6, 9, turn, mirrored=mirrored)
-    assert row_major_grid(surface) is not None
-    assert_same(find_lattice(surface), walked(surface, monkeypatch))
+        assert_same(find_lattice(step.surface), walked(step.surface))
 
 
 @pytest.mark.parametrize("name", ["rectangle", "L", "hole", "numbered"])
-def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str) -> None:
     whole = grid(12, 15, 1) if name == "numbered" else PIECES[name]
     lattice = find_lattice(whole)
     assert lattice is not None
@@ -272,4 +260,4 @@ def test_a_cut_piece_has_the_lattice_of_the_whole_one(name: str, monkeypatch: py
     ours = cut_lattice(surface, whole, made.vertex_origin)
     assert ours is not None
     assert ours.bends.sum() > lattice.bends.sum()
-    assert_same(ours, walked(surface, monkeypatch))
+    assert_same(ours, walked(surface))

@@ -32,7 +32,6 @@ from warpflat.kernels.stiffness import (
 from warpflat.surface.cells import CellArrays, face_creases, first_of_faces, make_cells
 from warpflat.surface.half_edges import half_edges, half_edges_of
 from warpflat.surface.mesh import Surface, once_per_faces, once_per_surface, read_only
-from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
 from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 
 __all__ = [
@@ -68,34 +67,26 @@ class SpringsAround:
     Attributes:
         offset: #V+1, where the entries of each vertex begin.
         neighbor: 2 #S, for each entry the vertex at the far end, by which they are sorted.
-        numbering: makes the springs' numbers, which are needed when a network is made and seldom later; for a grid
-            numbered row by row, the object that computes them.
+        numbering: makes the springs' numbers, which are needed when a network is made and seldom later.
     """
 
     offset: IntArray
     neighbor: IntArray
-    numbering: Callable[[], IntArray] | RowMajorGrid
-
-    @property
-    def entry(self) -> IntArray:
-        """The number of the spring of each entry, 2 #S; mesh edges have the first numbers."""
-        return self.numbering.springs_around(self.offset) if isinstance(self.numbering, RowMajorGrid) else self._numbers
+    numbering: Callable[[], IntArray]
 
     @cached_property
-    def _numbers(self) -> IntArray:
-        assert not isinstance(self.numbering, RowMajorGrid)
+    def entry(self) -> IntArray:
+        """The number of the spring of each entry, 2 #S; mesh edges have the first numbers."""
         return self.numbering()
 
     def drop_numbers(self) -> None:
         """Drop the springs' numbers; they are made again when they are next needed."""
-        vars(self).pop("_numbers", None)
+        vars(self).pop("entry", None)
 
     def listed(self, values: FloatArray) -> FloatArray:
         """Return the springs' values (#S) at both of their ends, 2 #S."""
-        if isinstance(self.numbering, RowMajorGrid):
-            return self.numbering.listed(self.offset, values)
         listed = np.empty(len(self.neighbor))
-        given = [self._numbers, np.ascontiguousarray(values, dtype=np.float64)]
+        given = [self.entry, np.ascontiguousarray(values, dtype=np.float64)]
         launch_each(pick_values, len(listed), given, [listed])
         return listed
 
@@ -267,9 +258,6 @@ def _listed_stiffness(surface: Surface, own: _SpringGeometry, of_side: FloatArra
         of_side: #H, stiffness that a face gives to the springs along its sides [N/m].
         diagonal: #Q, stiffness of both diagonals of a quad [N/m].
     """
-    numbered = row_major_grid(surface)
-    if numbered is not None:
-        return numbered.listed_stiffness(own.around.offset, of_side, diagonal)
     at_edges = np.bincount(half_edges_of(surface).edge, of_side, minlength=own.edge_count)
     return own.around.listed(np.concatenate([at_edges, diagonal, diagonal]))
 
@@ -337,11 +325,8 @@ def _lattice(fabric: Fabric, quads: IntArray, positions: FloatArray, warp: Float
 @once_per_surface
 def spring_geometry(surface: Surface) -> _SpringGeometry:
     """Return the springs of a surface without what depends on the fabric; made once for each surface."""
-    vertices, around, numbered = surface.vertices, _springs_around(surface), row_major_grid(surface)
+    vertices, around = surface.vertices, _springs_around(surface)
     diagonal, _ = unfold_quad_diagonals(vertices, surface.faces, crease=face_creases(surface))
-    if numbered is not None:
-        lengths = numbered.listed_lengths(around.offset, vertices, diagonal)
-        return read_only(_SpringGeometry(edge_count=numbered.edge_count, around=around, listed_length=lengths))
     edges = half_edges_of(surface).edges
     rest_length = np.empty(around.count)
     rest_length[len(edges) :] = diagonal.T.ravel()
@@ -352,14 +337,10 @@ def spring_geometry(surface: Surface) -> _SpringGeometry:
 @once_per_faces
 def _springs_around(surface: Surface) -> SpringsAround:
     """Return the springs around each vertex, edges first, then diagonals."""
-    numbered = row_major_grid(surface)
-    if numbered is not None:
-        offset, neighbor = numbered.neighbors_around()
-        return read_only(SpringsAround(offset=offset, neighbor=neighbor, numbering=numbered))
     faces, count = surface.faces, len(surface.vertices)
     offset, neighbor, spring = _sorted_springs(half_edges_of(surface).edges, faces, count)
     around = SpringsAround(offset=offset, neighbor=neighbor, numbering=partial(_spring_numbers, faces, count))
-    vars(around)["_numbers"] = spring
+    vars(around)["entry"] = spring
     return read_only(around)
 
 

@@ -22,7 +22,6 @@ from warpflat.surface.half_edges import (
     read_only_view,
 )
 from warpflat.surface.mesh import Surface, once_per_faces
-from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = [
     "border_loops",
@@ -156,8 +155,7 @@ def border_loops(faces: ArrayLike, vertices: FloatArray | None = None) -> list[I
 
 def border_of(surface: Surface) -> IntArray:
     """Return the vertices on a surface's border, sorted."""
-    numbered = row_major_grid(surface)
-    return _on_border(half_edges_of(surface)) if numbered is None else numbered.border
+    return _on_border(half_edges_of(surface))
 
 
 def _on_border(he: HalfEdges) -> IntArray:

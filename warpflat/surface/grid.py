@@ -12,7 +12,6 @@ from warpflat.kernels.grid_lists import number_faces
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.half_edges import half_edges_of, opposite_half_edges
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_major_grid import RowMajorGrid, row_major_grid
 
 __all__ = ["Lattice", "cut_lattice", "find_lattice", "rows_and_columns"]
 
@@ -60,9 +59,6 @@ def find_lattice(surface: Surface) -> Lattice | None:
     faces, count = surface.faces, len(surface.vertices)
     if not surface.is_quad.all():
         return None
-    numbered = row_major_grid(surface)
-    if numbered is not None:
-        return _from_numbers(faces, numbered)
     he = half_edges_of(surface)
     twin = opposite_half_edges(he).astype(np.int32)
     place, queue = (
@@ -88,18 +84,6 @@ def find_lattice(surface: Surface) -> Lattice | None:
         if (row[corner[:, k]] != face_row + up).any() or (column[corner[:, k]] != face_column + right).any():
             return None
     return read_only(Lattice(row=row, column=column, corner=corner, bends=_bends(surface)))
-
-
-def _from_numbers(faces: IntArray, numbered: RowMajorGrid) -> Lattice:
-    """Return the lattice of a row-major grid, which follows from the vertex numbers."""
-    place = np.array([divmod(at, 2) for at in numbered.place])
-    to_right, up = place[1] - place[0], place[2] - place[1]
-    i, j = np.divmod(numbered.vertices.ravel(), np.int32(numbered.columns))
-    row, column = ((way[0] * i + way[1] * j).astype(np.int32) for way in (up, to_right))
-    row -= row.min()
-    column -= column.min()
-    ends = [np.isin(line, (0, line.max())) for line in (row, column)]
-    return read_only(Lattice(row=row, column=column, corner=faces, bends=ends[0] & ends[1]))
 
 
 def cut_lattice(surface: Surface, whole: Surface, origin: IntArray) -> Lattice | None:
@@ -135,9 +119,6 @@ def _bends(surface: Surface) -> BoolArray:
 @once_per_faces
 def rows_and_columns(surface: Surface) -> IntArray | None:
     """Return the vertices of a rectangular grid of quads, #rows by #columns; None for any other mesh."""
-    numbered = row_major_grid(surface)
-    if numbered is not None:
-        return numbered.vertices
     lattice = find_lattice(surface)
     if lattice is None:
         return None

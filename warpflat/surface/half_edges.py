@@ -17,7 +17,6 @@ from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.sorting import sort_with_order, stable_argsort
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = [
     "HalfEdges",
@@ -112,11 +111,7 @@ def half_edges(faces: ArrayLike) -> HalfEdges:
 @once_per_faces
 def half_edges_of(surface: Surface) -> HalfEdges:
     """Return the half-edges of a surface's faces, computed once per array of faces."""
-    numbered = row_major_grid(surface)
-    if numbered is None:
-        return read_only(half_edges(surface.faces))
-    edge, edges, count = numbered.edges()
-    return read_only(HalfEdges(faces=surface.faces.view(), edge=edge, edges=edges, count=count))
+    return read_only(half_edges(surface.faces))
 
 
 def opposite_half_edges(he: HalfEdges) -> NDArray[np.int64]:

@@ -19,7 +19,6 @@ from warpflat.kernels.unfold import average_normals, find_bends, find_creases
 from warpflat.kernels.unfold import lay_cells as lay_each
 from warpflat.surface.connectivity import coincident_vertices
 from warpflat.surface.mesh import Surface, once_per_faces, read_only
-from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = ["VertexLists", "corners_around", "corners_of", "lay_cells", "quad_creases", "vertex_normals"]
 
@@ -97,11 +96,7 @@ def corners_around(faces: IntArray, count: int) -> tuple[IntArray, IntArray]:
 @once_per_faces
 def corners_of(surface: Surface) -> VertexLists:
     """Return the faces' corners around each vertex (see `corners_around`), computed once per array of faces."""
-    numbered = row_major_grid(surface)
-    if numbered is not None:
-        offset, entry = numbered.corners_around()
-    else:
-        offset, entry = corners_around(surface.faces, len(surface.vertices))
+    offset, entry = corners_around(surface.faces, len(surface.vertices))
     return read_only(VertexLists(offset=offset, entry=entry))
 
 

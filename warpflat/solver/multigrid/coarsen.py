@@ -45,7 +45,6 @@ from warpflat.solver.multigrid.grid_coarsening import (
 from warpflat.surface.cells import face_creases, make_cells
 from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.mesh import Surface, once_per_surface, store_results
-from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.triangles import triangulate
 
 __all__ = [
@@ -222,7 +221,7 @@ def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     For triangle meshes this includes all that depends on no layout. Those of a grid, which starts from a resampled
     grid, are not needed so soon, and do not take long.
     """
-    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD or row_major_grid(surface) is not None:
+    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:

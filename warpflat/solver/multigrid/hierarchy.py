@@ -21,7 +21,6 @@ from warpflat.surface.grid import rows_and_columns
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.injective import border_edges_of
 from warpflat.surface.mesh import Surface, drop_result, is_large
-from warpflat.surface.row_major_grid import row_major_grid
 from warpflat.surface.untangle import untangle
 
 __all__ = [
@@ -121,11 +120,10 @@ def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) ->
             drop_result(made.surface, half_edges_of)
             if made.surface.is_quad.all():
                 made.spring_arrays.around.drop_numbers()
-        if row_major_grid(network.surface) is None:
-            # Make the transfers now, so that the memory they need on the way is returned, too.
-            for level in coarse_levels:
-                level.coarsening.transfer.make()
-            return_freed_memory()
+        # Make the transfers now, so that the memory they need on the way is returned, too.
+        for level in coarse_levels:
+            level.coarsening.transfer.make()
+        return_freed_memory()
 
 
 def _is_lowest(network: SpringNetwork) -> bool:

@@ -20,7 +20,6 @@ from warpflat.core.text import quote_value
 from warpflat.surface.half_edges import half_edges_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import EdgeGraph, are_joined, as_vertex, path_in
-from warpflat.surface.row_major_grid import row_major_grid
 
 __all__ = ["line_between", "line_from_curve", "line_from_indices", "line_on_plane", "with_lines"]
 
@@ -69,8 +68,7 @@ def line_from_indices(surface: Surface, indices: ArrayLike, *, as_read: bool = F
 
 def _are_neighbors(surface: Surface, a: IntArray, b: IntArray) -> BoolArray:
     """Return #N, true where an edge joins `a` and `b` (#N each)."""
-    numbered = row_major_grid(surface)
-    return are_joined(half_edges_of(surface).edges, a, b) if numbered is None else numbered.are_joined(a, b)
+    return are_joined(half_edges_of(surface).edges, a, b)
 
 
 def line_between(surface: Surface, start: int | ArrayLike, end: int | ArrayLike, *, as_read: bool = False) -> IntArray:
