@@ -51,12 +51,14 @@ class ThreadGuard:
 
     warp, weft: unit vectors in the plane.
     stiffness_warp, stiffness_weft: [N/m].
+    isotropic: 1 for a sheet without threads, in which the principal directions of each cell take the place of warp and weft.
     """
 
     warp: wp.vec2d
     weft: wp.vec2d
     stiffness_warp: wp.float64
     stiffness_weft: wp.float64
+    isotropic: int
 
 
 @wp.func
@@ -149,6 +151,47 @@ def is_beyond(worn: wp.vec2d, unit: wp.float64, stretch: wp.float64):
 
 
 @wp.func
+def principal_direction(a: wp.vec2d, b: wp.vec2d):
+    """Return the unit vector v for which a v[0] + b v[1] is longest; the vector to its left makes it shortest.
+
+    Turned to these directions, what depends on lengths along them alone is a function of the singular values, and its
+    gradient is that with the directions held, since both lengths are stationary.
+    """
+    two = wp.float64(2.0)
+    difference = (wp.dot(a, a) - wp.dot(b, b)) / two
+    product = wp.dot(a, b)
+    size = wp.sqrt(difference * difference + product * product)
+    v = wp.vec2d(wp.float64(1.0), wp.float64(0.0))
+    if size > wp.float64(0.0):
+        larger = wp.sqrt((size + wp.abs(difference)) / (two * size))
+        smaller = product / (two * size * larger)
+        v = wp.where(difference >= wp.float64(0.0), wp.vec2d(larger, smaller), wp.vec2d(smaller, larger))
+    return v
+
+
+@wp.func
+def combined(v: wp.vec2d, a: wp.vec2d, b: wp.vec2d):
+    """Return a v[0] + b v[1]."""
+    return a * v[0] + b * v[1]
+
+
+@wp.func
+def is_beyond_anywhere(a: wp.vec2d, b: wp.vec2d, unit: wp.float64, stretch: wp.float64):
+    """Return `is_beyond` of the longest a v[0] + b v[1] with a unit vector v."""
+    length = (wp.float64(1.0) + stretch) * unit
+    aa = wp.dot(a, a)
+    bb = wp.dot(b, b)
+    half = wp.float64(0.5)
+    short = length * length - half * (aa + bb)
+    product = wp.dot(a, b)
+    return (
+        length < wp.float64(0.0)
+        or short < wp.float64(0.0)
+        or half * half * (aa - bb) * (aa - bb) + product * product > short * short
+    )
+
+
+@wp.func
 def early_share(det: wp.float64, longest2: wp.float64):
     """Return the share of the onset from which on a cell's stiffness counts.
 
@@ -161,8 +204,25 @@ def early_share(det: wp.float64, longest2: wp.float64):
 
 
 @wp.func
+def guard_acts(
+    worn_warp: wp.vec2d, worn_weft: wp.vec2d, unit: wp.float64, share: wp.float64, onset: wp.vec2d, isotropic: int
+):
+    """Return whether a thread is stretched beyond a share of the onset; worn threads as in `is_beyond`."""
+    if isotropic != 0:
+        return is_beyond_anywhere(worn_warp, worn_weft, unit, share * onset[0])
+    return is_beyond(worn_warp, unit, share * onset[0]) or is_beyond(worn_weft, unit, share * onset[1])
+
+
+@wp.func
 def check_cell(
-    p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, warp: wp.vec2d, weft: wp.vec2d, onset: wp.vec2d
+    p0: wp.vec2d,
+    p1: wp.vec2d,
+    p2: wp.vec2d,
+    laid: wp.vec3d,
+    warp: wp.vec2d,
+    weft: wp.vec2d,
+    onset: wp.vec2d,
+    isotropic: int,
 ):
     """Return the square of a cell's least height [m2], 0 if mirrored, and 1 where the guard acts or is about to."""
     D = edge_matrix(p0, p1, p2)
@@ -173,9 +233,7 @@ def check_cell(
         longest2 = longest_square(D)
         height2 = det * det / longest2
         early = early_share(det, longest2)
-        if is_beyond(on_body(laid, across(D, warp)), det, early * onset[0]) or is_beyond(
-            on_body(laid, across(D, weft)), det, early * onset[1]
-        ):
+        if guard_acts(on_body(laid, across(D, warp)), on_body(laid, across(D, weft)), det, early, onset, isotropic):
             near = int(1)
     return height2, near
 
@@ -189,6 +247,7 @@ def check_face(
     warp: wp.vec2d,
     weft: wp.vec2d,
     onset: wp.vec2d,
+    isotropic: int,
 ):
     """Return the least height and the largest flag of `check_cell` over the cells of a face; `begin`: the first."""
     p0 = position[natural(face[0])]
@@ -197,13 +256,13 @@ def check_face(
     height2 = wp.float64(0.0)
     near = int(0)
     if face[3] < 0:
-        height2, near = check_cell(p0, p1, p2, laid[begin], warp, weft, onset)
+        height2, near = check_cell(p0, p1, p2, laid[begin], warp, weft, onset, isotropic)
     else:
         p3 = position[natural(face[3])]
-        h0, near0 = check_cell(p3, p0, p1, laid[begin], warp, weft, onset)
-        h1, near1 = check_cell(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset)
-        h2, near2 = check_cell(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset)
-        h3, near3 = check_cell(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset)
+        h0, near0 = check_cell(p3, p0, p1, laid[begin], warp, weft, onset, isotropic)
+        h1, near1 = check_cell(p0, p1, p2, laid[natural(begin + 1)], warp, weft, onset, isotropic)
+        h2, near2 = check_cell(p1, p2, p3, laid[natural(begin + 2)], warp, weft, onset, isotropic)
+        h3, near3 = check_cell(p2, p3, p0, laid[natural(begin + 3)], warp, weft, onset, isotropic)
         height2 = wp.min(wp.min(h0, h1), wp.min(h2, h3))
         near = near0 | near1 | near2 | near3
     return height2, near
@@ -234,6 +293,18 @@ def thread_curvature(worn: wp.vec2d, F: wp.mat22d, stiffness: wp.float64, onset:
         return wp.float64(0.0)
     back = wp.transpose(F) * worn
     return stiffness * wp.dot(back, back) / (length * length)
+
+
+@wp.func
+def turning_share(longer: wp.vec2d, shorter: wp.vec2d, excess: wp.float64):
+    """Return the stiffness, over K, with which the longer principal stretch resists what turns the shorter one.
+
+    It is the derivative f / (s + t) + f / (s - t), halved, of the force f = K excess at the stretches s > t.
+    """
+    square = wp.dot(longer, longer)
+    apart = square - wp.dot(shorter, shorter)
+    turning = excess * wp.sqrt(square)
+    return wp.where(turning < apart, turning / wp.max(apart, wp.float64(1.0e-300)), wp.float64(1.0))
 
 
 @wp.func
@@ -269,7 +340,8 @@ def evaluate_guard(
 ):
     """Compute the forces of the thread guard, minus the gradient of its energy.
 
-    The energy of a cell is a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft].
+    The energy of a cell is a [1/2 K_warp <|F e_warp| - 1 - onset>^2 + the same for weft]; in an isotropic sheet warp
+    and weft are the cell's principal directions.
 
     Added are the energies of the shear deficit of long quads, a 1/2 (F s . F s')^2 with s' at right angles to s =
     `Cells.shear`, and of hourglass modes, 1/2 |sum of hourglass_k p_k|^2.
@@ -294,7 +366,7 @@ def evaluate_guard(
     weft = guard.weft * cells.slack[f][1]
     onset = cells.onset[f]
     begin = natural(cells.first[f])
-    height2, any_near = check_face(position, face, cells.laid, begin, warp, weft, onset)
+    height2, any_near = check_face(position, face, cells.laid, begin, warp, weft, onset, guard.isotropic)
     lacks_shear = wp.dot(cells.shear[f], cells.shear[f]) > wp.float64(0.0)
     wave = cells.hourglass[f]
     is_held = wp.dot(wave, wave) > wp.float64(0.0)
@@ -324,15 +396,21 @@ def evaluate_guard(
             q0 = position[i0]
             q1 = position[i1]
             q2 = position[i2]
-            cell_height2, near = check_cell(q0, q1, q2, laid, warp, weft, onset)
+            cell_height2, near = check_cell(q0, q1, q2, laid, warp, weft, onset, guard.isotropic)
             if near != 0 or (lacks_shear and cell_height2 > wp.float64(0.0)):
                 D = edge_matrix(q0, q1, q2)
                 det = wp.determinant(D)
                 early = early_share(det, longest_square(D))
                 inv = wp.inverse(D)
                 F = laid_edges(laid) * inv
-                worn_warp = F * warp
-                worn_weft = F * weft
+                along = warp
+                over = weft
+                if guard.isotropic != 0:
+                    turn = principal_direction(F * warp, F * weft)
+                    along = combined(turn, warp, weft)
+                    over = combined(turned_left(turn), warp, weft)
+                worn_warp = F * along
+                worn_weft = F * over
                 y_warp = excess_stretch(worn_warp, onset[0])
                 y_weft = excess_stretch(worn_weft, onset[1])
                 worn_s = F * s
@@ -342,8 +420,8 @@ def evaluate_guard(
                 density = wp.float64(0.5) * (
                     guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft
                 )
-                P = thread_stress(worn_warp, warp, guard.stiffness_warp, onset[0]) + thread_stress(
-                    worn_weft, weft, guard.stiffness_weft, onset[1]
+                P = thread_stress(worn_warp, along, guard.stiffness_warp, onset[0]) + thread_stress(
+                    worn_weft, over, guard.stiffness_weft, onset[1]
                 )
                 P += (wp.outer(worn_t, s) + wp.outer(worn_s, t)) * angle
                 # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
@@ -353,6 +431,9 @@ def evaluate_guard(
                 f2 = wp.vec2d(-G[0, 1], -G[1, 1])
                 q_warp = thread_curvature(worn_warp, F, guard.stiffness_warp, early * onset[0])
                 q_weft = thread_curvature(worn_weft, F, guard.stiffness_weft, early * onset[1])
+                if guard.isotropic != 0:
+                    # The principal directions turn with the cell, against the longer one's excess.
+                    q_weft = wp.max(q_weft, q_warp * turning_share(worn_warp, worn_weft, y_warp))
                 # rows of D^-1 are the gradients of the barycentric weights of corners 1 and 2
                 w1 = wp.vec2d(inv[0, 0], inv[0, 1])
                 w2 = wp.vec2d(inv[1, 0], inv[1, 1])
@@ -360,9 +441,9 @@ def evaluate_guard(
                 back_t = wp.transpose(F) * worn_t
                 bent = wp.abs(angle) * wp.ddot(F, F)
                 w0 = -(w1 + w2)
-                k0 = guard_bound(w0, warp, weft, q_warp, q_weft, density) + shear_bound(w0, s, t, back_s, back_t, bent)
-                k1 = guard_bound(w1, warp, weft, q_warp, q_weft, density) + shear_bound(w1, s, t, back_s, back_t, bent)
-                k2 = guard_bound(w2, warp, weft, q_warp, q_weft, density) + shear_bound(w2, s, t, back_s, back_t, bent)
+                k0 = guard_bound(w0, along, over, q_warp, q_weft, density) + shear_bound(w0, s, t, back_s, back_t, bent)
+                k1 = guard_bound(w1, along, over, q_warp, q_weft, density) + shear_bound(w1, s, t, back_s, back_t, bent)
+                k2 = guard_bound(w2, along, over, q_warp, q_weft, density) + shear_bound(w2, s, t, back_s, back_t, bent)
                 k0 *= area
                 k1 *= area
                 k2 *= area
@@ -450,7 +531,12 @@ def guard_energy(
     worn_warp = on_body(laid, across(D, warp))
     worn_weft = on_body(laid, across(D, weft))
     density = wp.float64(0.0)
-    if is_beyond(worn_warp, det, onset[0]) or is_beyond(worn_weft, det, onset[1]):
+    if guard_acts(worn_warp, worn_weft, det, wp.float64(1.0), onset, guard.isotropic):
+        if guard.isotropic != 0:
+            turn = principal_direction(worn_warp, worn_weft)
+            longest = combined(turn, worn_warp, worn_weft)
+            worn_weft = combined(turned_left(turn), worn_warp, worn_weft)
+            worn_warp = longest
         y_warp = excess_stretch(worn_warp / det, onset[0])
         y_weft = excess_stretch(worn_weft / det, onset[1])
         density = guard.stiffness_warp * y_warp * y_warp + guard.stiffness_weft * y_weft * y_weft

@@ -4,7 +4,8 @@ Warp and weft lie straight in the plane, F = dX/dx maps them to the body, and pe
 
     psi = W(e_warp, e_weft) + 1/2 G gamma^2,    e = |F t| - 1,    gamma = F t_warp . F t_weft,
 
-with t a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). W is that of an
+In an isotropic sheet the principal directions of each cell take the place of warp and weft, and gamma is 0.
+Here t is a thread's unit vector over the stretch at which it is meant to be worn (1 where none is). W is that of an
 orthotropic sheet in plane stress; a J-shaped curve adds what the tension differs from K e; and under compression cloth
 wrinkles: W = f W_sheet + (1 - f) W_wrinkled, with W_wrinkled the least energy of any sheet that may shorten freely
 (Pipkin 1986). The energy grows without bound as a cell collapses, so that no cell can be mirrored. Threads that have
@@ -21,12 +22,15 @@ from .cells import (
     cell_corner,
     cell_places,
     cell_weight,
+    combined,
     count_cells,
     edge_matrix,
     flat_edges,
     laid_edges,
     longest_square,
     on_body,
+    principal_direction,
+    turned_left,
 )
 from .indices import natural
 
@@ -42,6 +46,7 @@ class Cloth:
     """The fabric, and its stiffness in the step's matrix.
 
     warp, weft: unit vectors in the plane.
+    isotropic: 1 for a sheet without threads.
     c_warp, c_weft, c_cross, shear: plane stress [N/m].
     k_warp, k_weft: K, the stiffness of a strip along one thread [N/m].
     lock: K_lock, what locked threads add to G [N/m].
@@ -53,6 +58,7 @@ class Cloth:
 
     warp: wp.vec2d
     weft: wp.vec2d
+    isotropic: int
     c_warp: wp.float64
     c_weft: wp.float64
     c_cross: wp.float64
@@ -182,6 +188,19 @@ def stress_rates(rate_warp: wp.float64, rate_weft: wp.float64, e: wp.vec2d, clot
     )
 
 
+@wp.func
+def threads_in(F: wp.mat22d, cloth: Cloth, slack: wp.vec2d):
+    """Return warp and weft times the slack; the principal directions of a cell in an isotropic sheet."""
+    warp = cloth.warp * slack[0]
+    weft = cloth.weft * slack[1]
+    if cloth.isotropic != 0:
+        turn = principal_direction(F * warp, F * weft)
+        longest = combined(turn, warp, weft)
+        weft = combined(turned_left(turn), warp, weft)
+        warp = longest
+    return warp, weft
+
+
 @wp.kernel
 def evaluate_membrane(
     position: wp.array(dtype=wp.vec2d),
@@ -241,8 +260,7 @@ def evaluate_membrane(
             acts = 1
             inv = wp.inverse(D)
             F = laid_edges(cells.laid[natural(begin + k)]) * inv
-            warp = cloth.warp * cells.slack[f][0]
-            weft = cloth.weft * cells.slack[f][1]
+            warp, weft = threads_in(F, cloth, cells.slack[f])
             worn_warp = F * warp
             worn_weft = F * weft
             length_warp = wp.max(wp.length(worn_warp), TINY)
@@ -324,8 +342,6 @@ def bound_membrane(
     f = natural(wp.tid() + first)
     face = cells.face[f]
     begin = natural(cells.first[f])
-    warp = cloth.warp * cells.slack[f][0]
-    weft = cloth.weft * cells.slack[f][1]
     k = int(0)
     count = count_cells(face)
     while k < count:
@@ -335,6 +351,7 @@ def bound_membrane(
         if det > wp.float64(0.0):
             inv = wp.inverse(D)
             F = laid_edges(cells.laid[c]) * inv
+            warp, weft = threads_in(F, cloth, cells.slack[f])
             worn_warp = F * warp
             worn_weft = F * weft
             e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
@@ -363,6 +380,11 @@ def membrane_energy(
         return wp.float64(wp.inf)
     worn_warp = on_body(laid, across(D, warp)) / det
     worn_weft = on_body(laid, across(D, weft)) / det
+    if cloth.isotropic != 0:
+        turn = principal_direction(worn_warp, worn_weft)
+        longest = combined(turn, worn_warp, worn_weft)
+        worn_weft = combined(turned_left(turn), worn_warp, worn_weft)
+        worn_warp = longest
     e = wp.vec2d(wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0))
     law = stretched_sheet(e, cloth)
     return wp.float64(0.5) * det * (law[2] + sheared_threads(wp.dot(worn_warp, worn_weft), cloth)[1])

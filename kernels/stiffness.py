@@ -245,6 +245,11 @@ def weigh_quads(
     half_b = half * (kb * inverse - shear * ratio)
     lack[q] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
     if shear < lattice.shear:
+        # Along the longer sides, whichever of its corners the quad begins at.
+        if b > a:
+            d = (position[natural(quad[3])] - position[natural(quad[0])]) + (
+                position[natural(quad[2])] - position[natural(quad[1])]
+            )
         lack[q] = wp.normalize(d) * wp.pow(lattice.shear - shear, wp.float64(0.25))
     # An hourglass mode of 1 m strains a side by 2 m, and the hourglass spring by 4 m.
     short = wp.max(

@@ -2,7 +2,20 @@
 
 import warp as wp
 
-from .cells import Cells, across, cell_corner, cell_weight, count_cells, edge_matrix, flat_edges, laid_edges, on_body
+from .cells import (
+    Cells,
+    across,
+    cell_corner,
+    cell_weight,
+    combined,
+    count_cells,
+    edge_matrix,
+    flat_edges,
+    laid_edges,
+    on_body,
+    principal_direction,
+    turned_left,
+)
 from .indices import natural
 from .membrane import Cloth, sheared_threads, stretched_sheet
 
@@ -13,11 +26,13 @@ wp.set_module_options({"enable_backward": False, "fuse_fp": False})
 class Membrane:
     """Plane stress of an orthotropic sheet: sigma_warp = c_warp e_warp + c_cross e_weft, tau = shear gamma.
 
-    warp, weft: unit vectors in the plane. c_warp, c_weft, c_cross, shear: [N/m].
+    warp, weft: unit vectors in the plane. c_warp, c_weft, c_cross, shear: [N/m]. isotropic: 1 for a sheet without threads,
+    whose stress follows from its principal strains.
     """
 
     warp: wp.vec2d
     weft: wp.vec2d
+    isotropic: int
     c_warp: wp.float64
     c_weft: wp.float64
     c_cross: wp.float64
@@ -41,23 +56,19 @@ def measure_flat_cells(
 
 
 @wp.func
-def worn_strain(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
-    """Return the determinant of a cell's edges in the plane [m2], and its strains along warp and weft and in shear.
+def worn_strain(worn_warp: wp.vec2d, worn_weft: wp.vec2d):
+    """Return the strains along two worn threads, and their shear."""
+    return wp.vec3d(
+        wp.length(worn_warp) - wp.float64(1.0), wp.length(worn_weft) - wp.float64(1.0), wp.dot(worn_warp, worn_weft)
+    )
 
-    The determinant of a mirrored cell is 0 or less, and its strains are 0.
-    """
-    D = edge_matrix(p0, p1, p2)
-    det = wp.determinant(D)
-    e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
-    if det > wp.float64(0.0):
-        worn_warp = on_body(laid, across(D, membrane.warp)) / det
-        worn_weft = on_body(laid, across(D, membrane.weft)) / det
-        e = wp.vec3d(
-            wp.length(worn_warp) - wp.float64(1.0),
-            wp.length(worn_weft) - wp.float64(1.0),
-            wp.dot(worn_warp, worn_weft),
-        )
-    return det, e
+
+@wp.func
+def against_grain(turn: wp.vec2d, s: wp.vec3d):
+    """Return sigma_warp, sigma_weft, tau of principal stresses, the first one along `turn` from the warp."""
+    c2 = turn[0] * turn[0]
+    s2 = turn[1] * turn[1]
+    return wp.vec3d(c2 * s[0] + s2 * s[1], s2 * s[0] + c2 * s[1], turn[0] * turn[1] * (s[0] - s[1]))
 
 
 @wp.func
@@ -71,10 +82,39 @@ def stress_of(e: wp.vec3d, membrane: Membrane):
 
 
 @wp.func
+def worn_state(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
+    """Return the determinant of a cell's edges in the plane [m2], its strains and stresses, and its energy density.
+
+    The determinant of a mirrored cell is 0 or less, and the others are 0.
+    """
+    D = edge_matrix(p0, p1, p2)
+    det = wp.determinant(D)
+    e = wp.vec3d()
+    s = wp.vec3d()
+    density = wp.float64(0.0)
+    if det > wp.float64(0.0):
+        worn_warp = on_body(laid, across(D, membrane.warp)) / det
+        worn_weft = on_body(laid, across(D, membrane.weft)) / det
+        e = worn_strain(worn_warp, worn_weft)
+        if membrane.isotropic != 0:
+            turn = principal_direction(worn_warp, worn_weft)
+            principal = worn_strain(
+                combined(turn, worn_warp, worn_weft), combined(turned_left(turn), worn_warp, worn_weft)
+            )
+            s = stress_of(principal, membrane)
+            density = wp.float64(0.5) * wp.dot(s, principal)
+            s = against_grain(turn, s)
+        else:
+            s = stress_of(e, membrane)
+            density = wp.float64(0.5) * wp.dot(s, e)
+    return det, e, s, density
+
+
+@wp.func
 def stored_energy(p0: wp.vec2d, p1: wp.vec2d, p2: wp.vec2d, laid: wp.vec3d, membrane: Membrane):
     """Return the strain energy of a cell with all of its area [J]."""
-    det, e = worn_strain(p0, p1, p2, laid, membrane)
-    return wp.float64(0.25) * wp.dot(stress_of(e, membrane), e) * det
+    det, _e, _s, density = worn_state(p0, p1, p2, laid, membrane)
+    return wp.float64(0.5) * density * det
 
 
 @wp.kernel
@@ -94,7 +134,8 @@ def compute_worn_strain(
     The cloth is flat when relaxed and strained when worn: e = |F e_warp| - 1, |F e_weft| - 1, gamma = F e_warp . F
     e_weft.
 
-    U = 1/2 (sigma_warp e_warp + sigma_weft e_weft + tau gamma) a, eq. (3), with a the signed flat area of the cell.
+    U = 1/2 (sigma_warp e_warp + sigma_weft e_weft + tau gamma) a, eq. (3), with a the signed flat area of the cell; in
+    an isotropic sheet of its principal strains and stresses, so that it does not depend on the grain.
 
     Launched over the faces. position: #V [m]. strain: #C (e_warp, e_weft, gamma). stress: #C (sigma_warp, sigma_weft,
     tau) [N/m].
@@ -111,12 +152,11 @@ def compute_worn_strain(
         p0 = position[natural(at[0])]
         p1 = position[natural(at[1])]
         p2 = position[natural(at[2])]
-        det, e = worn_strain(p0, p1, p2, cells.laid[c], membrane)
+        det, e, s, density = worn_state(p0, p1, p2, cells.laid[c], membrane)
         flat = wp.float64(0.5) * det * cell_weight(face)
-        s = stress_of(e, membrane)
         strain[c] = e
         stress[c] = s
-        energy[c] = wp.float64(0.5) * wp.dot(s, e) * flat
+        energy[c] = density * flat
         area[c] = flat
         k += 1
 
@@ -214,19 +254,27 @@ def compute_membrane_strain(
         D = flat_edges(position, cell_corner(face, k))
         det = wp.determinant(D)
         area[c] = wp.float64(0.5) * det * cell_weight(face)
-        e = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+        e = wp.vec3d()
+        along = wp.vec3d()
+        turn = wp.vec2d(wp.float64(1.0), wp.float64(0.0))
         if det > wp.float64(0.0):
             F = laid_edges(cells.laid[c]) * wp.inverse(D)
             worn_warp = F * cloth.warp
             worn_weft = F * cloth.weft
-            e = wp.vec3d(
-                wp.length(worn_warp) - wp.float64(1.0),
-                wp.length(worn_weft) - wp.float64(1.0),
-                wp.dot(worn_warp, worn_weft),
-            )
-        law = stretched_sheet(wp.vec2d(e[0], e[1]), cloth)
-        across = sheared_threads(e[2], cloth)
+            e = worn_strain(worn_warp, worn_weft)
+            along = e
+            if cloth.isotropic != 0:
+                turn = principal_direction(worn_warp, worn_weft)
+                along = worn_strain(
+                    combined(turn, worn_warp, worn_weft), combined(turned_left(turn), worn_warp, worn_weft)
+                )
+                along[2] = wp.float64(0.0)
+        law = stretched_sheet(wp.vec2d(along[0], along[1]), cloth)
+        shear = sheared_threads(along[2], cloth)
         strain[c] = e
-        stress[c] = wp.vec3d(law[0], law[1], across[0])
-        energy[c] = (law[2] + across[1]) * area[c]
+        s = wp.vec3d(law[0], law[1], shear[0])
+        if cloth.isotropic != 0:
+            s = against_grain(turn, s)
+        stress[c] = s
+        energy[c] = (law[2] + shear[1]) * area[c]
         k += 1

@@ -38,7 +38,7 @@ def angles(d: FloatArray, warp: FloatArray) -> FloatArray:
 def stiffness(
     surface: Surface, fabric: Fabric, positions: FloatArray, grain_angle: float
 ) -> tuple[FloatArray, FloatArray]:
-    """#S, face by face, and #F by 2, what long quads lack in shear: along their first edges, the fourth root of it."""
+    """#S, face by face, and #F by 2, what long quads lack in shear: along their longer edges, the fourth root of it."""
     warp, _ = grain_axes(grain_angle)
     row = {(int(a), int(b)): e for e, (a, b) in enumerate(half_edges(surface.faces).edges)}
     k_ij, diagonals, lacks = np.zeros(len(row)), [], np.zeros((len(surface.faces), 2))
@@ -66,7 +66,7 @@ def stiffness(
         half_b = 0.5 * (kb - held * b**2 / a**2) * a / b
         k_ij[rows] += [half_a, half_b, half_a, half_b]
         diagonals.append(held * (a**2 + b**2) / (2.0 * a * b))
-        edge = q[1] - q[0] + q[2] - q[3]
+        edge = q[3] - q[0] + q[2] - q[1] if b > a else q[1] - q[0] + q[2] - q[3]
         lacks[number] = edge / np.linalg.norm(edge) * (shear - held) ** 0.25
     return np.concatenate([k_ij, diagonals, diagonals]), lacks
 

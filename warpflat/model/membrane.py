@@ -51,6 +51,7 @@ def make_cloth(
     """
     cloth = Cloth()
     cloth.warp, cloth.weft = wp.vec2d(*axes[0]), wp.vec2d(*axes[1])
+    cloth.isotropic = int(fabric.is_isotropic)
     cloth.c_warp, cloth.c_weft, cloth.c_cross = plane_stress(fabric)
     cloth.shear = fabric.shear_stiffness
     cloth.k_warp, cloth.k_weft = fabric.stiffness_warp, fabric.stiffness_weft

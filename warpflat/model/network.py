@@ -13,7 +13,9 @@ which the springs buckle,
 
 with F from the plane to the surface and a the flat area. This guard is zero below its onset. It makes the energy convex
 against kinks, since its sideways stiffness outweighs the springs' negative one. It grows without bound as a cell
-collapses, so that no face can be mirrored. Its energy is reported as `guard_energy_j`.
+collapses, so that no face can be mirrored. Its energy is reported as `guard_energy_j`. In an isotropic fabric, whose
+grain is only a direction on the table, the principal directions of F take the place of the threads, here and in the
+membrane, and nothing depends on the grain.
 
 **Long quads are sheared as a whole.** Along a quad much longer than wide, shear springs with all of G would be stiffer
 than the fabric, and would hold no vertex against its four neighbours. Theirs are weaker (`SpringArrays.shear_deficit`),
@@ -49,7 +51,14 @@ from warpflat.kernels.membrane import Cloth, compute_membrane_energy, evaluate_m
 from warpflat.kernels.springs import Springs
 from warpflat.kernels.stiffness import sum_stiffness
 from warpflat.model.membrane import Model, check_model, make_cloth, step_matrix
-from warpflat.model.springs import SpringArrays, measure_buckling_stiffness, shorten_springs, springs_of, with_stiffness
+from warpflat.model.springs import (
+    SpringArrays,
+    isotropic_buckling_stiffness,
+    measure_buckling_stiffness,
+    shorten_springs,
+    springs_of,
+    with_stiffness,
+)
 from warpflat.surface.cells import CellArrays, make_cells
 from warpflat.surface.grid_lines import LineArrays, join_lines, lines_of
 from warpflat.surface.mesh import Surface
@@ -142,7 +151,11 @@ class SpringNetwork:
             )
             springs, buckling_stiffness = with_stiffness(springs, cells, weights), np.inf
         elif buckling_stiffness is None:
-            buckling_stiffness = measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
+            buckling_stiffness = (
+                isotropic_buckling_stiffness(surface, fabric)
+                if fabric.is_isotropic
+                else measure_buckling_stiffness(surface, springs, positions, grain_axes(grain_angle)[0])
+            )
         return cls(
             surface=surface,
             fabric=fabric,
@@ -191,6 +204,7 @@ class SpringNetwork:
         guard = ThreadGuard()
         guard.warp, guard.weft = wp.vec2d(*warp), wp.vec2d(*weft)
         guard.stiffness_warp, guard.stiffness_weft = fabric.stiffness_warp, fabric.stiffness_weft
+        guard.isotropic = int(fabric.is_isotropic)
         self.guard = guard
         if self.held_stiffness is not None:
             # Strain beyond an intended stretch is small, and measured with the secant stiffness.

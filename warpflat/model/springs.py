@@ -37,6 +37,7 @@ from warpflat.surface.triangles import selected_rows, unfold_quad_diagonals
 __all__ = [
     "SpringArrays",
     "SpringsAround",
+    "isotropic_buckling_stiffness",
     "measure_buckling_stiffness",
     "shorten_springs",
     "spring_geometry",
@@ -411,6 +412,15 @@ def with_stiffness(springs: SpringArrays, cells: CellArrays, weights: FloatArray
     side = springs_along_cells(springs, cells)
     stiffness = np.bincount(side, weights.ravel(), minlength=springs.count).astype(np.float64)
     return replace(springs, listed_stiffness=springs.listed(stiffness), shear_deficit=None, hourglass=None)
+
+
+def isotropic_buckling_stiffness(surface: Surface, fabric: Fabric) -> float:
+    """Return the result of `measure_buckling_stiffness` for an isotropic sheet, in which any direction may buckle.
+
+    The mean of cos^2 sin^2 over all directions is 1/8, and each triangle gives its three springs k L^2 = K A: 3 K / 8
+    on any mesh.
+    """
+    return np.inf if surface.is_quad.all() else _BUCKLING_SHARE * 3.0 / 8.0 * fabric.stiffness_warp
 
 
 def measure_buckling_stiffness(

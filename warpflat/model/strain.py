@@ -49,6 +49,7 @@ def make_membrane(fabric: Fabric, grain_angle: float = 0.0) -> Membrane:
     warp, weft = grain_axes(grain_angle)
     membrane = Membrane()
     membrane.warp, membrane.weft = wp.vec2d(*warp), wp.vec2d(*weft)
+    membrane.isotropic = int(fabric.is_isotropic)
     membrane.c_warp, membrane.c_weft, membrane.c_cross = plane_stress(fabric)
     membrane.shear = fabric.shear_stiffness
     return membrane
