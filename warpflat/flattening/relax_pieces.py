@@ -30,7 +30,7 @@ from warpflat.solver.contact import open_cracks, relax_with_contact
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
 from warpflat.solver.grain_alignment import GrainAlignment
-from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of
+from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of, is_coarsest
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import relax
@@ -235,6 +235,8 @@ def relax_pieces(
             [starts[number] for number in numbers],
         )
         results = batch.relax(levels=levels, direction_updates=updates, isotropic_start=isotropic_start)
+        for number in numbers:
+            tasks[number].notes += _plain_step_notes(tasks[number], networks[number], levels=levels)
         relaxed |= zip(numbers, results, strict=True)
     for number, task in enumerate(tasks):
         # The springs of earlier rounds are gone: only those that the pattern has count.
@@ -277,6 +279,17 @@ def keep_apart(
             return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
     task.notes.append(f"{words}, and contact could not part it: cut it apart there")
     return free, (relaxed,)
+
+
+def _plain_step_notes(task: RelaxationTask, network: SpringNetwork, *, levels: bool) -> list[str]:
+    """Return a note on a piece that is relaxed by plain steps though it is large enough for coarser levels."""
+    meant = task.options.solver == "multilevel" and not is_coarsest(network.surface)
+    if levels or not meant or gauss_newton_pays(network):
+        return []
+    cause = (
+        "no coarser mesh is worth having" if multigrid_pays(network) else "the cloth is soft and the triangles are few"
+    )
+    return [f"relaxed by plain steps alone: {cause}"]
 
 
 def _has_levels(task: RelaxationTask, network: SpringNetwork) -> bool:
@@ -326,6 +339,8 @@ class _Batch:
                 break
         outcome, state = replace(self._round(levels), seconds=time.perf_counter() - started), self._state
         layout, check = state.positions(), state.status
+        for task in self._tasks:
+            task.notes += [note for note in outcome.notes if note not in task.notes]
         return [
             RelaxedPiece(
                 network=net,

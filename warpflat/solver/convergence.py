@@ -100,6 +100,7 @@ class Outcome:
         residual: largest force on a vertex over the mean spring force.
         energies: at the end [J].
         seconds: wall clock.
+        notes: why plain steps went on where cycles were meant to, one sentence each.
     """
 
     converged: bool
@@ -110,3 +111,4 @@ class Outcome:
     residual: float
     energies: Energies
     seconds: float
+    notes: tuple[str, ...] = ()

@@ -31,7 +31,7 @@ from __future__ import annotations
 import math
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -59,6 +59,8 @@ _FEW_VERTICES = 1_200
 _PATIENCE = 600.0
 _VERY_SOFT = 200.0
 _PATIENCE_WITH_MEMBRANE = 300.0
+_NO_LEVEL = "every coarser mesh has mirrored faces at the first layout, or none is worth having"
+_SLOW_CYCLES = "coarser meshes bring a membrane that is not isotropic to rest too slowly"
 # Limit on how often levels are made anew, after the piece has moved far from the layout at which they were made.
 _RENEWALS = 8
 
@@ -172,7 +174,8 @@ def relax_multilevel(
     # What the cascade does not share with the levels is no longer needed.
     del cascade
     if len(levels.sizes) == 1:
-        return relax(state, watch=watch, each_step=each_step)
+        outcome = relax(state, watch=watch, each_step=each_step)
+        return replace(outcome, notes=(f"relaxed by plain steps alone: {_NO_LEVEL}",))
     pieces = _CycledPieces(state=state, levels=levels, progress=[_PieceProgress() for _ in state.vertex_ranges])
     if nested and not from_cascade:
         nested_iteration(levels)
@@ -182,8 +185,8 @@ def relax_multilevel(
     levels.update_matrices()
     state.evaluate_at_rest()
     state.work_units += FORCE_WORK
-    _cycle_until_rest(pieces, work_before, least_gain=least_gain, watch=watch, each_step=each_step)
-    return state.make_outcome(steps_before, work_before, began_at=began_at)
+    notes = _cycle_until_rest(pieces, work_before, least_gain=least_gain, watch=watch, each_step=each_step)
+    return replace(state.make_outcome(steps_before, work_before, began_at=began_at), notes=notes)
 
 
 def _cycle_until_rest(
@@ -193,14 +196,20 @@ def _cycle_until_rest(
     least_gain: float | None,
     watch: Watch | None,
     each_step: Watch | None,
-) -> None:
-    """Cycle pieces until all are finished, or another method has gone on; the result is copied into their state."""
+) -> tuple[str, ...]:
+    """Cycle pieces until all are finished, or another method has gone on; the result is copied into their state.
+
+    Returns:
+        A note if plain steps have gone on.
+    """
+    notes: tuple[str, ...] = ()
     whole, options, patience = pieces.state, pieces.state.options, _patience(pieces.state.network)
     while not pieces.finished.all() and pieces.state.work_units - work_before < options.max_steps:
         spent = pieces.state.work_units - work_before
         if spent >= patience:
             if whole.network.model == "membrane":
                 relax(pieces.state, watch=watch, each_step=each_step)
+                notes = (f"plain steps went on after {spent:.0f} work units: {_SLOW_CYCLES}",)
             else:
                 max_work = options.max_steps - spent
                 relax_gauss_newton(
@@ -215,3 +224,4 @@ def _cycle_until_rest(
         pieces.notify(watch)
         pieces.notify(each_step)
     pieces.state.copy_into(whole)
+    return notes
