@@ -221,7 +221,8 @@ def hierarchy_in_background(surface: Surface) -> Iterator[None]:
     For triangle meshes this includes all that depends on no layout. Those of a grid, which starts from a resampled
     grid, are not needed so soon, and do not take long.
     """
-    if thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD:
+    few = thread_count() == 1 or len(surface.vertices) < _WORTH_A_THREAD
+    if few or rows_and_columns(surface) is not None:
         yield
         return
     with ThreadPoolExecutor(max_workers=1) as other:
