@@ -44,7 +44,7 @@ from warpflat.surface.shapes import bodice
 from warpflat.surface.triangles import triangulate
 
 _NEAR_ENERGY, _NEAR_OUTLINE = 1e-3, 1e-4
-_SIZES = ("EU 36", "EU 46")
+_SIZES = ("EU 36", "EU 44")
 _PEERS: dict[str, Solver] = {"ARAP": arap, "SLIM": slim}
 _SECONDS = 120.0
 

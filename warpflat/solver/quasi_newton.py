@@ -272,12 +272,13 @@ def relax_quasi_newton(
         each_step: called after every iteration, with the energies and the residual of the last check.
     """
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
-    state.check_start()
+    if state.check_start().at_rest.all():
+        return state.make_outcome(steps_before, work_before, began_at=began_at)
     start = state.positions()
     align_grain(state.alignments, start)
     problem = _Cloth(state)
     point = problem.at(start)
-    if state.status.at_rest.all() or not np.isfinite(point.energy):
+    if not np.isfinite(point.energy):
         return state.make_outcome(steps_before, work_before, began_at=began_at)
     descent, options = Descent(problem, point), state.options
 
