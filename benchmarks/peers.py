@@ -149,7 +149,7 @@ def lscm(problem: Problem) -> FloatArray:
     return np.ascontiguousarray(layout * (area / abs(flat)) ** 0.5)
 
 
-def turn_scan_upright(layout: FloatArray, datum: IntArray) -> FloatArray:
+def turn_upright(layout: FloatArray, datum: IntArray) -> FloatArray:
     """A layout (#V by 2 [m]) turned so that the chord of the datum, vertex indices, points up."""
     across, up = (layout[datum[-1]] - layout[datum[0]]) / np.linalg.norm(layout[datum[-1]] - layout[datum[0]])
     return layout @ np.array([[up, across], [-across, up]])

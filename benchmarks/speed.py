@@ -37,7 +37,7 @@ from peers import (
     majorize_with,
     now,
     slim,
-    upright,
+    turn_upright,
 )
 
 import warpflat
@@ -219,7 +219,7 @@ class Runner:
             try:
                 conformal = lscm(problem)
                 # Long quads are sheared along directions in the plane: it is to lie as ours does.
-                starts["LSCM"] = (now() - begun, upright(conformal, self.mesh.datum))
+                starts["LSCM"] = (now() - begun, turn_upright(conformal, self.mesh.datum))
             except ImportError:
                 pass
         runs = []

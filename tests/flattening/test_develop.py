@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.errors import InputError
 from warpflat.flattening.datum import choose_and_name_datum, choose_datum
-from warpflat.flattening.develop import _winds_twice, develop, flat_layout, geodesic_layout, profile_layout
+from warpflat.flattening.develop import develop, flat_layout, geodesic_layout, profile_layout, winds_twice
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.surface.cells import make_cells
 from warpflat.surface.cut.cut_mesh import cut_along
@@ -341,14 +341,14 @@ def fan(turns: float, *, closed: bool) -> tuple[Surface, FloatArray]:
 def test_faces_that_go_around_a_vertex_twice_are_found(turns: float, closed: bool, twice: bool):
     surface, positions = fan(turns, closed=closed)
     assert mirrored(surface, positions) == 0
-    assert _winds_twice(surface, make_cells(surface), positions) == twice
+    assert winds_twice(surface, make_cells(surface), positions) == twice
 
 
 @pytest.mark.parametrize("turns", [0.9, 1.05, 1.6, 2.4])
 def test_faces_that_go_around_a_border_vertex_by_more_than_a_turn_are_found(turns: float):
     surface, positions = fan(turns, closed=False)
     assert mirrored(surface, positions) == 0
-    assert _winds_twice(surface, make_cells(surface), positions) == (turns > 1)
+    assert winds_twice(surface, make_cells(surface), positions) == (turns > 1)
 
 
 # --- rings and tubes

@@ -31,6 +31,11 @@ __all__ = ["flatten"]
     "of the piece (bottom, left, right, top), or a line of the file (a USD curve).  [default: a long line through the "
     "middle]",
 )
+@click.option(
+    "--start",
+    metavar="FILE",
+    help="An OBJ file of the same mesh: relax from its texture coordinates.  [default: chosen by cost]",
+)
 @click.option("--grain-angle", type=float, metavar="DEGREES", help="Turns the warp from the datum; 45 is the bias.")
 @click.option("--model", metavar="NAME", help="springs, or membrane: the cloth measured as worn.  [default: springs]")
 @click.option("--stretch-warp", type=float, metavar="SHARE", help="Worn so much longer than flat along the warp: 0.1.")
@@ -85,7 +90,7 @@ def flatten(
             tables.setdefault(table, {})[key] = options[option]
     if options["component"] is not None and re.fullmatch(r"-?[0-9]{1,18}", options["component"]):
         tables["surface"]["component"] = int(options["component"])
-    for key in ("name", "fabric", "grain_angle", "model"):
+    for key in ("name", "fabric", "start", "grain_angle", "model"):
         if options[key] is not None:
             tables[key] = options[key]
     tables["fabric_files"] = list(options["fabric_files"])

@@ -30,7 +30,16 @@ from warpflat.surface.triangles import corner_triangles, triangulate
 from warpflat.surface.untangle import signed_cell_areas, untangle
 from warpflat.surface.vectors import norm, points_at
 
-__all__ = ["Development", "develop", "flat_layout", "geodesic_layout", "profile_layout"]
+__all__ = [
+    "Development",
+    "close_cracks",
+    "develop",
+    "flat_layout",
+    "geodesic_layout",
+    "profile_layout",
+    "turn_upright",
+    "winds_twice",
+]
 
 
 # A piece is flat if it leaves its plane by no more than this share of its size, the rounding of single precision.
@@ -58,15 +67,24 @@ class Development:
 
     Attributes:
         positions: #V by 2 [m], the datum along +y.
-        method: "flat", "profiles", "geodesic" or "harmonic".
-        mended: whether so many faces had to be turned back that it says little of directions.
+        method: "flat", "profiles", "geodesic" or "harmonic"; "given" where it is the user's.
+        as_rigid: whether it is what as-rigid iterations have made of that (`warpflat.flattening.start`).
+        mended: whether it says little of directions: many faces had to be turned back, or it is no development.
         notes: why a way was not taken, one sentence each.
     """
 
     positions: FloatArray
     method: str
+    as_rigid: bool = False
     mended: bool = False
     notes: tuple[str, ...] = ()
+
+    @property
+    def start(self) -> str:
+        """What the piece is relaxed from, as text."""
+        if self.method == "given":
+            return "the layout given"
+        return f"{'as-rigid iterations from ' if self.as_rigid else ''}the {self.method} development"
 
 
 def develop(surface: Surface, datum: IntArray) -> Development:
@@ -85,7 +103,7 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     if flat is not None and len(_mirrored(cells, flat)) == 0:
         return Development(positions=flat, method="flat")
     ways = (("profiles", profile_layout), ("geodesic", geodesic_layout))
-    closed = _with_cracks_closed(surface, datum)
+    closed = close_cracks(surface, datum)
     if closed is not None:
         whole, index = closed
         for method, layout in ways:
@@ -106,14 +124,14 @@ def develop(surface: Surface, datum: IntArray) -> Development:
             continue
         for start, mirrored in _starts(surface, cells, positions):
             mended, left = untangle(surface, start, least_area=_LEAST_AREA, suspects=mirrored)
-            if left == 0 and not _winds_twice(surface, cells, mended):
+            if left == 0 and not winds_twice(surface, cells, mended):
                 smoothed = "" if start is positions else "smoothed by a coarser mesh and "
                 notes.append(f"they were {smoothed}turned back, with a few faces around them")
                 turned = len(np.unique(cells.face[mirrored]))
                 much = turned > max(_MENDED, _MENDED_SHARE * len(surface.faces))
                 return Development(positions=mended, method=method, mended=much, notes=tuple(notes))
     refuse_tubes(surface)
-    positions = _upright(harmonic_layout(surface), datum)
+    positions = turn_upright(harmonic_layout(surface), datum)
     notes.append("started from a harmonic map onto a disk instead, which cannot fold")
     return Development(positions=positions, method="harmonic", mended=True, notes=tuple(notes))
 
@@ -150,7 +168,7 @@ def _smoother(surface: Surface, positions: FloatArray) -> Iterator[FloatArray]:
             yield smooth
 
 
-def _with_cracks_closed(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] | None:
+def close_cracks(surface: Surface, datum: IntArray) -> tuple[Surface, IntArray] | None:
     """Return the surface with border vertices at one place merged, and for each vertex its number there.
 
     None where there is no crack, and where what is closed is none but a seam: it would make a tube of a piece, or parts touch
@@ -194,7 +212,7 @@ def _mirrored(cells: CellArrays, positions: FloatArray) -> NDArray[np.int64]:
     return np.flatnonzero(signed_cell_areas(corner, positions) * weight <= _LEAST_AREA * cells.area)
 
 
-def _winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
+def winds_twice(surface: Surface, cells: CellArrays, positions: FloatArray) -> bool:
     """Return whether the faces wind more than once around an inner vertex, or by more than a full turn around a border vertex.
 
     Every cell may be the right way up and the layout be a staircase all the same. A quad's corner is one of its four cells.
@@ -238,7 +256,7 @@ def flat_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
         return None
     right = np.cross(np.eye(3)[np.abs(facing).argmin()], facing)
     axes = np.column_stack([right, np.cross(facing, right)])
-    return _upright(away @ (axes / np.linalg.norm(axes, axis=0)), datum)
+    return turn_upright(away @ (axes / np.linalg.norm(axes, axis=0)), datum)
 
 
 def profile_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
@@ -341,7 +359,7 @@ def geodesic_layout(surface: Surface, datum: IntArray) -> FloatArray | None:
     return positions if np.isfinite(positions).all() else None
 
 
-def _upright(positions: FloatArray, datum: IntArray) -> FloatArray:
+def turn_upright(positions: FloatArray, datum: IntArray) -> FloatArray:
     """Turn a layout so that the datum's chord points up, and shift its first point to the origin."""
     chord = positions[datum[-1]] - positions[datum[0]]
     length = float(np.hypot(*chord))

@@ -19,10 +19,11 @@ from warpflat.core.free_memory import return_freed_memory
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
-from warpflat.flattening.develop import Development, develop
+from warpflat.flattening.develop import Development
 from warpflat.flattening.progress import Progress, Stage
 from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, keep_apart, relax_pieces
 from warpflat.flattening.result import Flattening
+from warpflat.flattening.start import choose_start, given_start
 from warpflat.model.membrane import Model, check_model
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
@@ -30,6 +31,7 @@ from warpflat.model.wear import Wear, unused_stretch
 from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
+from warpflat.surface.laplacian import can_be_factored
 from warpflat.surface.mesh import Surface, is_large
 
 __all__ = ["flatten", "return_memory_of"]
@@ -44,6 +46,7 @@ def flatten(
     units: str | None = None,
     model: Model = "springs",
     wear: Wear | None = None,
+    start: ArrayLike | None = None,
     relax: RelaxOptions | None = None,
     callback: Callable[[Progress], None] | None = None,
     device: str | None = None,
@@ -60,6 +63,7 @@ def flatten(
         model: "springs", the paper's, or "membrane", the cloth measured as worn (see `warpflat.model.network`); what is
             minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
+        start: a layout of one's own to be relaxed from, #V by 2 in any unit; no face of it may be mirrored.
         relax: options of the relaxation.
         callback: called with a `Progress` for the development (step 0) and after every step.
         device: Warp device, "cpu" or "cuda:0"; Warp's own choice if not given.
@@ -70,7 +74,7 @@ def flatten(
     surface = as_surface(surface, units)
     expect_callback(callback)
     settings = check_settings(fabric, grain_angle=grain_angle, model=model, wear=wear, relax=relax, device=device)
-    developed = develop_piece(surface, datum, settings, callback)
+    developed = develop_piece(surface, datum, settings, callback, start)
     _refuse_unused_stretch(developed)
     return relax_developed([developed])[0]
 
@@ -165,6 +169,7 @@ def develop_piece(
     datum: str | ArrayLike | None,
     settings: FlattenSettings,
     callback: Callable[[Progress], None] | None,
+    start: ArrayLike | None = None,
 ) -> DevelopedPiece:
     """Develop a piece from its datum and measure its network there: the first half of `flatten`.
 
@@ -185,8 +190,10 @@ def develop_piece(
         wear=settings.wear,
     )
     return_memory_of(surface)
-    with hierarchy_in_background(surface) if settings.options.solver == "multilevel" else nullcontext():
-        development = task.shrink_to_rest(develop(surface, line))
+    has_levels = settings.options.solver == "multilevel" and not can_be_factored(surface)
+    with hierarchy_in_background(surface) if has_levels else nullcontext():
+        development = choose_start(surface, line) if start is None else given_start(surface, line, start)
+        development = task.shrink_to_rest(development)
         return_memory_of(surface)
         network = task.build_network(development.positions)
     return_memory_of(surface)

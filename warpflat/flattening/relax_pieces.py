@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
+from typing import Literal
 
 import numpy as np
 import warp as wp
@@ -33,11 +34,14 @@ from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of, is_coarsest
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
+from warpflat.solver.quasi_newton import quasi_newton_pays, relax_quasi_newton
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.connectivity import components_of
 from warpflat.surface.injective import overlap_area
 from warpflat.surface.mesh import Surface
+
+Scheme = Literal["quasi-newton", "multigrid", "gauss-newton", "steps"]
 
 __all__ = ["RelaxationTask", "RelaxedPiece", "keep_apart", "relax_pieces"]
 
@@ -129,7 +133,7 @@ class RelaxationTask:
 
         A harmonic map stores so much energy that cloth which is soft in shear would come to rest in folds of its threads.
         """
-        return development.method == "harmonic" and not self.fabric.is_isotropic
+        return development.method == "harmonic" and not development.as_rigid and not self.fabric.is_isotropic
 
     def max_direction_updates(self, *, mended: bool = False) -> int:
         """Return how many times directions are updated at most.
@@ -223,20 +227,22 @@ def relax_pieces(
         needs_isotropic_start: for each piece, whether it is first relaxed roughly as an isotropic sheet; none is if not given.
     """
     isotropic = needs_isotropic_start or [False] * len(tasks)
-    kinds: dict[tuple[bool, int, bool], list[int]] = {}
+    kinds: dict[tuple[Scheme, int, bool, int], list[int]] = {}
     for number, (task, network) in enumerate(zip(tasks, networks, strict=True)):
-        kind = _has_levels(task, network), direction_updates[number], isotropic[number]
-        kinds.setdefault(kind, []).append(number)
+        scheme = _scheme(task, network)
+        alone = number if scheme == "quasi-newton" else 0
+        kinds.setdefault((scheme, direction_updates[number], isotropic[number], alone), []).append(number)
     relaxed: dict[int, RelaxedPiece] = {}
-    for (levels, updates, isotropic_start), numbers in kinds.items():
+    for (scheme, updates, isotropic_start, _), numbers in kinds.items():
         batch = _Batch(
             [tasks[number] for number in numbers],
             [networks[number] for number in numbers],
             [starts[number] for number in numbers],
         )
-        results = batch.relax(levels=levels, direction_updates=updates, isotropic_start=isotropic_start)
-        for number in numbers:
-            tasks[number].notes += _plain_step_notes(tasks[number], networks[number], levels=levels)
+        results = batch.relax(scheme=scheme, direction_updates=updates, isotropic_start=isotropic_start)
+        if scheme == "steps":
+            for number in numbers:
+                tasks[number].notes += _plain_step_notes(tasks[number], networks[number])
         relaxed |= zip(numbers, results, strict=True)
     for number, task in enumerate(tasks):
         # The springs of earlier rounds are gone: only those that the pattern has count.
@@ -281,10 +287,9 @@ def keep_apart(
     return free, (relaxed,)
 
 
-def _plain_step_notes(task: RelaxationTask, network: SpringNetwork, *, levels: bool) -> list[str]:
+def _plain_step_notes(task: RelaxationTask, network: SpringNetwork) -> list[str]:
     """Return a note on a piece that is relaxed by plain steps though it is large enough for coarser levels."""
-    meant = task.options.solver == "multilevel" and not is_coarsest(network.surface)
-    if levels or not meant or gauss_newton_pays(network):
+    if task.options.solver == "plain" or is_coarsest(network.surface):
         return []
     cause = (
         "no coarser mesh is worth having" if multigrid_pays(network) else "the cloth is soft and the triangles are few"
@@ -292,8 +297,15 @@ def _plain_step_notes(task: RelaxationTask, network: SpringNetwork, *, levels: b
     return [f"relaxed by plain steps alone: {cause}"]
 
 
-def _has_levels(task: RelaxationTask, network: SpringNetwork) -> bool:
-    return task.options.solver == "multilevel" and multigrid_pays(network) and can_coarsen(network.surface)
+def _scheme(task: RelaxationTask, network: SpringNetwork) -> Scheme:
+    """Return how a piece is relaxed."""
+    if task.options.solver == "plain":
+        return "steps"
+    if quasi_newton_pays(network):
+        return "quasi-newton"
+    if multigrid_pays(network) and can_coarsen(network.surface):
+        return "multigrid"
+    return "gauss-newton" if gauss_newton_pays(network) else "steps"
 
 
 class _Batch:
@@ -316,11 +328,11 @@ class _Batch:
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, alignments=alignments)
 
-    def relax(self, *, levels: bool, direction_updates: int, isotropic_start: bool) -> list[RelaxedPiece]:
+    def relax(self, *, scheme: Scheme, direction_updates: int, isotropic_start: bool) -> list[RelaxedPiece]:
         """Relax the pieces in rounds, between which their directions are updated.
 
         Args:
-            levels: whether multigrid is used.
+            scheme: how they are relaxed.
             direction_updates: how many times directions are updated at most.
             isotropic_start: whether the pieces are relaxed roughly as isotropic sheets first.
         """
@@ -333,11 +345,11 @@ class _Batch:
             self._put(
                 [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
             )
-            self._update_directions(levels)
+            self._update_directions(scheme)
         for _ in range(direction_updates):
-            if self._update_directions(levels) <= _SETTLED_SHIFT:
+            if self._update_directions(scheme) <= _SETTLED_SHIFT:
                 break
-        outcome, state = replace(self._round(levels), seconds=time.perf_counter() - started), self._state
+        outcome, state = replace(self._round(scheme), seconds=time.perf_counter() - started), self._state
         layout, check = state.positions(), state.status
         for task in self._tasks:
             task.notes += [note for note in outcome.notes if note not in task.notes]
@@ -359,7 +371,7 @@ class _Batch:
             for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertex_ranges, strict=True))
         ]
 
-    def _update_directions(self, levels: bool) -> float:
+    def _update_directions(self, scheme: Scheme) -> float:
         """Relax the pieces roughly and measure directions there; return the largest mean shift of a piece as a share of its size."""
         state = self._state
         state.options = replace(
@@ -369,7 +381,7 @@ class _Batch:
         )
         state.least_strain = _ROUND_STRAIN
         before = state.positions()
-        self._round(levels, least_gain=_ROUND_GAIN)
+        self._round(scheme, least_gain=_ROUND_GAIN)
         layout = state.positions()
         self._put(
             [task.build_network(layout[own]) for task, own in zip(self._tasks, state.vertex_ranges, strict=True)],
@@ -379,12 +391,14 @@ class _Batch:
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
         return max(_moved(before[own], layout[own]) for own in state.vertex_ranges)
 
-    def _round(self, levels: bool, *, least_gain: float | None = None) -> Outcome:
+    def _round(self, scheme: Scheme, *, least_gain: float | None = None) -> Outcome:
         listens = any(task.callback is not None for task in self._tasks)
         each_step = self._each_step if listens else None
-        if not levels and self._options.solver == "multilevel" and gauss_newton_pays(self._state.network):
+        if scheme == "quasi-newton":
+            return relax_quasi_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
+        if scheme == "gauss-newton":
             return relax_gauss_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
-        if not levels:
+        if scheme == "steps":
             return relax(self._state, watch=self._watch, each_step=each_step)
         # After an edit the layout is near the minimum; only a grid comes nearer by nested iteration from its coarser levels.
         nested = self._state.steps == 0 and (

@@ -94,6 +94,11 @@ class Flattening:
         return self.stages[-1].converged
 
     @property
+    def start(self) -> str:
+        """What the piece was relaxed from, as text."""
+        return self.development.start
+
+    @property
     def flipped_faces(self) -> int:
         """Number of mirrored or collapsed faces."""
         return self._errors.flipped_faces
@@ -179,6 +184,7 @@ class Flattening:
             "model": self.network.model,
             "datum": self.datum_name,
             "development": self.development.method,
+            "start": self.start,
             "wear": wear_measures(
                 self.fit,
                 wear=self.wear,

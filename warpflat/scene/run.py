@@ -15,6 +15,7 @@ from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import (
     Scene,
     errors_named,
+    expand_variables,
     scene_fabric,
     scene_relax_options,
     scene_wear,
@@ -214,7 +215,12 @@ def _flatten(
 ) -> Flattening:
     from warpflat.flattening.flatten_piece import flatten
 
-    settings = scene.settings
+    settings, start = scene.settings, None
+    if settings.start is not None:
+        from warpflat.surface.io.read_layout import read_layout
+
+        with errors_named(f"{scene.where}: start"):
+            start = read_layout(scene.folder / expand_variables(settings.start))
     return flatten(
         surface,
         fabric=scene_fabric(scene),
@@ -222,6 +228,7 @@ def _flatten(
         grain_angle=settings.grain_angle,
         model=settings.model,
         wear=scene_wear(scene),
+        start=start,
         relax=relax,
         callback=callback,
         device=device or settings.device,

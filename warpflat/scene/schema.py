@@ -291,6 +291,8 @@ class SceneTable(Table):
     seams: list[SeamTable] = Field(default_factory=list)
     constraints: list[ConstraintTable] = Field(default_factory=list)
     datum: str | None = None
+    start: str | None = None
+    """An OBJ file of the same mesh, from whose texture coordinates the piece is relaxed."""
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
     model: Literal["springs", "membrane"] = "springs"
     wear: WearTable | None = None

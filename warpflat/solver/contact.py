@@ -4,25 +4,22 @@ The model energy is minimised together with a barrier between border vertices an
 Li et al. 2020, and Smith and Schaefer 2015): b(r) = -k (r - g)^2 ln(r / g) below a gap g, where r is their distance. The gap is
 g = d min(1, s / s0), s the way along the border on the body, so that the sides of a notch may meet at its tip.
 
-The minimiser is L-BFGS over one sparse factor of the springs' Laplacian (Liu et al. 2017), to which the stiffness of the contacts is
-added exactly by Woodbury's formula. A step is halved until the energy falls and the border is simple. The energy of the guard is
-infinite where a face is mirrored. Hence every layout on the way is injective, and the last one is certified.
+The minimiser is that of `warpflat.solver.quasi_newton`, to whose metric the stiffness of the contacts is added exactly by Woodbury's
+formula. A step is halved until the energy falls and the border is simple. The energy of the guard is infinite where a face is mirrored.
+Hence every layout on the way is injective, and the last one is certified.
 """
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array
-from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
-from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment, align_grain, remove_rotation
+from warpflat.solver.quasi_newton import Descent, Metric, Point, Solve
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
@@ -35,22 +32,12 @@ _FULL_GAP_WAY = 0.025
 _FULL_GAP_WAYS = 10.0
 # The sides of cracks must not cross, but may lie as close as this share of the gap.
 _CRACK_GAP = 0.02
-# Stiffness of the barrier, and of the spring that keeps the grain upright, in median stiffnesses of the springs.
-_BARRIER_STIFFNESS, _GRAIN_STIFFNESS = 1.0, 1e3
+# Stiffness of the barrier, in median stiffnesses of the springs.
+_BARRIER_STIFFNESS = 1.0
 # Near edges are looked for anew once the border has moved by so many gaps.
 _MARGIN = 4.0
-# Corrections that L-BFGS remembers; at most so many iterations.
-_MEMORY = 8
+# At most so many iterations.
 _MOST_ITERATIONS = 2_000
-# A piece is at rest when so many iterations together have released less than the energy tolerance allows, each,
-_REST_INTERVAL = 10
-# and when the next one could release at most this share of the energy, by the metric.
-_NEGLIGIBLE_RELEASE = 1e-5
-# The first step that is tried is longer than the last one taken by at most this factor.
-_LONGER = 4.0
-_LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
-# Stiffness added to hold the piece as a whole, over the mean of the diagonal.
-_REGULARISATION = 1e-7
 # Sides of closed cracks are drawn apart by this share of the way to the middle of the faces around each vertex; less where that folds.
 _OPENINGS = (1e-2, 1e-3, 1e-4)
 
@@ -170,72 +157,21 @@ def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, F
     return distance, t, away / np.maximum(distance, 1e-300)[:, None]
 
 
-class _Metric:
-    """The springs' Laplacian, factored once, plus rank-one stiffnesses of contacts."""
-
-    def __init__(self, network: SpringNetwork) -> None:
-        springs, n = network.spring_arrays, network.vertex_count
-        a, b = springs.ends.T
-        weight = coo_array((np.tile(springs.stiffness, 2), (np.append(a, b), np.append(b, a))), shape=(n, n)).tocsr()
-        laplacian = diags_array(np.asarray(weight.sum(axis=1)).ravel()) - weight
-        held = csc_array(laplacian + diags_array(np.full(n, _REGULARISATION * laplacian.diagonal().mean())))
-        self._factor = splu(held, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-        # The inverse's columns at vertices that have touched; most of the border never does.
-        self._column: dict[int, FloatArray] = {}
-        self._count = n
-
-    def _columns(self, vertices: IntArray) -> FloatArray:
-        new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
-        if new:
-            unit = np.zeros((self._count, len(new)))
-            unit[new, np.arange(len(new))] = 1.0
-            self._column |= zip(new, self._factor.solve(unit).T, strict=True)
-        return np.stack([self._column[vertex] for vertex in vertices.tolist()])
-
-    def solver(self, vertices: IntArray, lever: FloatArray) -> Callable[[FloatArray], FloatArray]:
-        """Return the solution by the Laplacian plus a row J^T J for each contact.
-
-        Args:
-            vertices: #C by 3.
-            lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
-        """
-        own, at = np.unique(vertices, return_inverse=True)
-        rows = np.zeros((2, len(vertices), len(own)))
-        number = np.repeat(np.arange(len(vertices)), 3)
-        for axis in range(2):
-            np.add.at(rows[axis], (number, at.ravel()), lever[:, :, axis].ravel())
-        columns = self._columns(own)
-        table = columns[:, own]
-        inner = np.eye(len(vertices)) + sum(row @ table @ row.T for row in rows)
-
-        def solve(force: FloatArray) -> FloatArray:
-            step = np.asarray(self._factor.solve(np.ascontiguousarray(force)))
-            pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
-            for axis in range(2):
-                step[:, axis] -= (rows[axis].T @ pull) @ columns
-            return step
-
-        return solve
-
-
 @dataclass(frozen=True, kw_only=True)
-class _Point:
-    """A layout (#V by 2 [m]), the energy there with contacts and grain [J], and the contacts."""
+class _Point(Point):
+    """A layout (#V by 2 [m]), the energy there with contacts [J], and the contacts."""
 
-    positions: FloatArray
-    energy: float
     touch: Contacts
 
 
 class _Problem:
-    """The energy that is minimised: cloth, barrier, and a spring that keeps the grain upright."""
+    """The energy that is minimised: cloth and barrier."""
 
     def __init__(self, state: Relaxation, grain: GrainAlignment, gap: float) -> None:
         self.state, self._grain = state, grain
         stiffness = float(np.median(state.network.spring_arrays.stiffness))
         self._barrier = Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
-        self._metric = _Metric(state.network)
-        self._upright = _GRAIN_STIFFNESS * stiffness
+        self._metric = Metric(state.network, [grain])
 
     def at(self, positions: FloatArray) -> _Point:
         """Evaluate a layout."""
@@ -243,31 +179,20 @@ class _Problem:
         energy = touch.energy
         if np.isfinite(energy):
             self.state.position.assign(positions)
-            energy += float(self.state.potentials().sum()) + 0.5 * self._upright * self._lean(positions) ** 2
+            energy += float(self.state.potentials().sum())
         return _Point(positions=positions, energy=energy, touch=touch)
-
-    def _lean(self, positions: FloatArray) -> float:
-        return float(positions[self._grain.upper, 0] - positions[self._grain.lower, 0])
 
     def gradient(self, point: _Point) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
         self.state.position.assign(point.positions)
         gradient, touch = -self.state.forces(), point.touch
-        lean = self._upright * self._lean(point.positions)
-        gradient[self._grain.upper, 0] += lean
-        gradient[self._grain.lower, 0] -= lean
         np.add.at(gradient, touch.vertices.ravel(), (touch.slope[:, None, None] * touch.lever).reshape(-1, 2))
         return gradient
 
-    def solver(self, point: _Point) -> Callable[[FloatArray], FloatArray]:
+    def solver(self, point: _Point) -> Solve:
         """Return the solution by the metric at a point."""
-        lower, upper, root = self._grain.lower, self._grain.upper, np.sqrt(self._upright)
         bend = np.sqrt(np.maximum(point.touch.bend, 0.0))
-        chord = np.array([[[root, 0.0], [-root, 0.0], [0.0, 0.0]]])
-        return self._metric.solver(
-            np.concatenate([[[upper, lower, lower]], point.touch.vertices]).astype(np.int32),
-            np.concatenate([chord, bend[:, None, None] * point.touch.lever]),
-        )
+        return self._metric.solver(point.touch.vertices, bend[:, None, None] * point.touch.lever)
 
     def residual(self, point: _Point) -> float:
         """Return the largest force on a vertex over the mean force of the springs."""
@@ -281,30 +206,6 @@ class _Problem:
         return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
 
 
-class _Memory:
-    """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4)."""
-
-    def __init__(self) -> None:
-        self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
-
-    def add(self, step: FloatArray, change: FloatArray) -> None:
-        """Remember a step and the change of the gradient along it, if the energy is convex there."""
-        curvature = float(np.vdot(step, change))
-        if curvature > 1e-12 * np.linalg.norm(step) * np.linalg.norm(change):
-            self._pairs = [*self._pairs, (step, change, 1.0 / curvature)][-_MEMORY:]
-
-    def direction(self, gradient: FloatArray, solve: Callable[[FloatArray], FloatArray]) -> FloatArray:
-        """Return the direction of descent."""
-        q, shares = gradient.copy(), []
-        for step, change, scale in reversed(self._pairs):
-            shares.append(scale * np.vdot(step, q))
-            q -= shares[-1] * change
-        z = solve(q)
-        for (step, change, scale), share in zip(self._pairs, reversed(shares), strict=True):
-            z += step * (share - scale * np.vdot(change, z))
-        return -z
-
-
 def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     """Minimise the energy of one piece with contact between stretches of its border.
 
@@ -315,68 +216,30 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     Returns:
         How it ended; the energies are those of the cloth alone. None if the start is not injective, in which case nothing is done.
     """
-    began, (grain,), tried = time.perf_counter(), state.alignments, 0
+    began, (grain,) = time.perf_counter(), state.alignments
     start = state.positions()
     align_grain([grain], start)
     problem = _Problem(state, grain, gap)
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return None
-    gradient, memory, history = problem.gradient(point), _Memory(), [point.energy]
-    at_rest, fresh, fraction = False, True, 1.0
+    descent, at_rest = Descent(problem, point), False
     most = min(_MOST_ITERATIONS, state.options.max_steps)
-    while not at_rest and len(history) <= most:
-        direction = memory.direction(gradient, problem.solver(point))
-        descent = float(np.vdot(gradient, direction))
-        # Where steps are short, the next one seldom is much longer.
-        new, fraction, count = _line_search(problem, point, direction, descent, min(1.0, _LONGER * fraction))
-        tried += count
-        if new is None:
-            if fresh:
-                break
-            memory, fresh, fraction = _Memory(), True, 1.0
-            continue
-        after = problem.gradient(new)
-        memory.add(new.positions - point.positions, after - gradient)
-        point, gradient, fresh = new, after, False
-        history.append(point.energy)
-        gain = history[-1 - _REST_INTERVAL] - point.energy if len(history) > _REST_INTERVAL else np.inf
-        at_rest = (
-            gain <= _REST_INTERVAL * state.options.energy_tolerance * point.energy
-            and -0.5 * descent <= _NEGLIGIBLE_RELEASE * point.energy
-        )
-    residual = problem.residual(point)
-    end = point.positions.copy()
+    while not at_rest and descent.iterations < most and descent.step():
+        at_rest = descent.is_at_rest(state.options)
+    residual = problem.residual(descent.point)
+    end = descent.point.positions.copy()
     align_grain([grain], end)
     state.position.assign(end)
-    change = abs(history[-2] - history[-1]) / max(history[-1], 1e-300) if len(history) > 1 else 0.0
-    state.steps += len(history) - 1
-    state.work_units += tried
+    state.steps += descent.iterations
+    state.work_units += descent.work_units
     return Outcome(
         converged=at_rest and is_injective(state.network.surface, end),
-        steps=len(history) - 1,
-        work_units=float(tried),
+        steps=descent.iterations,
+        work_units=descent.work_units,
         restarts=0,
-        energy_change=change,
+        energy_change=descent.change,
         residual=residual,
         energies=state.energies(),
         seconds=time.perf_counter() - began,
     )
-
-
-def _line_search(
-    problem: _Problem, point: _Point, direction: FloatArray, descent: float, fraction: float
-) -> tuple[_Point | None, float, int]:
-    """Halve a step from a fraction of it until the energy falls enough.
-
-    Returns:
-        Where it ends, if anywhere, the fraction taken, and how many layouts were tried.
-    """
-    tried = 0
-    while descent < 0.0 and fraction > _LEAST_FRACTION:
-        new = problem.at(point.positions + fraction * direction)
-        tried += 1
-        if new.energy <= point.energy + _ARMIJO * fraction * descent:
-            return new, fraction, tried
-        fraction *= 0.5
-    return None, fraction, tried

@@ -1,0 +1,87 @@
+"""L-BFGS over one factor: the minimum of the other schemes, no face mirrored, the chord upright, slivers, the same bits again."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from devices import DEVICE
+
+from warpflat.fabric.library import find_fabric
+from warpflat.flattening.flatten_piece import flatten
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.quasi_newton import Metric, relax_quasi_newton
+from warpflat.solver.relax import relax
+from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.laplacian import laplacian_of
+from warpflat.surface.mesh import Surface
+from warpflat.surface.repair.validate import make_surface
+from warpflat.surface.shapes import make_shape
+
+
+def pinched() -> Surface:
+    """A bodice, two columns of whose vertices nearly coincide: needles fifty times as long as wide."""
+    shape = make_shape("bodice", resolution=17, triangles=True)
+    place = shape.vertices.reshape(17, 17, 3).copy()
+    place[:, 5] += 0.95 * (place[:, 6] - place[:, 5])
+    return make_surface(place.reshape(-1, 3), shape.faces, lines=dict(shape.lines), name="pinched")
+
+
+def state_of(surface: Surface, fabric: str) -> Relaxation:
+    """As it is relaxed by `flatten`, at its start."""
+    piece = flatten(surface, fabric=fabric, datum="centre", device=DEVICE)
+    line = piece.datum
+    grain = GrainAlignment(lower=int(line[0]), upper=int(line[-1]), vertices=slice(0, piece.network.vertex_count))
+    return Relaxation(piece.network, RelaxOptions(), start=piece.development.positions, alignments=[grain])
+
+
+@pytest.mark.parametrize("fabric", ["isotropic", "denim"])
+def test_it_reaches_the_minimum_of_plain_steps_on_needles_in_a_few_iterations(fabric: str):
+    quick, plain = (state_of(pinched(), fabric) for _ in range(2))
+    seen: list[int] = []
+    outcome = relax_quasi_newton(quick, each_step=lambda state, energies, residual: seen.append(state.steps))
+    assert outcome.converged
+    assert seen == list(range(1, outcome.steps + 1))
+    assert outcome.steps <= 150
+    quick.evaluate_at_rest()
+    assert not quick.mirrored_pieces().any()
+    (grain,) = quick.alignments
+    chord = quick.positions()[[grain.lower, grain.upper]]
+    assert abs(chord[1, 0] - chord[0, 0]) < 1e-12
+    steps = relax(plain)
+    assert outcome.energies.potential <= 1.001 * steps.energies.potential
+    again = state_of(pinched(), fabric)
+    relax_quasi_newton(again)
+    np.testing.assert_array_equal(again.positions(), quick.positions())
+
+
+def test_the_laplacian_of_a_linear_field_is_zero_inside_and_its_energy_is_the_area():
+    shape = make_shape("dome", resolution=9, triangles=True)
+    flat = make_surface(np.column_stack([shape.vertices[:, :2], 0 * shape.vertices[:, 0]]), shape.faces, name="flat")
+    laplacian = laplacian_of(flat)
+    slope = laplacian.matrix @ flat.vertices[:, 0]
+    inside = np.ones((9, 9), dtype=bool)
+    inside[[0, -1]] = inside[:, [0, -1]] = False
+    assert np.abs(slope[inside.ravel()]).max() < 1e-12
+    assert flat.vertices[:, 0] @ slope == pytest.approx(0.25)
+    turned = flat.vertices[:, :2] @ [[0.6, 0.8], [-0.8, 0.6]]
+    np.testing.assert_allclose(laplacian.as_rigid_step(turned), turned, atol=1e-9)
+
+
+def test_contacts_and_the_chord_enter_the_metric_exactly():
+    surface = make_shape("dome", resolution=7, triangles=True)
+    network = SpringNetwork.build(surface, find_fabric("isotropic"), surface.vertices[:, :2], device=DEVICE)
+    metric = Metric(network, [GrainAlignment(lower=3, upper=45)])
+    random = np.random.default_rng(0)
+    vertices, lever = np.array([[0, 8, 9], [6, 12, 13]]), random.normal(scale=30.0, size=(2, 3, 2))
+    force = random.normal(size=(49, 2))
+    step = metric.solver(vertices, lever)(force)
+    assert abs(step[45, 0] - step[3, 0]) < 1e-12
+    left = force - 1000.0 * (laplacian_of(surface).matrix @ step)
+    for corners, row in zip(vertices, lever, strict=True):
+        left[corners] -= row * np.vdot(row, step[corners])
+    # What is left is the force that holds the chord, and the little that holds the piece as a whole.
+    assert left[45, 0] == pytest.approx(-left[3, 0], rel=1e-2)
+    left[[3, 45], 0] = 0.0
+    assert np.abs(left).max() < 1e-2

@@ -1,0 +1,124 @@
+"""The layout from which a piece is relaxed: its development, as-rigid iterations from there, or one's own."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.flattening.develop import (
+    Development,
+    close_cracks,
+    develop,
+    flat_layout,
+    geodesic_layout,
+    turn_upright,
+    winds_twice,
+)
+from warpflat.surface.cells import make_cells
+from warpflat.surface.injective import is_injective
+from warpflat.surface.laplacian import can_be_factored, laplacian_of
+from warpflat.surface.mesh import Surface
+
+__all__ = ["choose_start", "given_start"]
+
+# A cell of less than this share of its area counts as mirrored.
+_LEAST_AREA = 0.01
+# As-rigid iterations end with one that moves the piece by no more than this share of its size, or after so many.
+_SMALL_STEP = 1e-3
+_MOST_STEPS = 20
+
+
+def choose_start(surface: Surface, datum: IntArray) -> Development:
+    """Return the start of a piece: its development, or what as-rigid iterations make of it where a factor is cheap.
+
+    Draped meshes are developed by geodesic distances, which crush some faces, and are far from rest. A few as-rigid iterations unfold
+    these and are much nearer, for a factor that the relaxation needs as well. Grids of quads are near enough as they are developed.
+
+    Raises:
+        InputError: the surface is a closed tube.
+    """
+    if not can_be_factored(surface) or surface.is_quad.all() or flat_layout(surface, datum) is not None:
+        return develop(surface, datum)
+    first = _geodesic(surface, datum)
+    rigid = None if first is None else _as_rigid(surface, first)
+    if rigid is not None:
+        return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
+    development = develop(surface, datum)
+    rigid = _as_rigid(surface, development.positions)
+    if rigid is None:
+        return development
+    return replace(development, positions=turn_upright(rigid, datum), as_rigid=True, mended=True)
+
+
+def _geodesic(surface: Surface, datum: IntArray) -> FloatArray | None:
+    """Return the geodesic layout, with cracks closed where there are any; it may be folded."""
+    closed = close_cracks(surface, datum)
+    if closed is None:
+        return geodesic_layout(surface, datum)
+    whole, index = closed
+    positions = geodesic_layout(whole, index[datum])
+    return None if positions is None else positions[index]
+
+
+def _as_rigid(surface: Surface, positions: FloatArray) -> FloatArray | None:
+    """Return what as-rigid iterations make of a layout: none of its cells mirrored; None where that fails.
+
+    Once a layout is injective, they end before one that is not.
+    """
+    cells, laplacian = make_cells(surface), laplacian_of(surface)
+    size = float(np.linalg.norm(np.ptp(surface.vertices, axis=0)))
+    found, apart = None, False
+    for _ in range(_MOST_STEPS):
+        before, positions = positions, laplacian.as_rigid_step(positions)
+        if cells.least_shares(positions).min() > _LEAST_AREA:
+            lies_over_itself = not is_injective(surface, positions)
+            if apart and lies_over_itself:
+                break
+            found, apart = positions, not lies_over_itself
+        if np.sqrt(np.mean((positions - before) ** 2)) <= _SMALL_STEP * size:
+            break
+    return None if found is None or (not apart and winds_twice(surface, cells, found)) else found
+
+
+def given_start(surface: Surface, datum: IntArray, start: ArrayLike) -> Development:
+    """Return a layout of one's own as the start: turned over if it is mirrored as a whole, scaled to the surface's area, upright.
+
+    Args:
+        surface: one piece.
+        datum: vertex indices; its chord will point up.
+        start: #V by 2, or the vertices of the file by 2, in any unit.
+
+    Raises:
+        InputError: it is no such layout, or it mirrors some of the faces.
+    """
+    name = f"start of piece {surface.name!r}"
+    positions = np.asarray(start)
+    if positions.dtype.kind not in "iuf" or positions.ndim != 2 or positions.shape[1] != 2:
+        raise InputError(f"{name}: shape {positions.shape}; must be a row of two numbers for each vertex")
+    count, read = len(surface.vertices), len(surface.input_vertices)
+    if len(positions) not in (count, read):
+        raise InputError(f"{name}: {len(positions):,} rows; must be {count:,}, a row for each vertex")
+    positions = positions.astype(np.float64)
+    if len(positions) != count:
+        positions = positions[surface.input_index]
+    missing = np.flatnonzero(~np.isfinite(positions).all(axis=1))
+    if len(missing):
+        vertex = int(surface.input_index[missing[0]])
+        raise InputError(f"{name}: vertex {vertex} has no place in it; must be finite numbers")
+    cells = make_cells(surface)
+    shares = cells.least_shares(positions)
+    if np.median(shares) < 0.0:
+        positions = positions * [-1.0, 1.0]
+        shares = cells.least_shares(positions)
+    mirrored = int((shares <= 0.0).sum())
+    if mirrored:
+        raise InputError(f"{name}: mirrors {mirrored:,} of {len(shares):,} faces; must mirror none")
+    p = positions[cells.corner]
+    a, b = p[:, 1] - p[:, 0], p[:, 2] - p[:, 0]
+    flat = 0.5 * float(cells.weight @ (a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]))
+    positions = positions * np.sqrt(cells.area.sum() / flat)
+    return Development(positions=turn_upright(positions, datum), method="given", mended=True)

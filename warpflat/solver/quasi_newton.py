@@ -1,0 +1,321 @@
+"""Quasi-Newton relaxation: L-BFGS over one sparse factor (Liu et al. 2017), for meshes small enough to be factored.
+
+The metric is the Laplacian of the surface times the cloth's stiffness (`warpflat.surface.laplacian`): the same factor gives the
+as-rigid start. The memory of L-BFGS learns what the metric does not say, as the difference between shear and stretch. A step is halved
+until the energy falls; it is infinite where a face is mirrored, so that none ever is. The chord of the datum stays exactly upright.
+
+Contact (`warpflat.solver.contact`) adds its barrier to the energy and its stiffness to the metric, and takes the same steps.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Generic, Protocol, TypeVar
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.model.network import SpringNetwork
+from warpflat.solver.convergence import Outcome
+from warpflat.solver.grain_alignment import GrainAlignment, align_grain
+from warpflat.solver.options import RelaxOptions
+from warpflat.solver.relax import Watch
+from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.laplacian import can_be_factored, laplacian_of
+
+__all__ = ["Descent", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
+
+# Corrections that L-BFGS remembers.
+_MEMORY = 8
+# A piece is at rest when so many iterations together have released less than the energy tolerance allows, each,
+_REST_INTERVAL = 10
+# and when by the metric the next one could release at most this times the squared residual tolerance, as a share of the energy.
+_NEGLIGIBLE_RELEASE = 0.004
+# It is at rest, however large the force on a vertex of a sliver, if that is a smaller share still.
+_SMALLER = 0.3
+# The first step that is tried is longer than the last one taken by at most this factor.
+_LONGER = 4.0
+_LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
+# Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
+_WORK, _TRIAL_WORK = 3.0, 0.5
+
+Solve = Callable[[FloatArray], FloatArray]
+
+
+def quasi_newton_pays(network: SpringNetwork) -> bool:
+    """Return whether L-BFGS may be the fastest: for one piece of few vertices, nothing sewn, that is no grid of quads."""
+    surface = network.surface
+    return network.seams is None and can_be_factored(surface) and not bool(surface.is_quad.all())
+
+
+@dataclass(frozen=True, kw_only=True)
+class Point:
+    """A layout (#V by 2 [m]) and the energy there [J], infinite where it is not allowed."""
+
+    positions: FloatArray
+    energy: float
+
+
+P = TypeVar("P", bound=Point)
+
+
+class Problem(Protocol[P]):
+    """An energy of layouts, and a metric for its steps."""
+
+    def at(self, positions: FloatArray) -> P:
+        """Evaluate a layout."""
+
+    def gradient(self, point: P) -> FloatArray:
+        """Return the gradient of the energy, #V by 2 [N]."""
+
+    def solver(self, point: P) -> Solve:
+        """Return the solution by the metric at a point."""
+
+
+class Metric:
+    """The Laplacian of a piece times its stiffness, with the chord of the datum held upright, plus stiffnesses of rank one."""
+
+    def __init__(self, network: SpringNetwork, alignments: Sequence[GrainAlignment]) -> None:
+        fabric = network.fabric
+        self._stiffness = max(fabric.stiffness_warp, fabric.stiffness_weft)
+        self._laplacian = laplacian_of(network.surface)
+        self._chords = np.array([[each.upper, each.lower, each.lower] for each in alignments]).reshape(-1, 3)
+        # The inverse's columns at vertices that have touched; most of the border never does.
+        self._column: dict[int, FloatArray] = {}
+        self._count = network.vertex_count
+
+    def _columns(self, vertices: IntArray) -> FloatArray:
+        new = [vertex for vertex in vertices.tolist() if vertex not in self._column]
+        if new:
+            unit = np.zeros((self._count, len(new)))
+            unit[new, np.arange(len(new))] = 1.0 / self._stiffness
+            self._column |= zip(new, self._laplacian.solve(unit).T, strict=True)
+        return np.stack([self._column[vertex] for vertex in vertices.tolist()])
+
+    def solver(self, vertices: IntArray | None = None, lever: FloatArray | None = None) -> Solve:
+        """Return the solution by the metric plus a row J^T J for each contact; it does not move chords sideways.
+
+        Args:
+            vertices: #C by 3, of contacts, if any.
+            lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
+        """
+        chord = np.zeros((len(self._chords), 3, 2))
+        chord[:, :2, 0] = 1.0, -1.0
+        rigid = np.arange(len(chord))
+        vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
+        lever = chord if lever is None else np.concatenate([chord, lever])
+        if len(vertices) == 0:
+            return lambda force: self._laplacian.solve(force) / self._stiffness
+        own, at = np.unique(vertices, return_inverse=True)
+        rows = np.zeros((2, len(vertices), len(own)))
+        number = np.repeat(np.arange(len(vertices)), 3)
+        for axis in range(2):
+            np.add.at(rows[axis], (number, at.ravel()), lever[:, :, axis].ravel())
+        columns = self._columns(own)
+        table = columns[:, own]
+        # By Woodbury's formula; a chord is a row of infinite stiffness.
+        inner = np.eye(len(vertices))
+        inner[rigid, rigid] = 0.0
+        inner += sum(row @ table @ row.T for row in rows)
+
+        def solve(force: FloatArray) -> FloatArray:
+            step = self._laplacian.solve(force) / self._stiffness
+            pull = np.linalg.solve(inner, sum(rows[axis] @ step[own, axis] for axis in range(2)))
+            for axis in range(2):
+                step[:, axis] -= (rows[axis].T @ pull) @ columns
+            return step
+
+        return solve
+
+
+class _Memory:
+    """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4)."""
+
+    def __init__(self) -> None:
+        self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is remembered."""
+        return not self._pairs
+
+    def add(self, step: FloatArray, change: FloatArray) -> None:
+        """Remember a step and the change of the gradient along it, if the energy is convex there."""
+        curvature = float(np.vdot(step, change))
+        if curvature > 1e-12 * np.linalg.norm(step) * np.linalg.norm(change):
+            self._pairs = [*self._pairs, (step, change, 1.0 / curvature)][-_MEMORY:]
+
+    def direction(self, gradient: FloatArray, solve: Solve) -> FloatArray:
+        """Return the direction of descent."""
+        q, shares = gradient.copy(), []
+        for step, change, scale in reversed(self._pairs):
+            shares.append(scale * np.vdot(step, q))
+            q -= shares[-1] * change
+        z = solve(q)
+        for (step, change, scale), share in zip(self._pairs, reversed(shares), strict=True):
+            z += step * (share - scale * np.vdot(change, z))
+        return -z
+
+
+class Descent(Generic[P]):
+    """A running minimisation.
+
+    Attributes:
+        point: the present one.
+        history: the energies of all points so far [J].
+        tried: layouts that have been evaluated.
+        release: the energy that the last step could have released, by the metric [J].
+        is_stuck: whether no step makes the energy fall any more.
+    """
+
+    def __init__(self, problem: Problem[P], start: P) -> None:
+        self._problem = problem
+        self.point, self.history = start, [start.energy]
+        self._gradient, self._memory, self._fraction = problem.gradient(start), _Memory(), 1.0
+        self.tried, self.release, self.is_stuck = 1, np.inf, False
+
+    @property
+    def gain(self) -> float:
+        """The energy that the last few iterations have released together [J]; infinite if there were fewer."""
+        return self.history[-1 - _REST_INTERVAL] - self.history[-1] if len(self.history) > _REST_INTERVAL else np.inf
+
+    @property
+    def iterations(self) -> int:
+        """Steps taken."""
+        return len(self.history) - 1
+
+    @property
+    def work_units(self) -> float:
+        """All work, in approximate implicit steps."""
+        return _WORK * self.iterations + _TRIAL_WORK * self.tried
+
+    @property
+    def change(self) -> float:
+        """Eq. (11) for the last iteration."""
+        return (self.history[-2] - self.history[-1]) / max(self.history[-1], 1e-300) if len(self.history) > 1 else 0.0
+
+    def is_at_rest(self, options: RelaxOptions, share: float = 1.0) -> bool:
+        """Return whether the last iterations have released next to nothing, and the next could release no more than a share of that."""
+        return (
+            self.is_stuck or self.gain <= _REST_INTERVAL * options.energy_tolerance * self.point.energy
+        ) and self.release <= share * _NEGLIGIBLE_RELEASE * options.residual_tolerance**2 * self.point.energy
+
+    def step(self) -> bool:
+        """Take one step; return False, and stay, where none makes the energy fall."""
+        while True:
+            direction = self._memory.direction(self._gradient, self._problem.solver(self.point))
+            descent = float(np.vdot(self._gradient, direction))
+            self.release = -0.5 * descent
+            new = self._search(direction, descent)
+            if new is not None:
+                break
+            if self._memory.is_empty:
+                self.is_stuck = True
+                return False
+            self._memory, self._fraction = _Memory(), 1.0
+        gradient = self._problem.gradient(new)
+        self._memory.add(new.positions - self.point.positions, gradient - self._gradient)
+        self.point, self._gradient = new, gradient
+        self.history.append(new.energy)
+        return True
+
+    def _search(self, direction: FloatArray, descent: float) -> P | None:
+        """Halve a step until the energy falls enough. Where steps are short, the next one seldom is much longer."""
+        fraction = min(1.0, _LONGER * self._fraction)
+        while descent < 0.0 and fraction > _LEAST_FRACTION:
+            new = self._problem.at(self.point.positions + fraction * direction)
+            self.tried += 1
+            if new.energy <= self.point.energy + _ARMIJO * fraction * descent:
+                self._fraction = fraction
+                return new
+            fraction *= 0.5
+        return None
+
+
+class _Cloth:
+    """The energy of a network alone."""
+
+    def __init__(self, state: Relaxation) -> None:
+        self._state = state
+        self._solve = Metric(state.network, state.alignments).solver()
+
+    def at(self, positions: FloatArray) -> Point:
+        """Evaluate a layout."""
+        self._state.position.assign(positions)
+        return Point(positions=positions, energy=float(self._state.potentials().sum()))
+
+    def gradient(self, point: Point) -> FloatArray:
+        """Return the gradient of the energy, #V by 2 [N]."""
+        self._state.position.assign(point.positions)
+        return -self._state.forces()
+
+    def solver(self, point: Point) -> Solve:
+        """Return the solution by the metric, which is the same everywhere."""
+        return self._solve
+
+
+def relax_quasi_newton(
+    state: Relaxation,
+    *,
+    least_gain: float | None = None,
+    watch: Watch | None = None,
+    each_step: Watch | None = None,
+) -> Outcome:
+    """Minimise the energy of one piece until it is at rest, or the step limit is reached.
+
+    Args:
+        state: where to start, no cell mirrored; holds the relaxed layout afterwards.
+        least_gain: stop, at rest or not, once some iterations release no more than this share of the energy; if given.
+        watch: called every few iterations with the state, its energies and the residual.
+        each_step: called after every iteration, with the energies and the residual of the last check.
+    """
+    began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
+    if state.check_start().at_rest.all():
+        return state.make_outcome(steps_before, work_before, began_at=began_at)
+    start = state.positions()
+    align_grain(state.alignments, start)
+    problem = _Cloth(state)
+    point = problem.at(start)
+    if not np.isfinite(point.energy):
+        return state.make_outcome(steps_before, work_before, began_at=began_at)
+    descent, options = Descent(problem, point), state.options
+
+    done = False
+    while not done:
+        moved = descent.step()
+        state.steps += moved
+        state.work_units = work_before + descent.work_units
+        if moved and each_step is not None:
+            each_step(state, state.status.total, state.status.worst_residual)
+        near = descent.is_at_rest(options)
+        done = not moved or state.work_units - work_before >= options.max_steps
+        done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy
+        if done or near or descent.iterations % options.check_every == 0:
+            _check(state, descent, near)
+            done |= bool(state.status.at_rest.all())
+            if watch is not None:
+                watch(state, state.status.total, state.status.worst_residual)
+    return state.make_outcome(steps_before, work_before, began_at=began_at)
+
+
+def _check(state: Relaxation, descent: Descent[Point], near: bool) -> None:
+    """Check convergence at the present layout: near rest, by residual or by what could still be released, or free of strain."""
+    state.position.assign(descent.point.positions)
+    state.evaluate_at_rest()
+    status, options = state.check_convergence(1.0), state.options
+    residual = status.residual * _without_reaction(state)
+    small = residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
+    free = descent.point.energy <= state.negligible_energy
+    state.status = replace(status, residual=residual, at_rest=(near & small) | free, change=np.array([descent.change]))
+
+
+def _without_reaction(state: Relaxation) -> float:
+    """Return the largest force without that which keeps the chord upright, over the largest one without that which turns the piece."""
+    force, (largest,) = state.cloth_force(), state.piece_sums.largest_forces(state.alignments)
+    for each in state.alignments:
+        reaction = 0.5 * (force[each.upper, 0] - force[each.lower, 0])
+        force[each.upper, 0] -= reaction
+        force[each.lower, 0] += reaction
+    return float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))

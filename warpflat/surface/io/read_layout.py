@@ -1,0 +1,56 @@
+"""A layout read from the texture coordinates of an OBJ file."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+
+__all__ = ["read_layout"]
+
+_CORNER = re.compile(r"(-?\d+)/(-?\d+)")
+
+
+def read_layout(path: Path) -> FloatArray:
+    """Return the texture coordinates (`vt`) of the vertices of an OBJ file, #V by 2; not a number for those without.
+
+    Raises:
+        InputError: the file cannot be read, has no texture coordinates, or parts a vertex in the plane.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8", errors="replace").splitlines()
+    except OSError as error:
+        raise InputError(f"{path}: cannot be read as a start: {error.strerror}; must be an OBJ file") from None
+    places: list[list[float]] = []
+    of_vertex: dict[int, int] = {}
+    count = 0
+    for number, line in enumerate(lines, start=1):
+        key, _, rest = line.strip().partition(" ")
+        if key == "v":
+            count += 1
+        elif key == "vt":
+            try:
+                x, y = (float(word) for word in rest.split()[:2])
+            except ValueError:
+                raise InputError(f"{path}: line {number}: {line.strip()[:40]!r} is not 'vt x y'") from None
+            places.append([x, y])
+        elif key == "f":
+            for vertex, place in ((int(v), int(t)) for v, t in _CORNER.findall(rest)):
+                own = vertex - 1 if vertex > 0 else count + vertex
+                at = place - 1 if place > 0 else len(places) + place
+                if not (0 <= own < count and 0 <= at < len(places)):
+                    raise InputError(f"{path}: line {number}: corner {vertex}/{place} is not in the file")
+                before = of_vertex.setdefault(own, at)
+                if places[before] != places[at]:
+                    raise InputError(
+                        f"{path}: line {number}: vertex {own} has two texture coordinates; a start must not be cut"
+                    )
+    if not of_vertex:
+        raise InputError(f"{path}: has no texture coordinates; a start is read from 'vt x y' and faces 'f v/vt'")
+    layout = np.full((count, 2), np.nan)
+    layout[list(of_vertex)] = np.array(places)[list(of_vertex.values())]
+    return layout
