@@ -25,6 +25,9 @@ _LEAN = np.radians(9.0)
 _DROP, _SHOULDER_HEIGHT = 0.016, 0.075
 # Down to this far above the armpit the armhole is the body's own section.
 _SCOOP = 0.012
+# The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew; the elbow at this share
+# of the way from the shoulder point to the wrist.
+_SHORTEST_SLEEVE, _ELBOW = 0.070, 0.575
 _HARMONICS = 5
 _NOTCH = 0.22
 
@@ -293,42 +296,67 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
 
 
 def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
-    """Return biceps, elbow and wrist from planes across the arm."""
+    """Return biceps, elbow and wrist from planes across the arm's own centre line, which a bent elbow turns."""
     points, triangles = slicer.vertices, slicer.triangles
     middle = hole.mean(axis=0)
     normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
     limb = _beyond(points, triangles, normal, float(middle @ normal) + 0.004, middle)
-    reach = np.linalg.norm(limb - middle, axis=1)
-    hand = limb[int(np.argmax(reach))]
-    axis = (hand - middle) / reach.max()
-    if reach.max() < 0.2 * points[:, 1].max():
-        raise InputError(f"scan: the {side} arm is only {reach.max():.2f} m long; its mesh is broken")
-    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
-    up /= np.linalg.norm(up)
-    ahead = np.cross(axis, up)
-    ahead *= np.sign(ahead[2])
+    away = np.linalg.norm(limb - middle, axis=1)
+    hand, reach = limb[int(np.argmax(away))], float(away.max())
+    if reach < 0.2 * points[:, 1].max():
+        raise InputError(f"scan: the {side} arm is only {reach:.2f} m long; its mesh is broken")
+    axis = (hand - middle) / reach
 
-    def ring(share: float) -> FloatArray:
-        parts = [p for p in slicer.cut(axis, float(middle @ axis) + share * reach.max()) if len(p.points) > 6]
-        # The arm may be bent, so its section lies anywhere near the axis; the trunk's and the legs' lie further off.
-        centre = middle + share * reach.max() * axis
-        near = [p for p in parts if np.linalg.norm(p.points.mean(axis=0) - centre) < 0.30 * reach.max()
+    def section(at: FloatArray, across: FloatArray) -> FloatArray:
+        # The arm may be bent, so its section lies anywhere near; the trunk's and the legs' lie further off.
+        near = [p for p in slicer.cut(across, float(at @ across))
+                if len(p.points) > 6 and np.linalg.norm(p.points.mean(axis=0) - at) < 0.30 * reach
                 and sign * p.points[:, 0].mean() > sign * middle[0]]  # fmt: skip
         if not near:
-            raise InputError(f"scan: the {side} arm has no section {share:.0%} along it; its mesh is broken there")
-        part = max(near, key=lambda p: p.length)
-        return _loop(part.points, part.points.mean(axis=0), -up, ahead, 4, 240)
+            raise InputError(f"scan: the {side} arm has no section at {at[1]:.2f} m; its mesh is broken there")
+        return max(near, key=lambda p: p.length).points
 
-    shares = np.linspace(0.60, 0.84, 25)
-    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in shares])
+    shares = np.linspace(0.14, 0.86, 37)
+    line, way = _centre_line(section, middle, reach * axis, shares)
+
+    def ring(share: float) -> FloatArray:
+        at, across = (np.array([np.interp(share, shares, values[:, k]) for k in range(3)]) for values in (line, way))
+        across /= np.linalg.norm(across)
+        up = np.array([0.0, 1.0, 0.0]) - across * across[1]
+        up /= np.linalg.norm(up)
+        ahead = np.cross(across, up)
+        cut = section(at, across)
+        return _loop(cut, cut.mean(axis=0), -up, np.sign(ahead[2]) * ahead, 4, 240)
+
+    low = np.linspace(0.60, 0.84, 25)
+    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in low])
     # Where the scan's hand is missing, the arm's torn end gives sections of half its girth and less.
     whole = np.flatnonzero(girths > 0.6 * np.median(girths[:9]))
-    wrist = float(shares[whole[int(np.argmin(girths[whole]))]])
-    under = float((hole[0] - middle) @ axis) / reach.max()
-    tip = float((hole[int(np.argmax(hole[:, 1]))] - middle) @ axis) / reach.max()
-    clear = 0.032 / float(reach.max())
-    biceps = float(np.clip(max(under, tip) + clear, 0.10, 0.40 * wrist + 0.05))
-    return ArmCurves(biceps=ring(biceps), elbow=ring(biceps + 0.44 * (wrist - biceps)), wrist=ring(wrist))
+    wrist = float(low[whole[int(np.argmin(girths[whole]))]])
+    under, tip = (float((p - middle) @ axis) / reach for p in (hole[0], hole[int(np.argmax(hole[:, 1]))]))
+    elbow = tip + _ELBOW * (wrist - tip)
+    biceps = float(np.clip(max(under, tip) + _SHORTEST_SLEEVE / reach, 0.10, elbow - 0.10))
+    return ArmCurves(biceps=ring(biceps), elbow=ring(elbow), wrist=ring(wrist))
+
+
+def _centre_line(
+    section: Callable[[FloatArray, FloatArray], FloatArray], start: FloatArray, to_hand: FloatArray, shares: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of an arm's sections at `shares` of the way to the hand and the unit directions of their line."""
+    from scipy.ndimage import gaussian_filter1d
+
+    axis = to_hand / np.linalg.norm(to_hand)
+    line = start + shares[:, None] * to_hand
+    for i, at in enumerate(line.copy()):
+        try:
+            cut = section(at, axis)
+        except InputError:
+            continue
+        line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
+    way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
+    # Next to the armhole sections still hold a part of the shoulder.
+    way[:4] = way[4]
+    return line, way / np.linalg.norm(way, axis=1, keepdims=True)
 
 
 def _beyond(
