@@ -93,7 +93,7 @@ def main() -> None:
         print(name)
         for form in given.forms:
             made = body.form(form)
-            inside = 1000.0 * depth_inside(made.vertices, body.vertices, body.layout)
+            inside = 1000.0 * depth_inside(made, body)
             garment = flatten_form(body, made, fabric=FORMS.get(form, "woven"))
             drawn.append((name, garment))
             print(*measure(garment), f"  {form:11} inside the body {inside:.1f} mm", sep="\n", flush=True)

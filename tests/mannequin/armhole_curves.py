@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.mannequin.closest import Closest
-from warpflat.mannequin.layout import Layout
+from warpflat.mannequin.forms import FormResult
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.normals import vertex_normals
 
 
 def _turning(curve: np.ndarray, step: float) -> np.ndarray:
@@ -51,19 +53,16 @@ def corner_degrees(flat: np.ndarray, armhole: np.ndarray, side: np.ndarray) -> f
     return float(np.degrees(np.arccos(a @ b / np.linalg.norm(a) / np.linalg.norm(b))))
 
 
-def depth_inside(form: np.ndarray, body: np.ndarray, layout: Layout) -> float:
-    """How far the deepest vertex of a form lies inside the body [m], trunk and arms alike."""
-    triangles = np.concatenate([layout.faces[:, :3], layout.faces[:, [0, 2, 3]]]).astype(np.int64)
-    corner = body[triangles]
-    face = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
-    normal = np.zeros_like(body)
-    for k in range(3):
-        np.add.at(normal, triangles[:, k], face)
-    moved = np.unique(layout.faces[(np.abs(form - body).max(axis=1) > 1e-9)[layout.faces].any(axis=1)])
+def depth_inside(form: FormResult, body: Mannequin) -> float:
+    """How far the deepest vertex of a form's pieces lies inside the body [m], trunk and arms alike."""
+    vertices, layout = body.vertices, body.layout
+    used = np.unique(np.concatenate([piece.grid_vertices for piece in form.pieces.values()]))
+    moved = used[np.abs(form.vertices - vertices)[used].max(axis=1) > 1e-9]
     if not len(moved):
         return 0.0
-    triangle, weights, away = Closest(body, triangles)(form[moved])
-    place = np.einsum("nk,nkd->nd", weights, corner[triangle])
-    outward = np.einsum("nk,nkd->nd", weights, normal[triangles[triangle]])
-    inside = ((form[moved] - place) * outward).sum(axis=1) < 0.0
+    triangles = np.concatenate([layout.faces[:, :3], layout.faces[:, [0, 2, 3]]]).astype(np.int64)
+    triangle, weights, away = Closest(vertices, triangles)(form.vertices[moved])
+    place = np.einsum("nk,nkd->nd", weights, vertices[triangles[triangle]])
+    outward = np.einsum("nk,nkd->nd", weights, vertex_normals(vertices, layout.faces)[triangles[triangle]])
+    inside = ((form.vertices[moved] - place) * outward).sum(axis=1) < 0.0
     return float(np.where(inside, away, 0.0).max())

@@ -243,9 +243,12 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
     middle = np.vstack([front, back]).mean(axis=0)
     tip, under = front[0], front[-1]
-    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), 0.06])
+    # The chest is narrower than the back, so that the armhole looks a little forward; the arm leaves square to it.
+    across = quarters["front-left"].chest[-1] - quarters["back-left"].chest[-1]
+    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), -np.sin(_ARM_ANGLE) * across[0] / across[2]])
     axis /= np.linalg.norm(axis)
-    up = np.array([np.cos(_ARM_ANGLE), np.sin(_ARM_ANGLE), 0.0])
+    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
+    up /= np.linalg.norm(up)
     ahead = np.cross(axis, up)
     ahead *= np.sign(ahead[2])
     start = float((tip - middle) @ axis)
