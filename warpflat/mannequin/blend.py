@@ -247,7 +247,7 @@ def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntA
         the vertices of both armholes, or None where the trunk's sides do not move outward.
     """
     normals = vertex_normals(body, layout.faces)
-    bust, reach = layout.rings[layout.level_row["bust"]], layout.columns[3] + 2
+    bust, reach = layout.rings[layout.level_row["bust"]], layout.columns[3] + len(layout.front) // 2
     at = np.arange(-reach, reach + 1)
     near = np.cos(0.5 * np.pi * at / (reach + 1)) ** 2
     loops = []

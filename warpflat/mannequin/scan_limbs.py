@@ -235,9 +235,11 @@ def _armhole(slicer: Slicer, t: TrunkSections, side: str, under: FloatArray) -> 
         across, down = np.array([0.0, 0.0, end[2] - under[2]]), (level - under[1]) / up[1] * up
         points.append(under + 0.001 * normal + np.sin(turn) * across + (1.0 - np.cos(turn)) * down)
     hole = _loop(np.concatenate(points), under, -up, np.array([0.0, 0.0, 1.0]), _HARMONICS, below=under)
-    # Few harmonics round the curve off below the underarm point.
-    depth = (hole[:, 1].max() - hole[:, 1]) / np.ptp(hole[:, 1])
-    return np.asarray(hole + depth[:, None] ** 2 * (under - hole[0]))
+    # Few harmonics round the curve off below the underarm point, and tilt it there where that lies off the middle.
+    depth = ((hole[:, 1].max() - hole[:, 1]) / np.ptp(hole[:, 1]))[:, None] ** 2
+    way = hole[1] - hole[-1]
+    level = (hole[:, 2:] - hole[0, 2]) * (way @ up / way[2])
+    return np.asarray(hole + depth * (under - hole[0] - level * up))
 
 
 def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:

@@ -168,9 +168,12 @@ def _armhole(notch: FloatArray, other: FloatArray, under: FloatArray, tip: Float
     """
     from scipy.interpolate import CubicSpline
 
+    middle = 0.5 * (abs(notch[2] - under[2]) + abs(other[2] - under[2]))
+
     def scoop(point: FloatArray) -> FloatArray:
         at = 0.62 * point + 0.38 * under
-        at[1] = under[1] + 0.24 * (point[1] - under[1])
+        # On a parabola about the underarm point, wherever it lies between the notches: level there.
+        at[1] = under[1] + 0.24 * ((point[2] - under[2]) / middle) ** 2 * (point[1] - under[1])
         return at
 
     def brow(point: FloatArray) -> FloatArray:
