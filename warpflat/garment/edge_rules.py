@@ -13,7 +13,7 @@ __all__ = ["HEMMED_LEVELS", "EdgeRules", "find_unused_name"]
 
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
 #: skirt, a band or a facing.
-HEMMED_LEVELS = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "wrist")
+HEMMED_LEVELS = ("abdomen", "hip", "thigh", "knee", "calf", "ankle", "biceps", "elbow", "forearm", "wrist")
 
 
 @dataclass(frozen=True, kw_only=True)

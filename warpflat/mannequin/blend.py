@@ -6,17 +6,23 @@ import itertools
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
+from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
 __all__ = ["Adjustment", "adjusted_vertices", "blend_forms"]
+
+# A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
+_LEAST_MITRE = 0.5
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -199,9 +205,6 @@ def _hull_reach(points: FloatArray, starts: FloatArray, rays: FloatArray) -> Flo
 
 def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjustment | None) -> None:
     """Move chest and shoulders with the bust's rows; neckline and shoulder seams stay."""
-    from scipy import sparse
-    from scipy.sparse.linalg import spsolve
-
     bust = layout.level_row["bust"]
     ids, laplacian, local = sheet_laplacian(layout, bust - 3)
     move = out - body
@@ -216,11 +219,61 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjust
             normals = _row_normals(body[row])
             move[row] = distance * normals + (chest.scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
+    _solve_moves(move, ids, laplacian, held)
+    loops = _mitre_underarms(move, layout, body)
+    if loops is not None:
+        held[local[loops]] = True
+        _solve_moves(move, ids, laplacian, held)
+    out[ids] = body[ids] + move[ids]
+    out[layout.rings[: bust + 1]] = (body + move)[layout.rings[: bust + 1]]
+
+
+def _solve_moves(move: FloatArray, ids: IntArray, laplacian: Any, held: NDArray[np.bool_]) -> None:
+    """Set the displacements of the sheet's vertices that are not held to the smoothest ones between those that are."""
+    from scipy import sparse
+    from scipy.sparse.linalg import spsolve
+
     operator = laplacian[~held]
     unknown, known = operator[:, np.flatnonzero(~held)], operator[:, np.flatnonzero(held)]
     right = -(known @ move[ids[held]])
     solved = spsolve((unknown.T @ unknown + 1e-12 * sparse.identity(unknown.shape[1])).tocsc(), unknown.T @ right)
-    out[ids[~held]] = body[ids[~held]] + np.asarray(solved).reshape(-1, 3)
+    move[ids[~held]] = np.asarray(solved).reshape(-1, 3)
+
+
+def _mitre_underarms(move: FloatArray, layout: Layout, body: FloatArray) -> IntArray | None:
+    """Move the armholes' lower ends along the bisector of the fold under the arm, off trunk and arm alike: out and down.
+
+    Returns:
+        the vertices of both armholes, or None where the trunk's sides do not move outward.
+    """
+    normals = vertex_normals(body, layout.faces)
+    bust, reach = layout.rings[layout.level_row["bust"]], layout.columns[3] + len(layout.front) // 2
+    at = np.arange(-reach, reach + 1)
+    near = np.cos(0.5 * np.pi * at / (reach + 1)) ** 2
+    loops = []
+    for side, column in (("left", layout.quarter), ("right", 3 * layout.quarter)):
+        beside, loop = bust[column], layout.arms[side][0]
+        out = float(move[beside] @ (normals[beside] * [1.0, 0.0, 1.0]))
+        if out <= 0.0:
+            return None
+        bisector = normals[loop[0]]
+        wished = out / max(float(bisector @ normals[beside]), _LEAST_MITRE) * bisector
+        more = wished - move[loop[0]]
+        move[loop[at % len(loop)]] += near[:, None] * more
+        _lower_sides(move, layout, column, float(more[1]))
+        loops.append(loop)
+    return np.concatenate(loops)
+
+
+def _lower_sides(move: FloatArray, layout: Layout, column: int, lower: float) -> None:
+    """Lower the rows from the underbust to the bust at a side, so that they share the height below a lowered underarm."""
+    first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
+    reach, count = layout.quarter - layout.to_princess, layout.rings.shape[1]
+    at = np.arange(-reach + 1, reach)
+    near = 1.0 - np.abs(at) / reach
+    share = (np.arange(first, bust + 1) - first)[:, None] / (chest - first)
+    ids = layout.rings[first : bust + 1, (column + at) % count]
+    move[ids, 1] += lower * share * near * near * (3.0 - 2.0 * near)
 
 
 def _row_normals(row: FloatArray) -> FloatArray:

@@ -32,6 +32,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
     vertices = np.full((layout.vertex_count, 3), np.nan)
     _set_rings(vertices, layout, blueprint)
     _set_bounds(vertices, layout, blueprint)
+    _set_sides(vertices, layout)
     _set_arms(vertices, layout, blueprint)
     _set_neck(vertices, layout, blueprint)
     _set_sheet(vertices, layout, blueprint)
@@ -85,6 +86,32 @@ def _set_rings(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
             share = (row - first) / (last - first)
             height = (1.0 - share) * blueprint.heights[low] + share * blueprint.heights[high]
             vertices[layout.rings[row]] = girth_ring(layout, blueprint.profile(height), height)
+    _dip_sides(vertices, layout, blueprint)
+
+
+def _dip_sides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:
+    """Lower the rows from the underbust to the bust at the sides, so that all rows up to the underarm share its height.
+
+    A bust lies level with the armpits on many bodies, and the armhole ends below them. A tape still reads each row's girth.
+    """
+    first, bust, chest = (layout.level_row[level] for level in ("underbust", "bust", "chest"))
+    base = vertices[layout.rings[: bust + 1]].copy()
+    heights = base[:, 0, 1]
+    quarter, count = layout.quarter, layout.rings.shape[1]
+    reach = quarter - layout.to_princess
+    for side, name in ((quarter, "front-left"), (3 * quarter, "front-right")):
+        under = float(blueprint.quarters[name].armhole[-1, 1])
+        for row in range(first + 1, bust + 1):
+            even = heights[first] + (under - heights[first]) * (row - first) / (chest - first)
+            dip = max(0.0, heights[row] - even)
+            for column in range(side - reach + 1, side + reach):
+                near = 1.0 - abs(column - side) / reach
+                height = heights[row] - near * near * (3.0 - 2.0 * near) * dip
+                line = base[:, column % count]
+                vertices[layout.rings[row, column % count]] = [np.interp(height, heights, line[:, k]) for k in range(3)]
+    for row in range(first + 1, bust + 1):
+        ring = layout.rings[row]
+        vertices[ring] = scale_to_girth(vertices[ring], convex_girth(base[row]))
 
 
 def _pieces(curve: FloatArray, knots: list[float], counts: list[int]) -> FloatArray:
@@ -134,6 +161,18 @@ def _set_bounds(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> N
         vertices[shoulder] = seam + follow
         yoke = c.notch * _yoke_share(c)
         vertices[armhole] = _pieces(c.armhole, [0.0, yoke, c.notch, 1.0], [m3, m2, n3])
+
+
+def _set_sides(vertices: FloatArray, layout: Layout) -> None:
+    """Set the side lines from the bust to the underarm points: straight on from the rows below, without a kink."""
+    bust, chest = layout.level_row["bust"], layout.level_row["chest"]
+    for column in (layout.quarter, 3 * layout.quarter):
+        ids = layout.rings[bust : chest + 1, column]
+        start, end = vertices[ids[0]], vertices[ids[-1]]
+        way = start - vertices[layout.rings[bust - 3, column]]
+        corner = start + 0.5 * np.linalg.norm(end - start) / np.linalg.norm(way) * way
+        t = np.linspace(0.0, 1.0, len(ids))[1:-1, None]
+        vertices[ids[1:-1]] = (1.0 - t) ** 2 * start + 2.0 * t * (1.0 - t) * corner + t**2 * end
 
 
 def _to_length(loop: FloatArray, length: float) -> FloatArray:

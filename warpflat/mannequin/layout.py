@@ -22,7 +22,7 @@ __all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 
 #: Closed horizontal levels, bottom up.
 RING_LEVELS = ("ankle", "knee", "thigh", "hip", "abdomen", "waist", "underbust", "bust")
-ARM_LEVELS = ("armhole", "biceps", "elbow", "wrist")
+ARM_LEVELS = ("armhole", "biceps", "elbow", "forearm", "wrist")
 #: In the order in which a ring runs: from centre front over the body's left to the back.
 QUARTERS = ("front-left", "back-left", "back-right", "front-right")
 
@@ -30,7 +30,7 @@ QUARTERS = ("front-left", "back-left", "back-right", "front-right")
 _COLUMN_LENGTHS = (0.045, 0.045, 0.065, 0.065)
 _RING_GAPS = (0.33, 0.25, 0.10, 0.10, 0.075, 0.10, 0.07)
 _CHEST_GAP, _YOKE_GAP, _SHOULDER_GAP, _COLLAR_GAP = 0.055, 0.100, 0.045, 0.045
-_ARM_GAPS = (0.10, 0.16, 0.25)
+_ARM_GAPS = (0.10, 0.16, 0.12, 0.13)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

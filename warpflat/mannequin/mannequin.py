@@ -175,7 +175,8 @@ class Mannequin:
         for name in reversed(RING_LEVELS):
             points = self.line(name)[:-1]
             found[name] = Level(
-                height=float(points[:, 1].mean()),
+                # In front and behind: under the arms the rows dip towards the armholes.
+                height=float(points[0, 1]),
                 girth=convex_girth(points),
                 # Below the hip a section is of two legs, and a skirt's profile goes around both.
                 section=self.sections.get(name) if name in _TRUNK_LEVELS else None,

@@ -17,7 +17,7 @@ from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.scan_checks import check_girths
 from warpflat.mannequin.scan_legs import plumb_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
-from warpflat.mannequin.scan_limbs import neck_and_arms
+from warpflat.mannequin.scan_limbs import neck_and_arms, underarm_point
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
 from warpflat.mannequin.table_body import PRINCESS
 
@@ -26,6 +26,8 @@ __all__ = ["ScanFound", "blueprint_from_scan"]
 # Smoothing of the sampled hulls: up the body [rows] and around it [harmonics kept].
 _UP_SIGMA = 1.5
 _HARMONICS = 28
+# Beyond planes that lean so far outward from the armpits up, the scan is arm.
+_ARM_LEAN = np.radians(11.0)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,8 +64,9 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     levels, more = find_levels(trunk, options.landmarks)
     check_girths(trunk, levels)
     plumb, apart = plumb_legs(slicer, trunk, levels["hip"])
-    profile = _profiles(plumb, levels)
-    quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile)
+    underarms = {side: underarm_point(slicer, trunk, side, levels["underbust"]) for side in ("left", "right")}
+    profile = _profiles(plumb, levels, underarms)
+    quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile, underarms)
     blueprint = Blueprint(
         profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
         neck=neck, collar=collar, attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
@@ -102,7 +105,9 @@ def _ray_radii(hull: FloatArray, middle: FloatArray, count: int, height: float) 
     return np.where(safe, top / np.where(safe, bottom, 1.0), np.linalg.norm(a, axis=1))
 
 
-def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float], Profile]:
+def _profiles(
+    t: TrunkSections, levels: Mapping[str, float], underarms: Mapping[str, FloatArray]
+) -> Callable[[float], Profile]:
     from scipy.ndimage import gaussian_filter1d
 
     rows = np.flatnonzero(t.y < levels["armpit"] - 0.002)
@@ -120,9 +125,9 @@ def _profiles(t: TrunkSections, levels: Mapping[str, float]) -> Callable[[float]
     y, girth = t.y[rows], t.girth[rows]
     # A side seam hangs nearly plumb: midway between front and back, whose waves it does not follow.
     side_z = gaussian_filter1d(middle_z, 14.0, mode="nearest")
-    under = 0.5 * (t.armpits["left"][2] + t.armpits["right"][2])
-    near = np.clip((y - levels["waist"]) / (levels["armpit"] - levels["waist"]), 0.0, 1.0) ** 2
-    side_z = (1.0 - near) * side_z + near * under
+    _, under_y, under_z = 0.5 * (underarms["left"] + underarms["right"])
+    near = np.clip((y - levels["waist"]) / (under_y - levels["waist"]), 0.0, 1.0) ** 2
+    side_z = (1.0 - near) * side_z + near * under_z
     rays = np.arange(count) * 2.0 * np.pi / count
     outward = np.column_stack([np.sin(rays), np.cos(rays)])
     bust_girth = float(np.interp(levels["bust"], y, girth))
@@ -186,7 +191,11 @@ def _attractor(
 
     points, triangles = slicer.vertices, slicer.triangles
     upper = points[triangles][:, :, 1].mean(axis=1) > 0.6 * points[:, 1].max()
-    closest = Closest(points, triangles[upper])
+    # The arms are no part of chest and shoulders: what lies beyond planes that lean outward from the armpits.
+    middle = points[triangles].mean(axis=1)
+    height, half = min((y, abs(x)) for y, x, _ in armpits.values())
+    inside = np.abs(middle[:, 0]) < half + np.tan(_ARM_LEAN) * np.maximum(middle[:, 1] - height, 0.0) + 0.004
+    closest = Closest(points, triangles[upper & inside])
     reach = 0.95 * min(abs(a[1]) for a in armpits.values())
     x = np.linspace(-reach, reach, 61)
     y = np.linspace(levels["bust"] - 0.02, levels["front_neck"], 24)

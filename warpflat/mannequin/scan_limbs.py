@@ -16,16 +16,28 @@ from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
 from warpflat.surface.connectivity import join_labels
 
-__all__ = ["neck_and_arms"]
+__all__ = ["neck_and_arms", "underarm_point"]
 
 #: How far the armhole's plane leans outward from the armpit up.
 _LEAN = np.radians(9.0)
+# How far below the armpit the armhole ends, and how far outside the armpit it passes at the shoulder's height above it,
+# as shares of the stature.
+_DROP, _SHOULDER_HEIGHT = 0.016, 0.075
+# Down to this far above the armpit the armhole is the body's own section.
+_SCOOP = 0.012
+# The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew; the elbow at this share
+# of the way from the shoulder point to the wrist.
+_SHORTEST_SLEEVE, _ELBOW = 0.070, 0.575
 _HARMONICS = 5
 _NOTCH = 0.22
 
 
 def neck_and_arms(
-    slicer: Slicer, trunk: TrunkSections, levels: Mapping[str, float], profile: Callable[[float], Profile]
+    slicer: Slicer,
+    trunk: TrunkSections,
+    levels: Mapping[str, float],
+    profile: Callable[[float], Profile],
+    underarms: Mapping[str, FloatArray],
 ) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray]:
     """Return the curves above the bust.
 
@@ -34,6 +46,7 @@ def neck_and_arms(
         trunk: its horizontal sections.
         levels: heights [m] of the levels and landmarks.
         profile: the trunk's profile at a height [m].
+        underarms: the left and the right armhole's lowest point (see :func:`underarm_point`).
 
     Returns:
         the quarters' curves, the arms' curves, the neck base's length [m], and the collar's curve (#P by 3 [m]).
@@ -52,7 +65,7 @@ def neck_and_arms(
         around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
         end = back if sign > 0 else len(neckline) - back
         corner = int(np.argmax(sign * around[: end + 1, 0]))
-        hole = _armhole(slicer, trunk, side, sign)
+        hole = _armhole(slicer, trunk, side, underarms[side])
         tip = int(np.argmax(hole[:, 1]))
         arms[side] = _arm(slicer, hole, sign, side)
         # The loop runs from the underarm forward: its first half is the front.
@@ -76,14 +89,25 @@ def neck_and_arms(
 
 
 def _loop(
-    points: FloatArray, origin: FloatArray, first: FloatArray, second: FloatArray, harmonics: int, count: int = 360
+    points: FloatArray,
+    origin: FloatArray,
+    first: FloatArray,
+    second: FloatArray,
+    harmonics: int,
+    count: int = 360,
+    below: FloatArray | None = None,
 ) -> FloatArray:
-    """Return a smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3."""
+    """Return a smooth closed curve around plane points: their hull, from direction `first` over `second`, #count by 3.
+
+    The curve starts at the point `below` if that is given.
+    """
     from scipy.spatial import ConvexHull
 
     flat = np.column_stack([(points - origin) @ first, (points - origin) @ second])
     hull = flat[ConvexHull(flat).vertices]
     middle = 0.5 * (hull.min(axis=0) + hull.max(axis=0))
+    if below is not None:
+        middle[1] = (below - origin) @ second
     corners = hull - middle
     angle = np.arctan2(corners[:, 1], corners[:, 0]) % (2.0 * np.pi)
     order = np.argsort(angle)
@@ -130,21 +154,92 @@ def _neck(slicer: Slicer, t: TrunkSections, levels: Mapping[str, float]) -> tupl
     return base, top
 
 
-def _armhole(slicer: Slicer, t: TrunkSections, side: str, sign: float) -> FloatArray:
-    """Return the closed armhole in the leaning plane through the armpit, from the underarm forward."""
-    y, x, z = t.armpits[side]
-    normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
-    up = np.array([sign * np.sin(_LEAN), np.cos(_LEAN), 0.0])
-    ahead = np.array([0.0, 0.0, 1.0])
-    under = np.array([x, y, z])
-    parts = slicer.cut(normal, float(under @ normal) + 0.004)
-    near = [p.points[p.points[:, 1] > y - 0.002] for p in parts]
-    near = [p for p in near if len(p) > 8 and p[:, 1].max() > y + 0.03 * t.stature and p[:, 1].max() < 0.95 * t.stature]
+def underarm_point(slicer: Slicer, t: TrunkSections, side: str, underbust: float) -> FloatArray:
+    """Return the lowest point of an armhole: on the trunk's side, 25 mm below the armpit on an adult.
+
+    As deep as a woven block needs it, and at least halfway from the underbust up; midway between the armhole's front and back.
+
+    Args:
+        slicer: the upright scan.
+        t: its horizontal sections.
+        side: ``left`` or ``right``.
+        underbust: height of the underbust [m].
+
+    Raises:
+        InputError: if there is no armhole.
+    """
+    armpit, x, z = t.armpits[side]
+    sign = 1.0 if side == "left" else -1.0
+    height = max(armpit - _DROP * t.stature, 0.5 * (underbust + armpit))
+    ring = _hole_points(slicer, t, side, np.array([x, armpit, z]), _LEAN, 0.004)
+    # Between the middle of the armhole and where the side seam comes from below.
+    middles = (
+        ring[:, 2].min() + ring[:, 2].max(),
+        np.interp(underbust, t.y, t.front) + np.interp(underbust, t.y, t.back),
+    )
+    z = 0.25 * float(sum(middles))
+    points = np.concatenate([p.points for p in slicer.cut(np.array([0.0, 1.0, 0.0]), height)])
+    reach = float(np.interp(height, t.y, t.left if sign > 0 else t.right))
+    beside = points[
+        (np.abs(points[:, 2] - z) < 0.006) & (sign * points[:, 0] > 0.0) & (sign * points[:, 0] < reach + 0.002)
+    ]
+    return np.array([sign * (float((sign * beside[:, 0]).max()) if len(beside) else reach), height, z])
+
+
+def _hole_points(
+    slicer: Slicer, t: TrunkSections, side: str, through: FloatArray, lean: float, outward: float
+) -> FloatArray:
+    """Return the part of the scan's section above `through` in the plane through it that leans `lean` outward.
+
+    Args:
+        slicer: the upright scan.
+        t: its horizontal sections.
+        side: ``left`` or ``right``.
+        through: a point of the plane [m].
+        lean: of the plane, from plumb [radians].
+        outward: how far the plane is moved towards the arm [m].
+
+    Raises:
+        InputError: if there is none.
+    """
+    sign = 1.0 if side == "left" else -1.0
+    armpit = t.armpits[side][0]
+    normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
+    near = [
+        p.points[p.points[:, 1] > through[1] - 0.002] for p in slicer.cut(normal, float(through @ normal) + outward)
+    ]
+    near = [
+        p for p in near if len(p) > 8 and armpit + 0.03 * t.stature < p[:, 1].max() < 0.95 * t.stature
+    ]  # fmt: skip
     if not near:
-        raise InputError(f"scan: no {side} armhole above the armpit at {y:.2f} m; arms must stand off the body")
-    points = max(near, key=len)
-    points = np.vstack([points, under + 0.004 * normal])
-    return _loop(points, points.mean(axis=0), -up, ahead, _HARMONICS)
+        raise InputError(f"scan: no {side} armhole above the armpit at {armpit:.2f} m; arms must stand off the body")
+    return max(near, key=len)
+
+
+def _armhole(slicer: Slicer, t: TrunkSections, side: str, under: FloatArray) -> FloatArray:
+    """Return the closed armhole in the plane through the underarm point and the shoulder, from the underarm forward."""
+    sign = 1.0 if side == "left" else -1.0
+    armpit, x, _ = t.armpits[side]
+    # The plane passes the shoulder where one that leans `_LEAN` from the armpit would.
+    rise = _SHOULDER_HEIGHT * t.stature
+    lean = float(np.arctan2(sign * (x - under[0]) + rise * np.tan(_LEAN), rise + armpit - under[1]))
+    normal = np.array([sign * np.cos(lean), -np.sin(lean), 0.0])
+    up = np.array([sign * np.sin(lean), np.cos(lean), 0.0])
+    ring = _hole_points(slicer, t, side, under, lean, 0.001)
+    # From just above the armpit a quarter of an ellipse runs down to the underarm point, front and back.
+    level = armpit + _SCOOP * t.stature
+    points = [ring[ring[:, 1] > level]]
+    near = ring[np.abs(ring[:, 1] - level) < 0.005 * t.stature]
+    turn = np.linspace(0.0, 0.5 * np.pi, 24)[:, None]
+    for end in (near[np.argmin(near[:, 2])], near[np.argmax(near[:, 2])]):
+        across, down = np.array([0.0, 0.0, end[2] - under[2]]), (level - under[1]) / up[1] * up
+        points.append(under + 0.001 * normal + np.sin(turn) * across + (1.0 - np.cos(turn)) * down)
+    hole = _loop(np.concatenate(points), under, -up, np.array([0.0, 0.0, 1.0]), _HARMONICS, below=under)
+    # Few harmonics round the curve off below the underarm point, and tilt it there where that lies off the middle.
+    depth = ((hole[:, 1].max() - hole[:, 1]) / np.ptp(hole[:, 1]))[:, None] ** 2
+    way = hole[1] - hole[-1]
+    level = (hole[:, 2:] - hole[0, 2]) * (way @ up / way[2])
+    return np.asarray(hole + depth * (under - hole[0] - level * up))
 
 
 def _shoulder(slicer: Slicer, neck: FloatArray, tip: FloatArray) -> FloatArray:
@@ -203,42 +298,67 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
 
 
 def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
-    """Return biceps, elbow and wrist from planes across the arm."""
+    """Return biceps, elbow and wrist from planes across the arm's own centre line, which a bent elbow turns."""
     points, triangles = slicer.vertices, slicer.triangles
     middle = hole.mean(axis=0)
     normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
     limb = _beyond(points, triangles, normal, float(middle @ normal) + 0.004, middle)
-    reach = np.linalg.norm(limb - middle, axis=1)
-    hand = limb[int(np.argmax(reach))]
-    axis = (hand - middle) / reach.max()
-    if reach.max() < 0.2 * points[:, 1].max():
-        raise InputError(f"scan: the {side} arm is only {reach.max():.2f} m long; its mesh is broken")
-    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
-    up /= np.linalg.norm(up)
-    ahead = np.cross(axis, up)
-    ahead *= np.sign(ahead[2])
+    away = np.linalg.norm(limb - middle, axis=1)
+    hand, reach = limb[int(np.argmax(away))], float(away.max())
+    if reach < 0.2 * points[:, 1].max():
+        raise InputError(f"scan: the {side} arm is only {reach:.2f} m long; its mesh is broken")
+    axis = (hand - middle) / reach
 
-    def ring(share: float) -> FloatArray:
-        parts = [p for p in slicer.cut(axis, float(middle @ axis) + share * reach.max()) if len(p.points) > 6]
-        # The arm may be bent, so its section lies anywhere near the axis; the trunk's and the legs' lie further off.
-        centre = middle + share * reach.max() * axis
-        near = [p for p in parts if np.linalg.norm(p.points.mean(axis=0) - centre) < 0.30 * reach.max()
+    def section(at: FloatArray, across: FloatArray) -> FloatArray:
+        # The arm may be bent, so its section lies anywhere near; the trunk's and the legs' lie further off.
+        near = [p for p in slicer.cut(across, float(at @ across))
+                if len(p.points) > 6 and np.linalg.norm(p.points.mean(axis=0) - at) < 0.30 * reach
                 and sign * p.points[:, 0].mean() > sign * middle[0]]  # fmt: skip
         if not near:
-            raise InputError(f"scan: the {side} arm has no section {share:.0%} along it; its mesh is broken there")
-        part = max(near, key=lambda p: p.length)
-        return _loop(part.points, part.points.mean(axis=0), -up, ahead, 4, 240)
+            raise InputError(f"scan: the {side} arm has no section at {at[1]:.2f} m; its mesh is broken there")
+        return max(near, key=lambda p: p.length).points
 
-    shares = np.linspace(0.60, 0.84, 25)
-    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in shares])
+    shares = np.linspace(0.14, 0.86, 37)
+    line, way = _centre_line(section, middle, reach * axis, shares)
+
+    def ring(share: float) -> FloatArray:
+        at, across = (np.array([np.interp(share, shares, values[:, k]) for k in range(3)]) for values in (line, way))
+        across /= np.linalg.norm(across)
+        up = np.array([0.0, 1.0, 0.0]) - across * across[1]
+        up /= np.linalg.norm(up)
+        ahead = np.cross(across, up)
+        cut = section(at, across)
+        return _loop(cut, cut.mean(axis=0), -up, np.sign(ahead[2]) * ahead, 4, 240)
+
+    low = np.linspace(0.60, 0.84, 25)
+    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in low])
     # Where the scan's hand is missing, the arm's torn end gives sections of half its girth and less.
     whole = np.flatnonzero(girths > 0.6 * np.median(girths[:9]))
-    wrist = float(shares[whole[int(np.argmin(girths[whole]))]])
-    under = float((hole[0] - middle) @ axis) / reach.max()
-    tip = float((hole[int(np.argmax(hole[:, 1]))] - middle) @ axis) / reach.max()
-    clear = 0.032 / float(reach.max())
-    biceps = float(np.clip(max(under, tip) + clear, 0.10, 0.40 * wrist + 0.05))
-    return ArmCurves(biceps=ring(biceps), elbow=ring(biceps + 0.44 * (wrist - biceps)), wrist=ring(wrist))
+    wrist = float(low[whole[int(np.argmin(girths[whole]))]])
+    under, tip = (float((p - middle) @ axis) / reach for p in (hole[0], hole[int(np.argmax(hole[:, 1]))]))
+    elbow = tip + _ELBOW * (wrist - tip)
+    biceps = float(np.clip(max(under, tip) + _SHORTEST_SLEEVE / reach, 0.10, elbow - 0.10))
+    return ArmCurves(biceps=ring(biceps), elbow=ring(elbow), wrist=ring(wrist))
+
+
+def _centre_line(
+    section: Callable[[FloatArray, FloatArray], FloatArray], start: FloatArray, to_hand: FloatArray, shares: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return the middles of an arm's sections at `shares` of the way to the hand and the unit directions of their line."""
+    from scipy.ndimage import gaussian_filter1d
+
+    axis = to_hand / np.linalg.norm(to_hand)
+    line = start + shares[:, None] * to_hand
+    for i, at in enumerate(line.copy()):
+        try:
+            cut = section(at, axis)
+        except InputError:
+            continue
+        line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
+    way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
+    # Next to the armhole sections still hold a part of the shoulder.
+    way[:4] = way[4]
+    return line, way / np.linalg.norm(way, axis=1, keepdims=True)
 
 
 def _beyond(

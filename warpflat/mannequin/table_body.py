@@ -22,7 +22,11 @@ PRINCESS = {
     "waist": (0.82, 0.80), "underbust": (0.94, 0.92), "bust": (1.00, 1.00),
 }  # fmt: skip
 _SHOULDER_SLOPE = {"women": np.radians(21.0), "men": np.radians(22.0)}
+# Where the side line passes the bust: this share of the way back from where it passes the underbust to the widest points.
+_SIDE_BACK = 0.25
 _ARM_ANGLE = np.radians(40.0)
+# How far [m] the biceps' row lies beyond the underarm: the shortest sleeve ends there, with a seam to sew.
+_SHORTEST_SLEEVE = 0.085
 # How high up the armhole the across-chest row ends; the armhole runs slantwise there, which leaves the quads room.
 _NOTCH = 0.22
 
@@ -63,12 +67,17 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
     def lengths(key: str, top: float) -> FloatArray:
         return column(key, top, 1.0) * np.array([*girth, girth[-1]])
 
+    # A side seam climbs nearly plumb to the armhole, and a bust's widest points stand far behind those of the ribs.
+    line = column("shift", 0.0, size / 100.0)
+    line[-2:] = line[-3] + _SIDE_BACK * (line[-2] - line[-3])
+
     # Monotone between levels: no girth, width or depth swells beyond those measured above and below.
     smooth = PchipInterpolator(
         y,
         np.column_stack([
             [*girth, girth[-1] * 0.985], lengths("width", 0.985), lengths("depth", 0.96 * 0.985),
             column("area", 0.99, 1.0), column("front", 0.95, 1.0), column("shift", 0.0, size / 100.0),
+            line,
         ]),
     )  # fmt: skip
     local = PchipInterpolator(
@@ -78,7 +87,7 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
     places = PchipInterpolator(h, np.array([PRINCESS[level] for level in RING_LEVELS]) * points)
 
     def profile(height: float) -> Profile:
-        g, width, depth, area, front, shift = smooth(height)
+        g, width, depth, area, front, shift, side_z = smooth(height)
         front_bump, back_bump = local(height)
         front_x, back_x = places(height)
         section = Section(
@@ -89,8 +98,8 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
         s = arc_lengths(curve, closed=True)
         half = len(curve) // 2
         near = slice(half // 4, half - half // 4)
-        # The widest points stand where front and back half meet; read between samples, or the line would jitter.
-        side = float(np.interp(-shift, -curve[near, 1], s[:-1][near]))
+        # Read between samples, or the line would jitter.
+        side = float(np.interp(-side_z, -curve[near, 1], s[:-1][near]))
         ahead = float(np.interp(front_x, curve[: half // 2, 0], s[: half // 2]) / side)
         behind = float(
             np.interp(back_x, curve[half : half // 2 : -1, 0], s[half] - s[half : half // 2 : -1]) / (s[half] - side)
@@ -121,14 +130,15 @@ def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str,
     bust_centre_back = np.array([0.0, h["bust"], bust.curve[len(bust.curve) // 2, 1]])
     side = resample(bust.curve, bust.side_left / polyline_length(bust.curve, closed=True), closed=True)
     under = np.array([side[0] + 0.001, h["underarm"], side[1] - 0.002])
+    widest = float(bust.curve[np.argmax(bust.curve[:, 0]), 1]) - 0.002
     level = h["underarm"] + _NOTCH * (tip[1] - h["underarm"])
     reach = {"front": 0.050 * size, "back": -0.053 * size}
     rise = (level - h["bust"]) / (neckline[0, 1] - h["bust"])
     start_front = np.array([0.0, level, (1 - rise) * bust_centre_front[2] + rise * neckline[0, 2] + 0.016 * size])
     start_back = np.array([0.0, level, min(bust_centre_back[2], neckline[half, 2] - 0.030 * size) - 0.005 * size])
     chest = {
-        "front": _chest_row(start_front, under[2] + reach["front"], 0.5 * m.lengths["chest_width"], 0.0),
-        "back": _chest_row(start_back, under[2] + reach["back"], 0.5 * m.lengths["back_width"], -0.010 * size),
+        "front": _chest_row(start_front, widest + reach["front"], 0.5 * m.lengths["chest_width"], 0.0),
+        "back": _chest_row(start_back, widest + reach["back"], 0.5 * m.lengths["back_width"], -0.010 * size),
     }
 
     curves: dict[str, QuarterCurves] = {}
@@ -158,9 +168,12 @@ def _armhole(notch: FloatArray, other: FloatArray, under: FloatArray, tip: Float
     """
     from scipy.interpolate import CubicSpline
 
+    middle = 0.5 * (abs(notch[2] - under[2]) + abs(other[2] - under[2]))
+
     def scoop(point: FloatArray) -> FloatArray:
         at = 0.62 * point + 0.38 * under
-        at[1] = under[1] + 0.24 * (point[1] - under[1])
+        # On a parabola about the underarm point, wherever it lies between the notches: level there.
+        at[1] = under[1] + 0.24 * ((point[2] - under[2]) / middle) ** 2 * (point[1] - under[1])
         return at
 
     def brow(point: FloatArray) -> FloatArray:
@@ -233,9 +246,12 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
     front, back = quarters["front-left"].armhole, quarters["back-left"].armhole
     middle = np.vstack([front, back]).mean(axis=0)
     tip, under = front[0], front[-1]
-    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), 0.06])
+    # The chest is narrower than the back, so that the armhole looks a little forward; the arm leaves square to it.
+    across = quarters["front-left"].chest[-1] - quarters["back-left"].chest[-1]
+    axis = np.array([np.sin(_ARM_ANGLE), -np.cos(_ARM_ANGLE), -np.sin(_ARM_ANGLE) * across[0] / across[2]])
     axis /= np.linalg.norm(axis)
-    up = np.array([np.cos(_ARM_ANGLE), np.sin(_ARM_ANGLE), 0.0])
+    up = np.array([0.0, 1.0, 0.0]) - axis * axis[1]
+    up /= np.linalg.norm(up)
     ahead = np.cross(axis, up)
     ahead *= np.sign(ahead[2])
     start = float((tip - middle) @ axis)
@@ -248,7 +264,7 @@ def _arms(m: Measurements, quarters: Mapping[str, QuarterCurves]) -> dict[str, A
         scale = girth / polyline_length(shape, closed=True)
         return middle + at * axis + forward * ahead + scale * shape
 
-    biceps_at = float((under - middle) @ axis) + 0.030
+    biceps_at = float((under - middle) @ axis) + _SHORTEST_SLEEVE
     left = ArmCurves(
         biceps=ring(biceps_at, m.lengths["upper_arm"], 1.06, 0.0) + 0.006 * up,
         elbow=ring(start + 0.575 * length, m.lengths["elbow"], 1.0, 0.004),

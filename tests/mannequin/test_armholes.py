@@ -1,0 +1,78 @@
+"""Armholes and sleeves as a pattern maker cuts them, on the bodies that had the worst ones; all bodies: `benchmarks/armholes.py`."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import numpy as np
+import pytest
+from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_turn
+
+from warpflat.core.polyline import polyline_length
+from warpflat.garment.garment import flatten_form
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.scan_levels import trunk_sections
+from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
+from warpflat.surface.io.read import read_scan
+
+needs_bodies = pytest.mark.skipif(
+    "WARPFLAT_DATA" not in os.environ, reason="body scans: set WARPFLAT_DATA to their folder"
+)
+BODIES = ["child", pytest.param("scan child", marks=needs_bodies)]
+
+
+def _body(name: str) -> Mannequin:
+    if name.startswith("scan"):
+        points, faces = _scan(name[5:])
+        return Mannequin.from_scan(points, faces, options=ScanOptions(mirror=True), resolution_mm=15)
+    given = {"bust": 0.64, "waist": 0.58, "hip": 0.68, "stature": 1.28, "shoulder": 0.095}
+    return Mannequin.from_measurements(resolution_mm=15, **given)
+
+
+def _scan(name: str) -> tuple[np.ndarray, np.ndarray]:
+    points, faces = read_scan(Path(os.environ["WARPFLAT_DATA"]) / f"body_{name}.obj")
+    return np.asarray(points, float), np.asarray(faces)
+
+
+@pytest.mark.parametrize("name", BODIES)
+def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
+    body = _body(name)
+    for form, fabric, sharpest in (("bodice", "woven", 26.0), ("tshirt", "interlock", 46.0)):
+        made = body.form(form, half=True)
+        assert depth_inside(made, body) < 0.0003
+        garment = flatten_form(body, made, fabric=fabric)
+        corners = []
+        for key, piece in made.pieces.items():
+            flat = garment.pieces[key]
+            assert flat.flipped_faces == 0
+            curve = flat.positions[piece.edges["armhole left"]]
+            if "underarm left" in piece.edges:
+                assert sharpest_turn(curve) < 20.0
+                # A cap bends the other way towards each end, or runs into its end straight.
+                assert inflections(curve) <= 3
+                seam = polyline_length(flat.positions[piece.edges["underarm left"]])
+                assert seam > 0.060
+            else:
+                assert sharpest_turn(curve) < sharpest, key
+                assert inflections(curve) <= 2, key
+                corners.append(corner_degrees(flat.positions, piece.edges["armhole left"], piece.edges["side left"]))
+        # Front and back meet in a smooth armhole; each is square to the side seam but for darts that are not taken.
+        assert abs(sum(corners) - 180.0) < 25.0
+        assert all(65.0 < corner < 120.0 for corner in corners), corners
+
+
+@needs_bodies
+@pytest.mark.parametrize("name", ["female", "male_heavy"])
+def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
+    points, triangles, _ = turn_scan_upright(*_scan(name), ScanOptions())
+    armpits = trunk_sections(Slicer(points, triangles)).armpits
+    body = Mannequin.from_scan(*_scan(name), resolution_mm=20)
+    for side in ("left", "right"):
+        hole, line = body.line(f"armhole {side}"), body.line(f"side {side}")
+        assert 0.020 < armpits[side][0] - hole[0, 1] < 0.031
+        # The underarm point is the lowest, and the side line runs up to it in a curve: at most so far from one row of 20 mm to the next.
+        assert hole[:, 1].min() > hole[0, 1] - 0.001
+        ways = np.diff(line[body.layout.level_row["underbust"] :], axis=0)
+        ways /= np.linalg.norm(ways, axis=1, keepdims=True)
+        assert np.degrees(np.arccos((ways[1:] * ways[:-1]).sum(axis=1).min())) < 18.0
