@@ -305,14 +305,14 @@ def _move_legs(
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment | None, sign: float) -> FloatArray:
-    """Return the displacement of a leg's closed row; its inside stays on its own side (`sign`) of the midplane."""
+    """Return the displacement of a leg's closed row; its inside runs midway between the leg and the midplane (`sign`: +1 left)."""
     if change is None:
         return np.zeros_like(row)
     if other is not None:
         other = other + row.mean(axis=0) - other.mean(axis=0)
     move = _changed(row, other, change) - row
-    inwards = float((sign * row[:, 0]).min() - (sign * (row + move)[:, 0]).min())
-    move[:, 0] += sign * max(inwards, 0.0)
+    outwards = 0.5 * float((sign * row[:, 0]).min()) - float((sign * (row + move)[:, 0]).min())
+    move[:, 0] += sign * max(outwards, 0.0)
     return move
 
 
