@@ -31,6 +31,14 @@ def tape(mesh: trimesh.Trimesh, height: float) -> float:
     return float(ConvexHull(_trunk(mesh, height)).area)
 
 
+def leg_tape(points: np.ndarray, faces: np.ndarray, height: float, left: bool) -> float:
+    """Return the girth [m] of a level tape around one leg at a height above the floor [m]; arguments as `tapes`."""
+    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
+    mesh = trimesh.Trimesh(points, triangles, process=False)
+    legs = section_parts(mesh, points[:, 1].min() + height)[:2]
+    return float(ConvexHull(max(legs, key=lambda p: p[:, 0].mean() * (1.0 if left else -1.0))).area)
+
+
 def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:
     """Return height above the floor and girth [m] of hip, waist, underbust and bust at the standard's places (ISO 8559-1).
 

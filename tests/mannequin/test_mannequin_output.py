@@ -43,11 +43,15 @@ def test_usd_holds_bricks_and_lines(written: tuple[Mannequin, dict[str, Path]]) 
     mesh = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/body"))
     assert np.allclose(np.array(mesh.GetPointsAttr().Get()), body.vertices, atol=1e-6)
     subsets = {s.GetPrim().GetDisplayName(): s for s in UsdGeom.Subset.GetAllGeomSubsets(mesh)}
-    assert set(subsets) == set(body.layout.bricks)
+    tube = UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/tube"))
+    assert tube.GetPurposeAttr().Get() == "guide"
+    around = {s.GetPrim().GetDisplayName() for s in UsdGeom.Subset.GetAllGeomSubsets(tube)}
+    assert set(subsets) | around == set(body.layout.bricks)
+    assert not set(subsets) & around
     name = "waist-abdomen/front-left-centre"
     assert sorted(subsets[name].GetIndicesAttr().Get()) == body.brick(name).faces.tolist()
     covered = np.concatenate([np.array(s.GetIndicesAttr().Get()) for s in subsets.values()])
-    assert sorted(covered.tolist()) == list(range(len(body.layout.faces)))
+    assert sorted(covered.tolist()) == list(range(len(body.layout.body_faces)))
     curves = {p.GetDisplayName(): p for p in stage.GetPrimAtPath("/World/mannequin/lines").GetChildren()}
     assert set(curves) == set(body.lines())
     waist = UsdGeom.BasisCurves(curves["waist"])

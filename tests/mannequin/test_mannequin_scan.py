@@ -70,7 +70,7 @@ def test_levels_are_where_the_body_has_them(sex: str) -> None:
         assert told["girth_m"] == levels[level].girth
         assert told["section_m"] == section
     assert np.abs(body.vertices[:, 0]).max() < 0.75 * body.vertices[:, 1].max()
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
 @needs_bodies
@@ -182,7 +182,7 @@ def test_other_bodies(sex: str, kind: str) -> None:
         assert levels["abdomen"].girth > levels["waist"].girth
     if kind == "slim":
         assert 0.84 < levels["bust"].girth / plain["bust"].girth < 0.89
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
 @needs_bodies
@@ -214,7 +214,7 @@ def test_holes_at_hands_and_feet() -> None:
     body, plain = on_scan(points, kept), _plain("female")
     for level in ("bust", "waist", "hip"):
         assert abs(body.levels()[level].girth - plain.levels()[level].girth) < 0.004
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
 @needs_bodies
@@ -359,7 +359,7 @@ def test_skirts_hang_outside_the_body(sex: str, form: str) -> None:
     import trimesh
 
     body = _plain(sex)
-    quads = body.layout.faces
+    quads = body.layout.body_faces
     mesh = trimesh.Trimesh(body.vertices, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
     made = body.form(form)
     used = np.unique(np.concatenate([piece.grid_vertices for piece in made.pieces.values()]))

@@ -46,7 +46,7 @@ def test_tape_reads_what_the_table_says(bodies: dict[str, Mannequin], size: str)
 def test_surface_is_sound(bodies: dict[str, Mannequin], size: str) -> None:
     body = bodies[size]
     assert np.isfinite(body.vertices).all()
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
     # No quad is folded over its diagonal, so no normal turns against its neighbours'.
     q = body.vertices[body.layout.faces]
     first = np.cross(q[:, 1] - q[:, 0], q[:, 2] - q[:, 0])
@@ -166,7 +166,7 @@ def test_odd_but_valid_bodies_are_built() -> None:
         for name, value in given.items():
             if name != "stature":
                 assert body.levels()[name].girth == pytest.approx(value, abs=1e-6)
-        assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+        assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
 @pytest.mark.parametrize(
@@ -186,7 +186,7 @@ def test_what_is_completed_lies_between_what_is_given(given: dict[str, float]) -
         low, high = sorted(lengths[end] for end in ends)
         assert low <= lengths[name] <= high, name
     body = Mannequin.from_measurements(resolution_mm=20, **given)
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
 
 
 def test_completion_agrees_with_the_table() -> None:
@@ -224,7 +224,7 @@ def test_lengths_down_the_body_go_with_stature() -> None:
 )
 def test_nothing_is_refused_for_what_was_not_given(given: dict[str, float]) -> None:
     body = Mannequin.from_measurements(resolution_mm=25, **given)
-    assert len(self_intersections(body.vertices, body.layout.faces)) == 0
+    assert len(self_intersections(body.vertices, body.layout.body_faces)) == 0
     made = measurements_from_values(**given)
     assert all(made.lengths[name] == value for name, value in given.items())
     if "armscye_depth" in given:

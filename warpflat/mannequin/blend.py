@@ -14,15 +14,17 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, polyline_length
-from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
+from warpflat.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
-from warpflat.mannequin.sheet import sheet_laplacian
+from warpflat.mannequin.sheet import fill_fork, sheet_laplacian
 
 __all__ = ["Adjustment", "adjusted_vertices", "blend_forms"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
+# Parts of the body whose profiles can be mixed with each other.
+_PARTS = (RING_LEVELS, ARM_LEVELS[1:], LEG_LEVELS[1:])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -77,25 +79,26 @@ def adjusted_vertices(
     Args:
         layout: the grid.
         vertices: #V by 3, the body [m].
-        profiles: what is done, by level: a closed level of the trunk, ``chest``, or an arm level.
-        ruled: pairs of levels (upper, lower) of trunk or arms between which the rows are straight.
+        profiles: what is done, by level: a closed level of the trunk, ``chest``, an arm or a leg level; ``crotch`` moves up or down only.
+        ruled: pairs of levels (upper, lower) of trunk, arms or legs between which the rows are straight.
 
     Raises:
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
-    arm_levels = ARM_LEVELS[1:]
-    known = [*RING_LEVELS, "chest", *arm_levels]
+    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
     for level, change in profiles.items():
         for name in (level, change.like):
             if name is not None and name not in known:
                 raise InputError(f"form: profile {name!r} cannot be adjusted: {nearest(name, known)}")
-        if change.like and ((change.like in arm_levels) != (level in arm_levels) or "chest" in (level, change.like)):
+        parts = [next((i for i, part in enumerate(_PARTS) if name in part), -1) for name in (level, change.like)]
+        if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
     out = vertices.copy()
     if profiles or ruled:
         _move_rings(out, layout, vertices, profiles, ruled)
         _move_sheet(out, layout, vertices, profiles.get("chest"))
         _move_arms(out, layout, vertices, profiles, ruled)
+        _move_legs(out, layout, vertices, profiles, ruled)
         _move_neck(out, layout, vertices)
     return out
 
@@ -163,20 +166,19 @@ def _move_rings(
     y = body[layout.rings[:, 0], 1]
     out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
     for pair in ruled:
-        if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
-            continue
-        _rule(out, layout, pair, body)
+        if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
+            _rule(out, layout.rings, {level: layout.level_row[level] for level in RING_LEVELS}, pair, body)
 
 
-def _rule(out: FloatArray, layout: Layout, pair: tuple[str, str], body: FloatArray) -> None:
-    """Hang the rows between two levels of the trunk straight, over whatever of the body stands out between them."""
+def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], body: FloatArray) -> None:
+    """Hang the rows between two levels of trunk or leg straight, over whatever of the body stands out between them."""
     for level in pair:
-        if level not in RING_LEVELS:
-            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, RING_LEVELS)}")
-    a, b = sorted(layout.level_row[level] for level in pair)
+        if level not in row_of:
+            raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, row_of)}")
+    a, b = sorted(row_of[level] for level in pair)
     if a == b:
         raise InputError(f"form: ruled: {pair[0]} and {pair[1]} are the same level")
-    ids = layout.rings[a : b + 1]
+    ids = grid[a : b + 1]
     first, last = out[ids[0]], out[ids[-1]]
     share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
     straight = first + share[:, None, None] * (last - first)
@@ -312,6 +314,58 @@ def _rule_arm(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: 
     a, b = sorted((row_of[pair[0]], row_of[pair[1]]))
     share = (np.arange(a, b + 1) - a) / max(b - a, 1)
     out[grid[a : b + 1]] = out[grid[a]] + share[:, None, None] * (out[grid[b]] - out[grid[a]])
+
+
+def _move_legs(
+    out: FloatArray,
+    layout: Layout,
+    body: FloatArray,
+    profiles: Mapping[str, Adjustment],
+    ruled: Sequence[tuple[str, str]],
+) -> None:
+    """Move crotch curve and legs, with the hip's row from which they hang."""
+    from scipy.interpolate import PchipInterpolator
+
+    curve = layout.crotch
+    change = profiles.get("crotch", Adjustment())
+    if change != Adjustment(raise_cm=change.raise_cm):
+        raise InputError("form: profile crotch: it moves up or down only; leave all but raise_cm out")
+    ends = out[curve[[0, -1]]] - body[curve[[0, -1]]]
+    share = (arc_lengths(body[curve]) / polyline_length(body[curve]))[:, None]
+    moved = body[curve] + (1.0 - share) * ends[0] + share * ends[1]
+    depth = body[curve[0], 1] - body[curve, 1]
+    moved[:, 1] += depth / depth.max() * change.raise_cm / 100.0
+    out[curve[1:-1]] = moved[1:-1]
+    for side, grid in layout.legs.items():
+        moves = []
+        for level in LEG_LEVELS[1:]:
+            row = body[grid[layout.leg_row[level]]]
+            wished = profiles.get(level)
+            other = body[grid[layout.leg_row[wished.like]]] if wished and wished.like else None
+            moves.append(_leg_move(row, other, wished, 1.0 if side == "left" else -1.0))
+        rows = np.array([layout.leg_row[level] for level in LEG_LEVELS[1:]])
+        between = np.arange(rows[0], rows[-1] + 1)
+        out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
+    move = out - body
+    fill_fork(move, layout)
+    for grid in layout.legs.values():
+        fork = grid[1 : layout.leg_row["leg_thigh"]]
+        out[fork] = body[fork] + move[fork]
+        for pair in ruled:
+            if set(pair) & set(LEG_LEVELS):
+                _rule(out, grid, {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}, pair, body)
+
+
+def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment | None, sign: float) -> FloatArray:
+    """Return the displacement of a leg's closed row; its inside runs midway between the leg and the midplane (`sign`: +1 left)."""
+    if change is None:
+        return np.zeros_like(row)
+    if other is not None:
+        other = other + row.mean(axis=0) - other.mean(axis=0)
+    move = _changed(row, other, change) - row
+    outwards = 0.5 * float((sign * row[:, 0]).min()) - float((sign * (row + move)[:, 0]).min())
+    move[:, 0] += sign * max(outwards, 0.0)
+    return move
 
 
 def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["ArmCurves", "Blueprint", "Profile", "QuarterCurves"]
+__all__ = ["ArmCurves", "Blueprint", "LegCurves", "LegProfile", "Profile", "QuarterCurves"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,6 +70,42 @@ class ArmCurves:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class LegProfile:
+    """One closed horizontal curve around a leg.
+
+    Attributes:
+        curve: #P by 2, (x, z) [m], from the inseam forward, not repeated.
+        crease_front, outseam, crease_back: shares of the curve's length.
+        girth: what a tape must read around the finished row [m].
+        spread: how much wider than the mean the columns next to the inseam are, as a share.
+    """
+
+    curve: FloatArray
+    crease_front: float
+    outseam: float
+    crease_back: float
+    girth: float
+    spread: float = 0.0
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LegCurves:
+    """The lower body below the hip.
+
+    Attributes:
+        heights: height [m] of every leg level but the first.
+        profile: the profile of a side, ``left`` or ``right``, at a height [m] from the ankle to the thigh.
+        crotch: #P by 3 [m], the crotch curve in the midplane, from the hip's centre front to its centre back.
+        point: share of the crotch curve's length at which the crotch point lies.
+    """
+
+    heights: Mapping[str, float]
+    profile: Callable[[str, float], LegProfile]
+    crotch: FloatArray
+    point: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Blueprint:
     """A body, ready for the grid.
 
@@ -78,6 +114,7 @@ class Blueprint:
         heights: height [m] of every closed level.
         quarters: the curves of the four quarters by name.
         arms: the curves of the two arms, ``left`` and ``right``.
+        legs: crotch curve and legs.
         neck: length of the neck base along its curve [m].
         collar: #P by 3 [m], closed curve at the upper end of the neck, from centre front over the left.
         attract: maps #P by 3 points of chest and shoulder to the places [m] on the body to draw them to; None for none.
@@ -88,6 +125,7 @@ class Blueprint:
     heights: Mapping[str, float]
     quarters: Mapping[str, QuarterCurves]
     arms: Mapping[str, ArmCurves]
+    legs: LegCurves
     neck: float
     collar: FloatArray
     attract: Callable[[FloatArray], FloatArray] | None = None

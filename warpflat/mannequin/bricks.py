@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout
+from warpflat.mannequin.layout import ARM_LEVELS, LEG_LEVELS, RING_LEVELS, Layout
 
 __all__ = ["TRUNK_LEVELS", "Brick", "brick", "select_bricks"]
 
@@ -111,15 +111,15 @@ def _bands(upper: str, lower: str, pattern: str) -> set[str]:
     """Return the bands of neighbouring levels between two levels."""
     if (upper, lower) == ("collar", "neck"):
         return {"collar-neck"}
-    for levels in (TRUNK_LEVELS, ARM_LEVELS):
+    for levels in (TRUNK_LEVELS, ARM_LEVELS, LEG_LEVELS):
         top = "shoulder" if upper == "neck" else upper
         if top in levels and lower in levels:
             i, j = levels.index(top), levels.index(lower)
             if i >= j:
                 raise InputError(f"brick {pattern!r}: {upper} does not lie above {lower}; write the upper level first")
             return {f"{a}-{b}" for a, b in itertools.pairwise(levels[i : j + 1])}
-    known = {"collar", "neck", *TRUNK_LEVELS, *ARM_LEVELS}
+    known = {"collar", "neck", *TRUNK_LEVELS, *ARM_LEVELS, *LEG_LEVELS}
     for level in (upper, lower):
         if level not in known:
             raise InputError(f"brick {pattern!r}: level {level!r} is unknown: {nearest(level, known)}")
-    raise InputError(f"brick {pattern!r}: {upper} and {lower} are not levels of one part (neck, trunk, arm)")
+    raise InputError(f"brick {pattern!r}: {upper} and {lower} are not levels of one part (neck, trunk, arm, leg)")

@@ -10,6 +10,7 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import Blueprint, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS, Layout
+from warpflat.mannequin.leg_builder import set_legs
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
@@ -31,6 +32,7 @@ def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
     """
     vertices = np.full((layout.vertex_count, 3), np.nan)
     _set_rings(vertices, layout, blueprint)
+    set_legs(vertices, layout, blueprint.legs)
     _set_bounds(vertices, layout, blueprint)
     _set_sides(vertices, layout)
     _set_arms(vertices, layout, blueprint)
@@ -45,6 +47,10 @@ def _mirrored(vertices: FloatArray, layout: Layout) -> FloatArray:
     out = 0.5 * (vertices + other)
     for ring in layout.rings[: layout.level_row["bust"] + 1]:
         out[ring] = scale_to_girth(out[ring], convex_girth(vertices[ring]))
+    for grid in layout.legs.values():
+        for row in grid[layout.leg_row["leg_thigh"] :]:
+            girth = 0.5 * (convex_girth(vertices[row]) + convex_girth(vertices[layout.mirror[row]]))
+            out[row] = scale_to_girth(out[row], girth)
     return out
 
 

@@ -4,6 +4,10 @@ Closed rings run from the ankle to the bust and on to the across-chest row, whos
 the front and the back are separate patches up to the yoke row, which starts at the bend of the neckline; four small
 patches climb from there to the shoulder seams. No corner of the grid is then sharper than about sixty degrees, which a
 single grid from chest to neck and shoulder cannot offer.
+
+At the hip the rings divide. One tube runs on to the ankle around both legs, as a skirt hangs and a tape lies. Inside it are
+the legs: the left or right half of the hip's row and the crotch curve, which runs in the midplane from centre front under the
+body to centre back, close to a loop, from which each leg runs down to its ankle.
 """
 
 from __future__ import annotations
@@ -13,16 +17,21 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError
 
-__all__ = ["ARM_LEVELS", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
+__all__ = ["ARM_LEVELS", "LEG_LEVELS", "LEG_LINES", "QUARTERS", "RING_LEVELS", "Layout", "make_layout"]
 
 
 #: Closed horizontal levels, bottom up.
 RING_LEVELS = ("ankle", "knee", "thigh", "hip", "abdomen", "waist", "underbust", "bust")
 ARM_LEVELS = ("armhole", "biceps", "elbow", "forearm", "wrist")
+#: Closed levels of one leg from the top down; the first is half of the hip's row and the crotch curve.
+LEG_LEVELS = ("crotch", "leg_thigh", "leg_knee", "leg_calf", "leg_ankle")
+#: The line of a leg's level, less its side.
+LEG_LINES = {level: level.removeprefix("leg_") for level in LEG_LEVELS[1:]}
 #: In the order in which a ring runs: from centre front over the body's left to the back.
 QUARTERS = ("front-left", "back-left", "back-right", "front-right")
 
@@ -31,6 +40,9 @@ _COLUMN_LENGTHS = (0.045, 0.045, 0.065, 0.065)
 _RING_GAPS = (0.33, 0.25, 0.10, 0.10, 0.075, 0.10, 0.07)
 _CHEST_GAP, _YOKE_GAP, _SHOULDER_GAP, _COLLAR_GAP = 0.055, 0.100, 0.045, 0.045
 _ARM_GAPS = (0.10, 0.16, 0.12, 0.13)
+# The crotch curve from the front to the crotch point and on to the back.
+_CROTCH_LENGTHS = (0.08, 0.14)
+_LEG_GAPS = (0.10, 0.27, 0.12, 0.24)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -49,6 +61,11 @@ class Strips:
         arms: for ``left`` and ``right`` #rows by #columns, closed rows from armhole to wrist, columns from the underarm
             forward.
         arm_row: row in `arms` of every arm level.
+        crotch: the crotch curve from the hip's centre front to its centre back.
+        crotch_point: index in `crotch` of the vertex where the inseams begin.
+        legs: for ``left`` and ``right`` #rows by #columns, closed rows from hip and crotch curve to the ankle, columns from
+            the inseam forward.
+        leg_row: row in `legs` of every leg level.
         vertex_count: number of vertices.
     """
 
@@ -62,6 +79,10 @@ class Strips:
     neck: IntArray
     arms: Mapping[str, IntArray]
     arm_row: Mapping[str, int]
+    crotch: IntArray
+    crotch_point: int
+    legs: Mapping[str, IntArray]
+    leg_row: Mapping[str, int]
     vertex_count: int
 
     @property
@@ -78,6 +99,7 @@ class Strips:
         m = self.neck.shape[1]
         out[self.neck] = self.neck[:, -np.arange(m) % m]
         out[self.arms["left"]], out[self.arms["right"]] = self.arms["right"], self.arms["left"]
+        out[self.legs["left"]], out[self.legs["right"]] = self.legs["right"], self.legs["left"]
         return out
 
     @property
@@ -95,6 +117,11 @@ class Strips:
         """Columns from the centre line to the princess line."""
         return sum(self.columns[:2])
 
+    @property
+    def to_outseam(self) -> int:
+        """Columns of a leg from the inseam over the front to the outseam."""
+        return self.crotch_point + self.quarter
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Layout(Strips):
@@ -105,12 +132,26 @@ class Layout(Strips):
         lines: feature profiles and lines by name; a closed one repeats its first vertex.
         faces: #F by 4, outward.
         face_brick: #F, index of the brick in `bricks`' order.
+        on_body: #F, true on the body itself, false on the tube around both legs.
     """
 
     bricks: Mapping[str, IntArray]
     lines: Mapping[str, IntArray]
     faces: IntArray
     face_brick: IntArray
+    on_body: NDArray[np.bool_]
+
+    @property
+    def body_faces(self) -> IntArray:
+        """The faces of the body itself, without the tube around both legs."""
+        return self.faces[self.on_body]
+
+    @property
+    def body_lines(self) -> dict[str, IntArray]:
+        """The parts of the lines that lie on the body itself."""
+        tube = self.rings[: self.level_row["hip"]]
+        kept = {name: ids[~np.isin(ids, tube)] for name, ids in self.lines.items()}
+        return {name: ids for name, ids in kept.items() if len(ids)}
 
 
 def make_layout(resolution_mm: float = 10.0) -> Layout:
@@ -128,9 +169,11 @@ def make_layout(resolution_mm: float = 10.0) -> Layout:
     bricks = _bricks(strips)
     faces = np.concatenate([_grid_faces(grid) for grid in bricks.values()])
     face_brick = np.repeat(np.arange(len(bricks)), [(g.shape[0] - 1) * (g.shape[1] - 1) for g in bricks.values()])
+    tube = set(strips.rings[: strips.level_row["hip"]].ravel().tolist())
+    around = [bool(tube & set(grid.ravel().tolist())) for grid in bricks.values()]
     return Layout(
         **vars(strips), bricks=bricks, lines=_lines(strips), faces=faces.astype(np.int32),
-        face_brick=face_brick.astype(np.int32),
+        face_brick=face_brick.astype(np.int32), on_body=~np.array(around)[face_brick],
     )  # fmt: skip
 
 
@@ -177,9 +220,21 @@ def _strips(resolution: float) -> Strips:
     arm_row = dict(zip(ARM_LEVELS, [0, *np.cumsum(arm_steps).tolist()], strict=True))
     arms = {side: np.vstack([loop, fresh(arm_row["wrist"], len(loop))]) for side, loop in armholes.items()}
 
+    hip = rings[level_row["hip"]]
+    to_point, to_back = (cells(s) for s in _CROTCH_LENGTHS)
+    crotch = np.concatenate([hip[:1], fresh(to_point + to_back - 1), hip[2 * q : 2 * q + 1]])
+    from_point, under = crotch[to_point:0:-1], crotch[:to_point:-1]
+    loops = {
+        "left": np.concatenate([from_point, hip[: 2 * q], under]),
+        "right": np.concatenate([from_point, hip[-np.arange(2 * q) % n], under]),
+    }
+    leg_row = dict(zip(LEG_LEVELS, [0, *np.cumsum([cells(g) for g in _LEG_GAPS]).tolist()], strict=True))
+    legs = {side: np.vstack([loop, fresh(leg_row["leg_ankle"], len(loop))]) for side, loop in loops.items()}
+
     return Strips(
         resolution=resolution, columns=(n0, n1, n2, n3), rings=rings, level_row=level_row, front=front, back=back,
-        yokes=yokes, neck=neck, arms=arms, arm_row=arm_row, vertex_count=next(counter),
+        yokes=yokes, neck=neck, arms=arms, arm_row=arm_row, crotch=crotch, crotch_point=to_point, legs=legs,
+        leg_row=leg_row, vertex_count=next(counter),
     )  # fmt: skip
 
 
@@ -206,7 +261,7 @@ def _grid_faces(grid: IntArray) -> IntArray:
 
 
 def _bricks(strips: Strips) -> dict[str, IntArray]:
-    """Return the grid of every brick by its name, ``upper-lower/column``, from the neck down, then the arms."""
+    """Return the grid of every brick by its name, ``upper-lower/column``: from the neck down, arms, legs, the tube around both."""
     n0, n1, n2, _ = strips.columns
     p, k, q = strips.to_princess, strips.to_arm, strips.quarter
     front, back, yokes, neck = strips.front, strips.back, strips.yokes, strips.neck
@@ -238,18 +293,30 @@ def _bricks(strips: Strips) -> dict[str, IntArray]:
     orders = (("centre", "side"), ("side", "centre")) * 2
     names = [f"{quarter}-{part}" for quarter, order in zip(QUARTERS, orders, strict=True) for part in order]
     levels = [*RING_LEVELS, "chest"]
+    tube: dict[str, IntArray] = {}
     for low, high in reversed(list(itertools.pairwise(levels))):
+        part = bricks if strips.level_row[low] >= strips.level_row["hip"] else tube
         rows = closed[strips.level_row[low] : strips.level_row[high] + 1]
         for name, a, b in zip(names, cuts[:-1], cuts[1:], strict=True):
-            bricks[f"{high}-{low}/{name}"] = rows[:, a : b + 1]
-    for arm, grid in strips.arms.items():
-        loop = np.hstack([grid, grid[:, :1]])
-        half = grid.shape[1] // 2
-        for high, low in itertools.pairwise(ARM_LEVELS):
-            rows = loop[strips.arm_row[high] : strips.arm_row[low] + 1]
-            for name, part in (("front", rows[:, : half + 1]), ("back", rows[:, half:])):
-                # Columns run upward in front on both arms; the left one's rows are turned, so that it faces outward too.
-                bricks[f"{high}-{low}/arm-{arm}-{name}"] = part[::-1] if arm == "left" else part
+            part[f"{high}-{low}/{name}"] = rows[:, a : b + 1]
+    for body_side, limb in strips.arms.items():
+        bricks |= _limb_bricks("arm", body_side, limb, limb.shape[1] // 2, ARM_LEVELS, strips.arm_row)
+    for body_side, limb in strips.legs.items():
+        bricks |= _limb_bricks("leg", body_side, limb, strips.to_outseam, LEG_LEVELS, strips.leg_row)
+    return bricks | tube
+
+
+def _limb_bricks(
+    limb: str, side: str, grid: IntArray, half: int, levels: tuple[str, ...], row_of: Mapping[str, int]
+) -> dict[str, IntArray]:
+    """Return the front and back bricks of an arm or a leg whose front has `half` columns of cells."""
+    loop = np.hstack([grid, grid[:, :1]])
+    bricks: dict[str, IntArray] = {}
+    for high, low in itertools.pairwise(levels):
+        rows = loop[row_of[high] : row_of[low] + 1]
+        for name, part in (("front", rows[:, : half + 1]), ("back", rows[:, half:])):
+            # Columns run forward from the inside on both sides; the left one's rows are turned, so that it faces outward too.
+            bricks[f"{high}-{low}/{limb}-{side}-{name}"] = part[::-1] if side == "left" else part
     return bricks
 
 
@@ -283,4 +350,11 @@ def _lines(strips: Strips) -> dict[str, IntArray]:
             lines[f"{level} {side}"] = loop(grid[strips.arm_row[level]])
         lines[f"underarm {side}"] = grid[:, 0]
         lines[f"overarm {side}"] = grid[:, grid.shape[1] // 2]
+    lines["crotch front"] = strips.crotch[: strips.crotch_point + 1]
+    lines["crotch back"] = strips.crotch[strips.crotch_point :]
+    for side, grid in strips.legs.items():
+        lines |= {f"{line} {side}": loop(grid[strips.leg_row[level]]) for level, line in LEG_LINES.items()}
+        lines[f"inseam {side}"], lines[f"outseam {side}"] = grid[:, 0], grid[:, strips.to_outseam]
+        lines[f"crease front {side}"] = grid[:, strips.to_outseam - q + p]
+        lines[f"crease back {side}"] = grid[:, strips.to_outseam + q - p]
     return {name: np.ascontiguousarray(ids, np.int32) for name, ids in lines.items()}

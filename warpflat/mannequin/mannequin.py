@@ -14,7 +14,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
-from warpflat.mannequin.layout import ARM_LEVELS, RING_LEVELS, Layout, make_layout
+from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
 from warpflat.mannequin.nearest_size import SizeDifference, nearest_size
 from warpflat.mannequin.profiles import convex_girth
@@ -167,7 +167,10 @@ class Mannequin:
         return {name: self.vertices[ids] for name, ids in self.layout.lines.items()}
 
     def levels(self) -> dict[str, Level]:
-        """Return height and girth of every feature profile, from the neck down, then the arms."""
+        """Return height and girth of every feature profile, from the neck down, then arms and legs.
+
+        ``thigh``, ``knee`` and ``ankle`` are around both legs, as a skirt hangs; ``thigh left`` is around one.
+        """
         found: dict[str, Level] = {}
         for name in ("neck", "shoulder left", "shoulder right", "chest front", "chest back"):
             points = self.line(name)
@@ -185,13 +188,24 @@ class Mannequin:
             for level in ARM_LEVELS:
                 points = self.line(f"{level} {side}")
                 found[f"{level} {side}"] = Level(height=float(points[:, 1].mean()), girth=polyline_length(points))
+        for side in ("left", "right"):
+            for level in LEG_LINES.values():
+                points = self.line(f"{level} {side}")[:-1]
+                found[f"{level} {side}"] = Level(height=float(points[:, 1].mean()), girth=convex_girth(points))
+        for name in ("crotch front", "crotch back"):
+            points = self.line(name)
+            found[name] = Level(height=float(points[:, 1].min()), girth=polyline_length(points))
         return found
 
     def surface(self) -> Surface:
-        """Return all bricks as one surface with every feature line."""
+        """Return the body as one surface with every feature line on it; the tube around both legs is no part of it."""
+        used, faces = np.unique(self.layout.body_faces, return_inverse=True)
+        local = np.full(len(self.vertices), -1, np.int32)
+        local[used] = np.arange(len(used))
         return Surface(
-            vertices=self.vertices, faces=self.layout.faces, lines=dict(self.layout.lines), name="mannequin",
-            input_vertices=self.vertices, input_index=np.arange(len(self.vertices), dtype=np.int32), notes=self.notes,
+            vertices=self.vertices[used], faces=np.reshape(faces, (-1, 4)).astype(np.int32),
+            lines={name: local[ids] for name, ids in self.layout.body_lines.items()}, name="mannequin",
+            input_vertices=self.vertices, input_index=used.astype(np.int32), notes=self.notes,
         )  # fmt: skip
 
     def form(self, form: str | Form, *, half: bool = False) -> FormResult:

@@ -307,6 +307,10 @@ def _heights(lengths: Mapping[str, float], body: Mapping[str, Any]) -> dict[str,
         h["side_neck"] = h["nape"] - 0.008 * stature
         h["front_neck"] = h["nape"] - 0.0385 * stature
     h["hip"] = min(h["hip"], h["waist"] - 0.11)
+    # The crotch curve needs room below the hip, the rows above the thigh's girth below the crotch.
+    h["crotch"] = min(lengths["inside_leg"], h["hip"] - 0.02 * stature)
+    h["leg_thigh"] = h["crotch"] - 0.03 * stature
+    h["leg_knee"], h["leg_calf"], h["leg_ankle"] = h["knee"], 0.205 * stature, h["ankle"]
     h["thigh"] = min(h["thigh"], h["hip"] - 0.05)
     h["underbust"] = h["bust"] - 0.40 * (h["bust"] - h["waist"])
     h["abdomen"] = h["waist"] - 0.42 * (h["waist"] - h["hip"])

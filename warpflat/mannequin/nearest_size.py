@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, size_tables
 
 __all__ = ["SizeDifference", "nearest_size"]
@@ -14,9 +14,15 @@ _SIZED_BY = ("bust", "waist", "hip")
 # The measurement that a line of the mannequin is, by the line's name without its side.
 _MEASUREMENT = {
     **{level: level for level in RING_LEVELS},
-    "neck": "neck", "shoulder": "shoulder", "chest front": "chest_width", "chest back": "back_width",
-    "biceps": "upper_arm", "elbow": "elbow", "wrist": "wrist",
-}  # fmt: skip
+    "neck": "neck",
+    "shoulder": "shoulder",
+    "chest front": "chest_width",
+    "chest back": "back_width",
+    "biceps": "upper_arm",
+    "elbow": "elbow",
+    "wrist": "wrist",
+}
+_OF_ONE_LEG = {f"{line} {side}": f"{line}_girth" for line in LEG_LINES.values() for side in ("left", "right")}  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -49,7 +55,10 @@ def nearest_size(heights: Mapping[str, float], girths: Mapping[str, float]) -> S
     sizes = {name: measurements_from_size(name) for name in names}
     name = min(sizes, key=lambda n: miss(sizes[n]))
     size = sizes[name]
-    measured = {level: _MEASUREMENT.get(level.removesuffix(" left").removesuffix(" right")) for level in girths}
+    measured = {
+        level: _OF_ONE_LEG.get(level, _MEASUREMENT.get(level.removesuffix(" left").removesuffix(" right")))
+        for level in girths
+    }
     return SizeDifference(
         size=name,
         heights={k: heights[k] - size.heights[k] for k in girths if k in RING_LEVELS},

@@ -51,18 +51,20 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
 def write_mannequin_obj(mannequin: Mannequin, path: str | os.PathLike[str]) -> None:
     """Write the bricks as groups (``g``) of quads and the lines as line elements (``l``), metres, Y up.
 
+    The object ``mannequin`` is the body, the object ``tube`` the bricks around both legs, on which skirts are made.
+
     Raises:
         InputError: if the file cannot be written.
     """
     layout = mannequin.layout
-    rows: list[str] = [f"# warpflat mannequin, {mannequin.source}", "o mannequin"]
+    rows: list[str] = [f"# warpflat mannequin, {mannequin.source}"]
     rows += [f"v {x!r} {y!r} {z!r}" for x, y, z in mannequin.vertices.tolist()]
-    start = 0
-    for name, grid in layout.bricks.items():
-        count = (grid.shape[0] - 1) * (grid.shape[1] - 1)
-        rows.append(f"g {name}")
-        rows += [f"f {a + 1} {b + 1} {c + 1} {d + 1}" for a, b, c, d in layout.faces[start : start + count].tolist()]
-        start += count
+    for part, on_body in (("mannequin", True), ("tube", False)):
+        rows.append(f"o {part}")
+        for index, name in enumerate(layout.bricks):
+            faces = layout.faces[(layout.face_brick == index) & (layout.on_body == on_body)]
+            rows += [f"g {name}"] * bool(len(faces))
+            rows += [f"f {a + 1} {b + 1} {c + 1} {d + 1}" for a, b, c, d in faces.tolist()]
     for name, ids in layout.lines.items():
         rows += [f"g line:{name.replace(' ', '_')}", "l " + " ".join(str(i + 1) for i in ids.tolist())]
     with atomic_path(path) as temporary:

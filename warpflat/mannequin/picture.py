@@ -10,7 +10,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.export.letters import all_letters
-from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.layout import LEG_LINES, RING_LEVELS
 from warpflat.mannequin.normals import face_normals, vertex_normals
 
 if TYPE_CHECKING:
@@ -76,7 +76,7 @@ def _turned(vertices: FloatArray, degrees: float) -> FloatArray:
 def _draw_body(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     from matplotlib.collections import PolyCollection
 
-    faces = mannequin.layout.faces
+    faces = mannequin.layout.body_faces
     normals = face_normals(turned, faces)
     light = 0.36 + 0.60 * np.clip(normals @ _LIGHT, 0.0, 1.0)
     colour = np.clip(np.outer(light, [1.0, 0.965, 0.90]), 0.0, 1.0)
@@ -95,7 +95,7 @@ def _visible(turned: FloatArray, mannequin: Mannequin, ids: Any) -> Any:
     """Return which vertices of a line face the viewer and are not behind an arm."""
     from scipy.spatial import cKDTree
 
-    normals = vertex_normals(turned, mannequin.layout.faces)
+    normals = vertex_normals(turned, mannequin.layout.body_faces)
     seen = normals[ids, 2] > 0.02
     arms = np.concatenate([turned[grid.ravel()] for grid in mannequin.layout.arms.values()])
     tree = cKDTree(arms[:, :2])
@@ -110,7 +110,7 @@ def _draw_lines(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     from matplotlib.collections import LineCollection
 
     segments = []
-    for ids in mannequin.layout.lines.values():
+    for ids in mannequin.layout.body_lines.values():
         seen = _visible(turned, mannequin, ids)
         both = seen[:-1] & seen[1:]
         segments.append(np.stack([turned[ids[:-1]], turned[ids[1:]]], 1)[both][:, :, :2])
@@ -120,7 +120,8 @@ def _draw_lines(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
 def _label_levels(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     """Return names and girths [cm] of the profiles behind the side view, on short leaders, spread so that none overlap."""
     levels = mannequin.levels()
-    names = ["neck", "chest back", *reversed(RING_LEVELS)]
+    trunk = RING_LEVELS[RING_LEVELS.index("hip") :]
+    names = ["neck", "chest back", *reversed(trunk), *(f"{line} left" for line in LEG_LINES.values())]
     span = float(np.ptp(turned[:, 1]))
     anchors = [turned[ids][int(np.argmax(turned[ids][:, 0]))] for ids in (mannequin.layout.lines[n] for n in names)]
     places = _spread(np.array([a[1] for a in anchors]), 0.028 * span)
@@ -141,15 +142,15 @@ def _spread(wished: FloatArray, gap: float) -> FloatArray:
 
 def _label_lines(axes: Any, turned: FloatArray, mannequin: Mannequin, view: str) -> None:
     """Return names of the vertical lines, written along them where they are seen best, and of shoulder and armhole."""
-    rows = mannequin.layout.level_row
     places = {
-        "front": {"centre front": 0.15, "princess front right": 0.35, "princess front left": 0.35},
-        "three-quarter": {"side left": 0.40},
-        "back": {"centre back": 0.15, "princess back left": 0.35, "princess back right": 0.35},
+        "front": {"centre front": 0.06, "crease front right": 0.45, "crease front left": 0.45},
+        "three-quarter": {"outseam left": 0.45},
+        "back": {"centre back": 0.06, "crease back left": 0.45, "crease back right": 0.45},
     }[view]
     for name, share in places.items():
-        ids = mannequin.layout.lines[name]
-        row = int(rows["ankle"] + share * (rows["thigh"] - rows["ankle"]))
+        ids = mannequin.layout.body_lines[name]
+        ids = ids if turned[ids[0], 1] < turned[ids[-1], 1] else ids[::-1]
+        row = int(share * (len(ids) - 1))
         point, above = turned[ids[row]], turned[ids[row + 2]]
         tilt = np.degrees(np.arctan2(above[1] - point[1], above[0] - point[0]))
         axes.text(

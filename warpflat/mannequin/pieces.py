@@ -19,6 +19,11 @@ from warpflat.surface.mesh import Surface
 
 __all__ = ["FormPiece", "FormSeam", "cut_pieces"]
 
+# The lines of the trunk that run on down a leg: a piece that has both has one edge, under the leg's name.
+_CONTINUED = {
+    "centre front": "crotch front", "centre back": "crotch back", "side left": "outseam left", "side right": "outseam right",
+}  # fmt: skip
+
 #: For each piece its brick patterns, its datum line, and the lines along which it is cut open.
 Recipes = Mapping[str, tuple[Sequence[str], str, Sequence[str]]]
 
@@ -242,6 +247,7 @@ def _edges(
         line_of.get((min(a, b), max(a, b)), "edge")
         for a, b in zip(on_grid.tolist(), np.roll(on_grid, -1).tolist(), strict=True)
     ]
+    labels = [_CONTINUED[label] if _CONTINUED.get(label) in labels else label for label in labels]
     # A doubled line turns back on itself at its end, which starts a new edge though the label stays.
     turns = [labels[i] != labels[i - 1] or on_grid[i - 1] == on_grid[(i + 1) % len(loop)] for i in range(len(loop))]
     starts = [i for i, t in enumerate(turns) if t] or [0]

@@ -9,13 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.blueprint import Blueprint, Profile
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.rays import ray_radii
 from warpflat.mannequin.scan_checks import check_girths
-from warpflat.mannequin.scan_legs import plumb_legs
+from warpflat.mannequin.scan_legs import leg_curves, plumb_legs, slice_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms, underarm_point
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
@@ -63,13 +63,15 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     trunk = trunk_sections(slicer)
     levels, more = find_levels(trunk, options.landmarks)
     check_girths(trunk, levels)
-    plumb, apart = plumb_legs(slicer, trunk, levels["hip"])
+    legs = slice_legs(slicer, trunk, levels["hip"])
+    plumb, apart = plumb_legs(trunk, legs)
     underarms = {side: underarm_point(slicer, trunk, side, levels["underbust"]) for side in ("left", "right")}
     profile = _profiles(plumb, levels, underarms)
     quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile, underarms)
     blueprint = Blueprint(
         profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
-        neck=neck, collar=collar, attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
+        legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=neck, collar=collar,
+        attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
     )  # fmt: skip
     sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
     return ScanFound(
@@ -78,31 +80,6 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         notes=(*notes, *more, *apart),
         sections=sections,
     )
-
-
-def _ray_radii(hull: FloatArray, middle: FloatArray, count: int, height: float) -> FloatArray:
-    """Return distance [m] from `middle` to a convex hull along `count` even directions, from +z over +x.
-
-    Raises:
-        InputError: if `middle` does not lie inside the hull; names its `height` [m].
-    """
-    corners = hull - middle
-    angle = np.arctan2(corners[:, 0], corners[:, 1]) % (2.0 * np.pi)
-    order = np.argsort(angle)
-    corners, angle = corners[order], angle[order]
-    if np.diff(angle, append=angle[0] + 2.0 * np.pi).max() >= np.pi:
-        raise InputError(
-            f"scan: the body at {height:.2f} m above the floor does not surround the midplane; its mesh is broken there"
-        )
-    rays = np.arange(count) * 2.0 * np.pi / count
-    after = np.searchsorted(angle, rays, side="right") % len(corners)
-    a, b = corners[after - 1], corners[after]
-    d = np.column_stack([np.sin(rays), np.cos(rays)])
-    along = b - a
-    bottom = d[:, 0] * along[:, 1] - d[:, 1] * along[:, 0]
-    top = a[:, 0] * along[:, 1] - a[:, 1] * along[:, 0]
-    safe = np.abs(bottom) > 1e-12
-    return np.where(safe, top / np.where(safe, bottom, 1.0), np.linalg.norm(a, axis=1))
 
 
 def _profiles(
@@ -116,7 +93,7 @@ def _profiles(
     # A row's rays start from a point that climbs smoothly, or the rows would be twisted against each other.
     start = gaussian_filter1d(middle_z, 3.0, mode="nearest")
     radii = np.stack([
-        _ray_radii(t.hulls[i], np.array([0.0, z]), count, float(t.y[i])) for i, z in zip(rows, start, strict=True)
+        ray_radii(t.hulls[i], np.array([0.0, z]), count, float(t.y[i])) for i, z in zip(rows, start, strict=True)
     ])  # fmt: skip
     radii = gaussian_filter1d(radii, _UP_SIGMA, axis=0, mode="nearest")
     spectrum = np.fft.rfft(radii, axis=1)

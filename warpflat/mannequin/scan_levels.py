@@ -183,6 +183,8 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     levels["underbust"] = given.get("underbust") or _underbust(t, levels["waist"], levels["bust"], notes)
     levels["thigh"] = min(0.44 * h, t.crotch - 0.01 * h, levels["hip"] - 0.05 * h)
     levels["knee"], levels["ankle"] = 0.28 * h, 0.06 * h
+    levels["leg_thigh"], levels["leg_knee"] = t.crotch - 0.03 * h, levels["knee"]
+    levels["leg_calf"], levels["leg_ankle"] = 0.205 * h, levels["ankle"]
     levels["front_neck"], levels["side_neck"] = _neck(t, levels["armpit"])
     for name, height in given.items():
         levels[name] = height

@@ -1,4 +1,4 @@
-"""The sheet above the bust: chest, blades and shoulders as one graph of the grid's vertices."""
+"""Sheets of the grid's vertices as one graph: chest, blades and shoulders above the bust, the fork below the hip."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import IntArray
-from warpflat.mannequin.layout import Layout
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.mannequin.layout import LEG_LEVELS, Layout
 
-__all__ = ["sheet_laplacian"]
+__all__ = ["fill_fork", "sheet_laplacian"]
 
 
 def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
@@ -24,10 +24,47 @@ def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDAr
         the sheet's vertices (#S), the operator (#S by #S sparse: mean of the neighbours minus the vertex), and for
         every vertex of the layout its row in it, -1 for those outside.
     """
+    grids = [_closed(layout.rings[first_row:]), layout.front, layout.back, *layout.yokes.values()]
+    return _umbrella(layout, grids)
+
+
+def fill_fork(values: FloatArray, layout: Layout) -> None:
+    """Set the rows between the loops of hip and crotch curve and the thighs to the smoothest sheet through what is around.
+
+    Args:
+        values: layout.vertex_count by 3, places or displacements [m], changed in place.
+        layout: the grid.
+    """
+    from scipy.sparse.linalg import spsolve
+
+    ids, laplacian, local = _fork_laplacian(layout, 2)
+    last = layout.leg_row["leg_thigh"]
+    free = local[np.concatenate([grid[1:last].ravel() for grid in layout.legs.values()])]
+    # The outermost rows have no neighbours beyond them, so nothing can be smooth there.
+    hip = layout.level_row["hip"]
+    rims = [layout.rings[hip + 2], *(grid[last + 2] for grid in layout.legs.values())]
+    inner = np.setdiff1d(np.arange(len(ids)), local[np.concatenate(rims)])
+    known = np.setdiff1d(np.arange(len(ids)), free)
+    operator = laplacian[inner]
+    unknown, fixed = operator[:, free], operator[:, known]
+    right = -(unknown.T @ (fixed @ values[ids[known]]))
+    values[ids[free]] = spsolve((unknown.T @ unknown).tocsc(), right)
+
+
+def _fork_laplacian(layout: Layout, rows: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
+    """Return the umbrella operator of the fork, from `rows` rows above the hip to as many below the thighs, as `sheet_laplacian`."""
+    hip, thigh = layout.level_row["hip"], layout.leg_row[LEG_LEVELS[1]]
+    legs = [_closed(grid[: thigh + rows + 1]) for grid in layout.legs.values()]
+    return _umbrella(layout, [_closed(layout.rings[hip : hip + rows + 1]), *legs])
+
+
+def _closed(grid: IntArray) -> IntArray:
+    return np.hstack([grid, grid[:, :1]])
+
+
+def _umbrella(layout: Layout, grids: list[IntArray]) -> tuple[IntArray, Any, NDArray[np.int64]]:
     from scipy import sparse
 
-    closed = layout.rings[first_row:]
-    grids = [np.hstack([closed, closed[:, :1]]), layout.front, layout.back, *layout.yokes.values()]
     across = [np.stack([g[:, :-1], g[:, 1:]], -1).reshape(-1, 2) for g in grids]
     along = [np.stack([g[:-1], g[1:]], -1).reshape(-1, 2) for g in grids]
     edges = np.unique(np.sort(np.concatenate(across + along), axis=1), axis=0)

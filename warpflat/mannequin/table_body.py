@@ -13,6 +13,7 @@ from warpflat.mannequin.blueprint import ArmCurves, Blueprint, Profile, QuarterC
 from warpflat.mannequin.layout import QUARTERS, RING_LEVELS
 from warpflat.mannequin.measurements import Measurements, size_tables
 from warpflat.mannequin.profiles import Section, section_curve
+from warpflat.mannequin.table_legs import legs_from_measurements
 
 __all__ = ["PRINCESS", "blueprint_from_measurements"]
 
@@ -43,6 +44,7 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
         heights={level: measurements.heights[level] for level in RING_LEVELS},
         quarters=quarters,
         arms=_arms(measurements, quarters),
+        legs=legs_from_measurements(measurements, profile),
         neck=measurements.lengths["neck"],
         collar=_collar(measurements),
     )

@@ -42,21 +42,27 @@ def write_mannequin_usd(mannequin: Mannequin, path: str | os.PathLike[str]) -> N
         group = UsdGeom.Xform.Define(stage, "/World/mannequin").GetPrim()
         Usd.ModelAPI(group).SetKind(Kind.Tokens.component)
         group.SetDocumentation(mannequin.source)
-        _body(stage, mannequin)
+        _mesh(stage, mannequin, "body", on_body=True)
+        _mesh(stage, mannequin, "tube", on_body=False)
         _lines(stage, mannequin)
     export_stage(stage, path)
 
 
-def _body(stage: Any, mannequin: Mannequin) -> None:
+def _mesh(stage: Any, mannequin: Mannequin, part: str, *, on_body: bool) -> None:
+    """Add the body, or the tube around both legs as a guide that renderers leave out."""
     from pxr import Gf, UsdGeom, Vt
 
     layout = mannequin.layout
+    chosen = layout.on_body == on_body
+    corners, face_brick = layout.faces[chosen], layout.face_brick[chosen]
     points = mannequin.vertices.astype(np.float32)
-    mesh = UsdGeom.Mesh.Define(stage, "/World/mannequin/body")
+    mesh = UsdGeom.Mesh.Define(stage, f"/World/mannequin/{part}")
+    if not on_body:
+        mesh.CreatePurposeAttr(UsdGeom.Tokens.guide)
     mesh.CreatePointsAttr(Vt.Vec3fArray.FromNumpy(points))
-    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(layout.faces), 4, np.int32)))
-    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(layout.faces.reshape(-1), np.int32)))
-    normals = vertex_normals(mannequin.vertices, layout.faces).astype(np.float32)
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(np.full(len(corners), 4, np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(corners.reshape(-1), np.int32)))
+    normals = vertex_normals(mannequin.vertices, corners).astype(np.float32)
     mesh.CreateNormalsAttr(Vt.Vec3fArray.FromNumpy(normals))
     mesh.SetNormalsInterpolation(UsdGeom.Tokens.vertex)
     mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
@@ -66,7 +72,9 @@ def _body(stage: Any, mannequin: Mannequin) -> None:
     mesh.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set(Vt.Vec3fArray([Gf.Vec3f(*_CLOTH)]))
     taken: set[str] = set()
     for index, name in enumerate(layout.bricks):
-        faces = np.flatnonzero(layout.face_brick == index).astype(np.int32)
+        faces = np.flatnonzero(face_brick == index).astype(np.int32)
+        if not len(faces):
+            continue
         subset = UsdGeom.Subset.CreateGeomSubset(
             mesh, valid_name(name, taken), UsdGeom.Tokens.face, Vt.IntArray.FromNumpy(faces), "brick",
             UsdGeom.Tokens.partition,

@@ -1,0 +1,88 @@
+"""Legs of the mannequin and the form `trousers`."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.mannequin.forms import form_from_mapping
+from warpflat.mannequin.mannequin import Mannequin
+
+SIDES = ("left", "right")
+
+
+@pytest.fixture(scope="module", params=["EU 38", "men 54"])
+def body(request: pytest.FixtureRequest) -> Mannequin:
+    return Mannequin.from_size(request.param, resolution_mm=20)
+
+
+def _mesh(body: Mannequin) -> trimesh.Trimesh:
+    quads = body.layout.body_faces
+    return trimesh.Trimesh(body.vertices, np.concatenate([quads[:, :3], quads[:, [0, 2, 3]]]), process=False)
+
+
+def test_each_leg_has_its_girths(body: Mannequin) -> None:
+    levels = body.levels()
+    order = [levels[f"{name} left"].height for name in ("thigh", "knee", "calf", "ankle")]
+    assert order == sorted(order, reverse=True)
+    assert order[0] < levels["crotch front"].height < levels["hip"].height
+    for name in ("thigh", "knee", "calf", "ankle"):
+        ring = body.line(f"{name} left")
+        assert levels[f"{name} left"].girth == pytest.approx(levels[f"{name} right"].girth, abs=1e-9)
+        assert ring[:, 0].min() > 0.0  # on its own side of the midplane
+    assert levels["thigh left"].girth > 1.3 * levels["knee left"].girth
+
+
+def test_the_tube_around_both_legs_holds_them(body: Mannequin) -> None:
+    from scipy.spatial import ConvexHull
+
+    for name in ("thigh", "knee", "ankle"):
+        around = body.line(name)[:-1]
+        height = around[0, 1]
+        section = np.asarray(_mesh(body).section([0, 1, 0], [0, height, 0]).vertices)
+        for part in section[np.abs(section[:, 0]) < 0.3][:, None, [0, 2]]:
+            planes = ConvexHull(around[:, [0, 2]]).equations
+            assert (planes[:, :2] @ part[0] + planes[:, 2]).max() < 0.006, name
+
+
+def test_trousers_are_sewn_from_four_pieces_around_the_crotch(body: Mannequin) -> None:
+    made = body.form("trousers")
+    seams = {seam.name: seam for seam in made.seams}
+    assert set(seams) == {
+        "crotch front",
+        "crotch back",
+        *(f"{s} {side}" for s in ("inseam", "outseam") for side in SIDES),
+    }
+
+    def length(piece: str, edge: str) -> float:
+        return polyline_length(made.pieces[piece].surface.vertices[made.pieces[piece].edges[edge]])
+
+    front, back = length("front_left", "crotch front"), length("back_left", "crotch back")
+    assert 1.1 * front < back < 1.6 * front
+    for seam in seams.values():
+        first, second = (
+            made.pieces[p].surface.vertices[ids] for p, ids in zip(seam.pieces, seam.vertices, strict=True)
+        )
+        assert np.array_equal(first, second)
+    assert set(body.form("trousers", half=True).pieces) == {"front_left", "back_left"}
+
+
+def test_trousers_lie_outside_the_body(body: Mannequin) -> None:
+    made = body.form("trousers")
+    used = np.unique(np.concatenate([piece.grid_vertices for piece in made.pieces.values()]))
+    mesh = _mesh(body)
+    place, distance, triangle = trimesh.proximity.closest_point_naive(mesh, made.vertices[used])
+    out = np.einsum("nd,nd->n", made.vertices[used] - place, mesh.face_normals[triangle])
+    assert distance[out < 0.0].max(initial=0.0) < 1e-4
+
+
+def test_the_crotch_curve_moves_up_and_down_only(body: Mannequin) -> None:
+    low = form_from_mapping("low", {"like": "trousers", "profiles": {"crotch": {"raise_cm": -4.0}}})
+    drop = body.form("trousers").vertices - body.form(low).vertices
+    assert drop[body.layout.crotch[body.layout.crotch_point], 1] == pytest.approx(0.025, abs=0.002)
+    wide = form_from_mapping("wide", {"like": "trousers", "profiles": {"crotch": {"ease_cm": 4.0}}})
+    with pytest.raises(InputError, match="profile crotch: it moves up or down only"):
+        body.form(wide)
