@@ -22,9 +22,10 @@ from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.mannequin.form_seams import FormSeam
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.pieces import FormPiece, FormSeam
+from warpflat.mannequin.pieces import FormPiece
 from warpflat.solver.options import RelaxOptions
 
 __all__ = ["Garment", "flatten_form"]
@@ -97,10 +98,10 @@ class Garment:
         return SeamLengths(
             name=seam.name,
             sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
-            length_3d=polyline_length(first.surface.vertices[seam.vertices[0]]),
+            length_3d=sum(polyline_length(first.surface.vertices[run.vertices[0]]) for run in seam.runs),
             lengths=(
-                polyline_length(first.positions[seam.vertices[0]]),
-                polyline_length(second.positions[seam.vertices[1]]),
+                sum(polyline_length(first.positions[run.vertices[0]]) for run in seam.runs),
+                sum(polyline_length(second.positions[run.vertices[1]]) for run in seam.runs),
             ),
             ease=1.0 / ratio - 1.0,
             cost=cost,
@@ -225,9 +226,11 @@ def flatten_form(
     for name, edges in ratios.full.items():
         pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
     pairs = [
-        SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices, ratio=ratio)
+        SeamPair(name=seam.name, pieces=seam.pieces, vertices=run.vertices, ratio=ratio)
         for seam, ratio in zip(form.seams, ratios.ratios, strict=True)
+        for run in seam.runs
     ]
+    pairs += _dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     result = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
     return Garment(
@@ -246,9 +249,24 @@ def _callback_by_name(
     return call
 
 
+def _dart_pairs(form: FormResult) -> list[SeamPair]:
+    """Return the legs of every dart, to be sewn to each other."""
+    return [
+        SeamPair(name=f"{name}.{dart}", pieces=(name, name), vertices=(piece.edges[left], piece.edges[right][::-1]))
+        for name, piece in form.pieces.items()
+        for dart, (left, right) in piece.darts.items()
+    ]
+
+
 def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
     """Return the vertices along each side of a seam of the piece that has no fullness."""
-    sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
+    sides = [
+        ids
+        for seam in form.seams
+        for run in seam.runs
+        for name, ids in zip(seam.pieces, run.vertices, strict=True)
+        if name == piece
+    ]
     return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
 
 

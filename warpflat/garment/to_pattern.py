@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.garment.edge_rules import EdgeRules, find_unused_name
+from warpflat.core.text import find_unused_name
+from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
@@ -25,7 +26,8 @@ from warpflat.garment.form_plan import (
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.surface.cut.dart_legs import are_curved
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -198,9 +200,16 @@ def _piece(
     for part in plan:
         vertices = np.asarray(piece.edges[part.source])[part.first : part.last + 1]
         kind = "seam" if open_fold and part.kind == "fold" else part.kind
-        allowance = rules.allowance(name, part.name, kind)
+        # A leg's allowance is for a dart that is cut away, not folded.
+        of_kind = "seam" if kind == "dart" else kind
+        allowance = rules.allowance(name, part.name, of_kind, whole=part.whole)
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
+    legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
+    darts = [
+        Dart(name=dart, left=left, right=right, cut=are_curved(legs[left], legs[right]))
+        for dart, (left, right) in piece.darts.items()
+    ]
     border = list(piece.edges.values())
     along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
@@ -209,6 +218,7 @@ def _piece(
         fabric=flat.fabric.name,
         quantity=quantity,
         edges=edges,
+        darts=darts,
         internal_lines=_inner_lines(piece.surface.lines, border, flat.positions),
         grain=grain_of(
             np.concatenate([edge.points[:-1] for edge in edges]),

@@ -14,7 +14,8 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, same_file
 from warpflat.core.text import quote_value
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms
-from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
+from warpflat.mannequin.form_seams import FormSeam, find_seams
+from warpflat.mannequin.pieces import FormPiece, cut_pieces
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -85,7 +86,7 @@ class FormResult:
         name: the form's.
         vertices: the mannequin's vertices moved to the form, #V by 3 [m]; its layout holds for them.
         pieces: by name; each is one disk.
-        seams: pairs of piece edges that are the same curve in space.
+        seams: between edges that are the same curve in space.
     """
 
     name: str
@@ -202,8 +203,8 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     """
     vertices = _surface(layout, vertices, form)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
-    pieces, seams = cut_pieces(layout, vertices, recipes, half=half)
-    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=seams)
+    pieces = cut_pieces(layout, vertices, recipes, half=half)
+    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=find_seams(pieces))
 
 
 def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:
