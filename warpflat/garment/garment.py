@@ -17,7 +17,8 @@ from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
-from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
+from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
+from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
@@ -110,7 +111,9 @@ class Garment:
     def _measure(self, name: str) -> dict[str, Any]:
         """Build the piece's entry in `metrics.json`, with its strain energy brick by brick."""
         brick = np.array(self.form.pieces[name].face_brick)
-        return self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+        measured = self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+        darts = measure_darts(self.form, name, self.pieces[name].positions)
+        return {**measured, **({"darts": darts} if darts else {})}
 
     def metrics(self) -> dict[str, Any]:
         """Return the content of `metrics.json`."""
@@ -206,7 +209,12 @@ def flatten_form(
     expect(mannequin, Mannequin, "mannequin", "a Mannequin")
     expect_callback(callback)
     expect_each(wishes, SeamWish, "wishes", "a SeamWish")
-    expect_each(constraints, (FixedLength, Straight, Symmetric), "constraints", "a Straight, FixedLength or Symmetric")
+    expect_each(
+        constraints,
+        (DartMouth, FixedLength, Straight, Symmetric),
+        "constraints",
+        "a Straight, FixedLength, Symmetric or DartMouth",
+    )
     ratios = seam_ratios(form, wishes)
     names = list(form.pieces)
     by_name = None if callback is None else _callback_by_name(names, callback)
@@ -230,9 +238,9 @@ def flatten_form(
         for seam, ratio in zip(form.seams, ratios.ratios, strict=True)
         for run in seam.runs
     ]
-    pairs += _dart_pairs(form)
+    pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    result = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
+    result = sew(pieces, pairs, constraints=(*constraints, *dart_constraints(form)), folds=folds, options=relax)
     return Garment(
         name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, ratios=ratios.ratios
     )
@@ -247,15 +255,6 @@ def _callback_by_name(
         callback(names[number], progress)
 
     return call
-
-
-def _dart_pairs(form: FormResult) -> list[SeamPair]:
-    """Return the legs of every dart, to be sewn to each other."""
-    return [
-        SeamPair(name=f"{name}.{dart}", pieces=(name, name), vertices=(piece.edges[left], piece.edges[right][::-1]))
-        for name, piece in form.pieces.items()
-        for dart, (left, right) in piece.darts.items()
-    ]
 
 
 def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:

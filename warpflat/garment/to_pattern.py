@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import (
@@ -27,7 +28,7 @@ from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mi
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Piece, Seam, SeamSide
-from warpflat.surface.cut.dart_legs import are_curved
+from warpflat.surface.cut.dart_legs import are_curved, open_length
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -39,6 +40,8 @@ __all__ = ["grain_of", "pattern_of_garment"]
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
 ON_DATUM = 1e-3
+#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
+CLOSED = 1e-4
 
 
 def pattern_of_garment(
@@ -184,6 +187,36 @@ def _bent_folds(garments: Mapping[str, FlatGarment]) -> dict[str, float]:
     return bent
 
 
+def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
+    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
+
+    Raises:
+        InputError: the legs of a dart overlap from the border on.
+    """
+    by_name = {edge.name: edge for edge in edges}
+    for dart, names in darts.items():
+        left, right = (by_name[name] for name in names)
+        count, overlap = open_length(left.points, right.points[::-1])
+        if count == 0:
+            raise InputError(
+                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
+                "it a width, mouth_mm = 10"
+            )
+        if count == len(left.points) or overlap > CLOSED:
+            continue
+        kept = slice(0, count)
+        tip = 0.5 * (left.points[count] + right.points[::-1][count])
+        for leg, turn in ((left, 1), (right, -1)):
+            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
+            ids = (
+                None
+                if leg.vertices is None
+                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
+            )
+            by_name[leg.name] = replace(leg, points=points, vertices=ids)
+    return list(by_name.values())
+
+
 def _piece(
     flat: Flattening,
     piece: FormPiece,
@@ -205,6 +238,7 @@ def _piece(
         allowance = rules.allowance(name, part.name, of_kind, whole=part.whole)
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
+    edges = _clear_legs(edges, piece.darts, name)
     legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
     darts = [
         Dart(name=dart, left=left, right=right, cut=are_curved(legs[left], legs[right]))

@@ -9,11 +9,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, same_file
 from warpflat.core.text import quote_value
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import FormDart, PlacedDart, place_darts
 from warpflat.mannequin.form_seams import FormSeam, find_seams
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
 
@@ -53,6 +55,7 @@ class Form:
         profiles: adjustments of the body's profiles, by level.
         ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
+        darts: slits in its pieces.
 
     Raises:
         InputError: a piece's name that cannot name a file, or two that would be one file on some system.
@@ -63,6 +66,7 @@ class Form:
     profiles: Mapping[str, Adjustment] = field(default_factory=dict)
     ruled: tuple[tuple[str, str], ...] = ()
     blend: tuple[Form, float] | None = None
+    darts: tuple[FormDart, ...] = ()
 
     def __post_init__(self) -> None:
         files: dict[str, str] = {}
@@ -87,12 +91,14 @@ class FormResult:
         vertices: the mannequin's vertices moved to the form, #V by 3 [m]; its layout holds for them.
         pieces: by name; each is one disk.
         seams: between edges that are the same curve in space.
+        darts: of the pieces on both sides of the body.
     """
 
     name: str
     vertices: FloatArray
     pieces: Mapping[str, FormPiece]
     seams: tuple[FormSeam, ...]
+    darts: tuple[PlacedDart, ...] = ()
 
 
 @functools.cache
@@ -203,8 +209,15 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     """
     vertices = _surface(layout, vertices, form)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
-    pieces = cut_pieces(layout, vertices, recipes, half=half)
-    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=find_seams(pieces))
+    placed: tuple[PlacedDart, ...] = ()
+    if form.darts:
+        bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
+        placed = place_darts(layout, vertices, bricks, form.darts)
+    rows: dict[str, dict[str, IntArray]] = {}
+    for dart in placed:
+        rows.setdefault(dart.piece, {})[dart.name] = dart.row
+    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half)
+    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed)
 
 
 def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:

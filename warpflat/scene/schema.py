@@ -285,6 +285,8 @@ class SceneTable(Table):
     """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
+    shape: Literal["none", "darts", "princess"] = "none"
+    """How a form's pieces are shaped: not, by the darts of a pattern book's block, or by seams along the princess lines."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
@@ -315,6 +317,10 @@ class SceneTable(Table):
 
     def _check_surface(self) -> None:
         """Refuse what belongs to the form on a mannequin."""
+        if self.shape != "none":
+            raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+        for number, cut in enumerate(self.cuts):
+            cut.check_for_surface(f"cuts[{number}]")
         if self.half:
             raise ValueError(
                 "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
@@ -331,8 +337,10 @@ class SceneTable(Table):
         """Refuse what belongs to a surface."""
         if self.lines or self.datum:
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.cuts or self.auto_cut:
-            raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.auto_cut:
+            raise ValueError('auto_cut belongs to a [surface]; a form has shape = "darts" or "princess"')
+        for number, cut in enumerate(self.cuts):
+            cut.check_for_form(f"cuts[{number}]")
         for number, seam in enumerate(self.seams):
             if seam.sides is not None:
                 raise ValueError(
@@ -369,6 +377,11 @@ class CutTable(Table):
     `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
     straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
     between points or along a plane runs through are divided. Tables with one `name` are one cut.
+
+    On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
+    "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
+    the waist in a skirt, the dart ends. `towards` puts it between two lines, `between` at that share of the way. `mouth_mm` is
+    how wide it opens; the energy that this costs is told. It is `mirrored` unless that is false.
     """
 
     name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
@@ -380,6 +393,30 @@ class CutTable(Table):
     plane: CutPlane | None = None
     tip_back: Annotated[float, Field(ge=0.0)] = 0.0
     """How far the tips of its darts are drawn back, [m]."""
+    piece: str | None = None
+    towards: str | None = None
+    between: Share = 0.5
+    tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
+    mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
+    mirrored: bool = True
+
+    def check_for_form(self, where: str) -> None:
+        """Refuse what a dart in a form does not have."""
+        if self.line is None or self.piece is None:
+            raise ValueError(
+                f"{where}: on a form a dart needs its piece and a line of it, as "
+                'piece = "front_bodice", line = "princess front left"'
+            )
+        if self.tip_back:
+            raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
+        if self.part is not None and (self.tip_mm is not None or self.towards is not None):
+            raise ValueError(f"{where}: give part, or tip_mm and towards")
+
+    def check_for_surface(self, where: str) -> None:
+        """Refuse what only a dart in a form has."""
+        given = self.model_fields_set & {"piece", "towards", "between", "tip_mm", "mouth_mm", "mirrored"}
+        if given:
+            raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
 
     @model_validator(mode="after")
     def _one_way(self) -> CutTable:
