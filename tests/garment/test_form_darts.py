@@ -9,6 +9,7 @@ from warpflat.core.errors import InputError
 from warpflat.garment.garment import flatten_form
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.darts import FormDart
+from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
@@ -22,7 +23,8 @@ def body():
 
 @pytest.fixture(scope="module")
 def block(body):
-    return shaped_form(body.layout, shipped_form("basic_block"), "darts")
+    eased = replace(shipped_form("basic_block"), ease=ease_from("close", "test"))
+    return shaped_form(body.layout, eased, "darts")
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +82,35 @@ def test_legs_are_sewn_and_the_mouth_kept(sewn):
     assert prices["front_bodice.waist dart left mouth 50 mm"] >= 0.0
     back = {dart["name"]: dart["intake_m"] for dart in sewn.metrics()["pieces"]["back_skirt"]["darts"]}
     assert back["waist dart left"] == pytest.approx(back["second waist dart left"], abs=2e-4)
+
+
+def test_girths_are_the_body_and_its_ease(body, sewn):
+    girths = sewn.metrics()["girths"]
+    assert list(girths) == ["bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee"]
+    wanted = {level: girth["ease_wanted_m"] for level, girth in girths.items() if "ease_wanted_m" in girth}
+    assert wanted == pytest.approx({"bust": 0.05, "waist": 0.025, "abdomen": 0.03, "hip": 0.03})
+    for level, ease in wanted.items():
+        assert girths[level]["body_m"] == pytest.approx(body.levels()[level].girth)
+        assert girths[level]["ease_m"] == pytest.approx(ease, abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("ease", "message"),
+    [
+        ("clos", "did you mean 'close'"),
+        ({"hips": 2.0}, "did you mean 'hip'"),
+        ({"hip": "wide"}, "a number from -30 to 400 cm is needed"),
+        (3, "a preset or a table of levels"),
+    ],
+)
+def test_ease_that_cannot_be(ease, message):
+    with pytest.raises(InputError, match=message):
+        ease_from(ease, "scene")
+
+
+def test_ease_of_a_preset_and_of_a_level():
+    assert ease_from({"preset": "loose", "hip": 10}, "scene")["hip"] == 10.0
+    assert ease_from({"hip": 10}, "scene", base={"hip": 1.0, "waist": 2.0}) == {"hip": 10.0, "waist": 2.0}
 
 
 def test_the_front_wants_its_darts(body, sewn):

@@ -75,7 +75,7 @@ def test_princess_dress_has_panels_and_shirt_has_sleeves(body: Mannequin) -> Non
 
 def test_ease_is_what_the_tape_reads_more(body: Mannequin) -> None:
     form = form_from_mapping(
-        "loose", {"like": "bodice", "profiles": {"bust": {"ease_cm": 8.0}, "waist": {"ease_cm": 5.0, "scale": 1.1}}}
+        "loose", {"like": "bodice", "profiles": {"waist": {"scale": 1.1}}, "ease": {"bust": 8.0, "waist": 5.0}}
     )
     made = body.form(form)
     girth = {k: convex_girth(made.vertices[body.layout.lines[k]]) for k in ("bust", "waist", "underbust")}
@@ -143,7 +143,7 @@ def test_sizes_of_one_form_correspond(body: Mannequin) -> None:
         ({}, "pieces is missing"),
         ({"pieces": {"a": {"brick": ["x"]}}}, "did you mean 'bricks'"),
         ({"pieces": {"a": {"bricks": []}}}, "bricks is empty"),
-        ({"like": "skirt", "profiles": {"hip": {"ease": 2}}}, "did you mean 'ease_cm'"),
+        ({"like": "skirt", "ease": {"hips": 2}}, "did you mean 'hip'"),
         ({"like": "skirt", "profiles": {"hip": {"scale": 40}}}, r"from 0\.5 to 6"),
         ({"like": "skirt", "profiles": {"hip": {"scale": "big"}}}, "a number"),
         ({"like": "skirt", "profiles": {"hip": {"bridge": 1}}}, "true or false"),
@@ -161,7 +161,7 @@ def test_scene_mistakes_are_named(data: dict[str, object], words: str) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"like": "skirt", "profiles": {"neck": {"ease_cm": 2}}}, "cannot be adjusted"),
+        ({"like": "skirt", "profiles": {"neck": {"scale": 2}}}, "cannot be adjusted"),
         ({"like": "skirt", "profiles": {"knee": {"like": "biceps"}}}, "level of the same part"),
         ({"like": "skirt", "profiles": {"knee": {"raise_cm": 40}}}, "less than 1 cm above"),
         ({"like": "skirt", "ruled": [["hip", "neck"]]}, "ruled"),

@@ -21,6 +21,7 @@ from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Str
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.form_seams import FormSeam
@@ -124,6 +125,9 @@ class Garment:
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
+            "girths": pattern_girths(
+                self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
+            ),
             **({} if self.sewn is None else self._sewing()),
         }
         return run_metrics(pieces, first.network.device, more)
@@ -240,7 +244,8 @@ def flatten_form(
     ]
     pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    result = sew(pieces, pairs, constraints=(*constraints, *dart_constraints(form)), folds=folds, options=relax)
+    held = (*constraints, *dart_constraints(form), *girth_constraints(form))
+    result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
     return Garment(
         name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, ratios=ratios.ratios
     )

@@ -18,6 +18,7 @@ from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_f
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.mannequin.darts import FormDart
+from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
@@ -50,6 +51,8 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
             form = shipped_form(settings.form)
         else:
             form = form_from_mapping(scene.name, settings.form or {})
+        if settings.ease is not None:
+            form = replace(form, ease=ease_from(settings.ease, "scene", base=form.ease))
         form = shaped_form(mannequin.layout, form, settings.shape)
     with errors_named(f"{scene.where}: cuts"):
         form = replace(form, darts=_with_cuts(form.darts, settings.cuts))

@@ -156,21 +156,21 @@ class SeamTable(Table):
     A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
     as "left" or "piece.left"; they may be equally long.
 
-    `ease` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
+    `fullness` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
     piece. `longer` names the piece, "piece.edge" or line that is longer; the seam's second side if not given.
     """
 
     name: str = Field(min_length=1)
     sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
-    ease: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
     gather: Annotated[float, Field(ge=1, le=5)] | None = None
     longer: str | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> SeamTable:
-        given = (self.ease is not None) + (self.gather is not None)
+        given = (self.fullness is not None) + (self.gather is not None)
         if given > 1 or (given == 0 and self.sides is None):
-            raise ValueError("give either ease = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
+            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
         return self
 
 
@@ -287,6 +287,8 @@ class SceneTable(Table):
     """Symmetric pieces as their left half, on the fold."""
     shape: Literal["none", "darts", "princess"] = "none"
     """How a form's pieces are shaped: not, by the darts of a pattern book's block, or by seams along the princess lines."""
+    ease: str | dict[str, Any] | None = None
+    """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
