@@ -27,7 +27,16 @@ from warpflat.surface.mirror import mirror_partners
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Constraint", "DartMouth", "FixedLength", "Straight", "Symmetric", "equations_of_constraint", "find_piece"]
+__all__ = [
+    "Constraint",
+    "DartMouth",
+    "FixedLength",
+    "KeptGirth",
+    "Straight",
+    "Symmetric",
+    "equations_of_constraint",
+    "find_piece",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,7 +124,27 @@ class DartMouth:
         return f"{self.piece}.{self.dart} mouth {wanted}"
 
 
-Constraint = Straight | FixedLength | Symmetric | DartMouth
+@dataclass(frozen=True, kw_only=True)
+class KeptGirth:
+    """A level that keeps its length on the form in one piece, in all the parts into which darts divide it.
+
+    Attributes:
+        piece, level: names.
+        lines: names of the parts.
+    """
+
+    piece: str
+    level: str
+    lines: tuple[str, ...]
+    kind: ClassVar[str] = "girth"
+
+    @property
+    def name(self) -> str:
+        """Name for reports."""
+        return f"{self.piece}.{self.level} girth"
+
+
+Constraint = Straight | FixedLength | Symmetric | DartMouth | KeptGirth
 
 
 def equations_of_constraint(
@@ -132,6 +161,9 @@ def equations_of_constraint(
     """
     if isinstance(constraint, DartMouth):
         return _mouth_equations(constraint, piece), False
+    if isinstance(constraint, KeptGirth):
+        parts = [FixedLength(piece=constraint.piece, line=line) for line in constraint.lines]
+        return one_group(*(equations_of_constraint(part, piece, fold)[0] for part in parts)), False
     surface = piece.network.surface
     line = _line(constraint, piece)
     if isinstance(constraint, FixedLength):

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.garment.constraints import FixedLength
+from warpflat.garment.constraints import KeptGirth
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.pieces import is_part_of
 from warpflat.mannequin.profiles import convex_girth
 
 if TYPE_CHECKING:
@@ -20,7 +21,7 @@ if TYPE_CHECKING:
 __all__ = ["girth_constraints", "pattern_girths"]
 
 
-def girth_constraints(form: FormResult) -> list[FixedLength]:
+def girth_constraints(form: FormResult) -> list[KeptGirth]:
     """Return constraints that keep the girth of every level with ease, in a form with darts.
 
     Cloth would rather lose some of it to strain. Darts give it its shape at a price of few millijoules; without them the
@@ -28,14 +29,13 @@ def girth_constraints(form: FormResult) -> list[FixedLength]:
     """
     if not form.darts:
         return []
-    return [
-        FixedLength(piece=name, line=line)
-        for level, ease in form.ease.items()
-        if ease != 0.0
-        for name, piece in form.pieces.items()
-        for line in piece.surface.lines
-        if line == level or (line.startswith(f"{level} ") and line[len(level) + 1 :].isdigit())
-    ]
+    found = []
+    for level in (level for level, ease in form.ease.items() if ease != 0.0):
+        for name, piece in form.pieces.items():
+            lines = tuple(line for line in piece.surface.lines if is_part_of(line, level))
+            if lines:
+                found.append(KeptGirth(piece=name, level=level, lines=lines))
+    return found
 
 
 def pattern_girths(

@@ -18,7 +18,7 @@ from warpflat.mannequin.layout import Layout
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 
-__all__ = ["FormPiece", "cut_pieces"]
+__all__ = ["FormPiece", "cut_pieces", "is_part_of"]
 
 #: For each piece its brick patterns, its datum line, and the lines along which it is cut open.
 Recipes = Mapping[str, tuple[Sequence[str], str, Sequence[str]]]
@@ -138,7 +138,7 @@ def _piece(
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
     wished = datum or fold
-    along = [line for line in lines if _is_of(line, wished)] if wished else list(lines)[:1]
+    along = [line for line in lines if is_part_of(line, wished)] if wished else list(lines)[:1]
     if not along:
         raise InputError(f"form: piece {name}: its datum {datum!r} does not run through it: {nearest(datum, lines)}")
     if fold and len(np.intersect1d(lines[datum if datum in lines else along[0]], edges[fold])) == 1:
@@ -270,7 +270,7 @@ def _named_stretches(
     last, taken = "", set[str]()
     for number, (label, _) in enumerate(stretches):
         after_dart = number > 0 and stretches[number - 1][0] in legs
-        goes_on = label not in legs and after_dart and _is_of(last, label)
+        goes_on = label not in legs and after_dart and is_part_of(last, label)
         wholes.append(last if goes_on else find_unused_name(label, taken))
         taken.add(wholes[-1])
         last = last if label in legs else wholes[-1]
@@ -293,14 +293,14 @@ def _lines(
     """
     lines = dict(edges)
     for line, runs in _inner_runs(layout, corners, grid_vertices).items():
-        own = [edge for edge in edges if _is_of(edge, line)]
+        own = [edge for edge in edges if is_part_of(edge, line)]
         for run in sorted(runs, key=len, reverse=True):
             whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in own})
             lines[border or find_unused_name(line, lines)] = np.array(whole, np.int32)
     return lines
 
 
-def _is_of(name: str, line: str) -> bool:
+def is_part_of(name: str, line: str) -> bool:
     """Return whether a name is that of a feature line or of a further part of it."""
     return name == line or (name.startswith(f"{line} ") and name[len(line) + 1 :].isdigit())
 
