@@ -13,6 +13,8 @@ from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
+from warpflat.scene.load import make_scene
+from warpflat.scene.run_garment import plan_garment
 from warpflat.surface.cut.dart_legs import open_length
 
 
@@ -170,3 +172,51 @@ def test_princess_seams_part_the_pieces(body):
         "sleeve", {"pieces": {"arm": {"bricks": ["armhole-biceps/arm-left-*"], "open": ["underarm left"]}}}
     )
     assert shaped_form(body.layout, own, "princess").pieces == own.pieces
+
+
+def test_darts_whose_legs_overlap_are_refused(sewn):
+    bodice = sewn.pieces["front_bodice"]
+    left, right = (sewn.form.pieces["front_bodice"].edges[f"waist dart left.{leg}"] for leg in ("left", "right"))
+    turned = bodice.positions.copy()
+    turned[left[:-1]], turned[right[1:]] = bodice.positions[right[:0:-1]], bodice.positions[left[-2::-1]]
+    crossed = {**sewn.pieces, "front_bodice": replace(bodice, positions=turned)}
+    with pytest.raises(InputError, match="dart 'waist dart left' overlaps at its mouth"):
+        pattern_of_garment({"": replace(sewn, pieces=crossed)}, name="block")
+
+
+@pytest.mark.parametrize(
+    ("more", "message"),
+    [
+        ({"cuts": [{"line": "bust"}]}, r"cuts\[0\]: on a form a dart needs its piece"),
+        ({"cuts": [{"line": "bust", "piece": "front"}]}, "cuts: dart 'bust': no piece 'front'"),
+        ({"cuts": [{"line": "bust", "piece": "front_bodice", "tip_back": 0.02}]}, "give tip_mm"),
+        ({"ease": "clos"}, "ease 'clos' is unknown"),
+        ({"auto_cut": {}}, "auto_cut belongs to a"),
+    ],
+)
+def test_scenes_that_ask_for_impossible_shapes(tmp_path, more, message):
+    table = {"form": "basic_block", "mannequin": {"size": "EU 38", "resolution_mm": 40}, **more}
+    with pytest.raises(InputError, match=message):
+        plan_garment(make_scene(table, name="x", folder=tmp_path, where="x.toml"))
+
+
+def test_a_cut_of_a_scene_replaces_the_dart_along_its_line(tmp_path):
+    cut = {"line": "princess front left", "piece": "front_bodice", "mouth_mm": 50}
+    table = {
+        "form": "basic_block",
+        "shape": "darts",
+        "ease": "close",
+        "mannequin": {"size": "EU 38", "resolution_mm": 40},
+    }
+    plan = plan_garment(make_scene({**table, "cuts": [cut]}, name="x", folder=tmp_path, where="x.toml"))
+    front = [dart for dart in plan.form.darts if dart.piece == "front_bodice"]
+    assert [(d.name, d.asked.mouth_mm) for d in front if d.name.endswith("left")] == [
+        ("bust dart left", None),
+        ("waist dart left", 50.0),
+    ]
+
+
+@pytest.mark.parametrize("more", [{"ease": "close"}, {"shape": "darts"}, {"cuts": [{"line": "left", "mouth_mm": 3}]}])
+def test_surfaces_have_no_ease_shape_or_mouths(tmp_path, more):
+    with pytest.raises(InputError, match="belongs to a form"):
+        make_scene({"surface": {"shape": "dome"}, **more}, name="x", folder=tmp_path, where="x.toml")

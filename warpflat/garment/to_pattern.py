@@ -191,7 +191,7 @@ def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], pie
     """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
 
     Raises:
-        InputError: the legs of a dart overlap from the border on.
+        InputError: the legs of a dart overlap from the border on, or by more.
     """
     by_name = {edge.name: edge for edge in edges}
     for dart, names in darts.items():
@@ -202,7 +202,12 @@ def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], pie
                 f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
                 "it a width, mouth_mm = 10"
             )
-        if count == len(left.points) or overlap > CLOSED:
+        if overlap > CLOSED:
+            raise InputError(
+                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
+                "or make it shorter"
+            )
+        if count == len(left.points):
             continue
         kept = slice(0, count)
         tip = 0.5 * (left.points[count] + right.points[::-1][count])

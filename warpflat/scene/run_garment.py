@@ -51,8 +51,9 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
             form = shipped_form(settings.form)
         else:
             form = form_from_mapping(scene.name, settings.form or {})
-        if settings.ease is not None:
-            form = replace(form, ease=ease_from(settings.ease, "scene", base=form.ease))
+    if settings.ease is not None:
+        form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
+    with errors_named(f"{scene.where}: form"):
         form = shaped_form(mannequin.layout, form, settings.shape)
     with errors_named(f"{scene.where}: cuts"):
         form = replace(form, darts=_with_cuts(form.darts, settings.cuts))

@@ -321,6 +321,8 @@ class SceneTable(Table):
         """Refuse what belongs to the form on a mannequin."""
         if self.shape != "none":
             raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+        if self.ease is not None:
+            raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
         for number, cut in enumerate(self.cuts):
             cut.check_for_surface(f"cuts[{number}]")
         if self.half:
