@@ -220,3 +220,10 @@ def test_a_cut_of_a_scene_replaces_the_dart_along_its_line(tmp_path):
 def test_surfaces_have_no_ease_shape_or_mouths(tmp_path, more):
     with pytest.raises(InputError, match="belongs to a form"):
         make_scene({"surface": {"shape": "dome"}, **more}, name="x", folder=tmp_path, where="x.toml")
+
+
+def test_sizes_lie_upon_each_other(sewn):
+    away = {name: replace(piece, positions=np.add(piece.positions, [0.1, -0.02])) for name, piece in sewn.pieces.items()}
+    pattern, _ = pattern_of_garment({"36": sewn, "38": replace(sewn, pieces=away)}, name="block")
+    first, second = (pattern.piece("back_bodice", size).outline for size in ("36", "38"))
+    np.testing.assert_allclose(first, second, atol=1e-12)

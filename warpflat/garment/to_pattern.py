@@ -67,6 +67,7 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
+    garments = _laid_upon_each_other(garments)
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
     bent = _bent_folds(garments)
@@ -87,6 +88,23 @@ def pattern_of_garment(
         for piece, stray in bent.items()
     )
     return Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size), notes
+
+
+def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:
+    """Move the pieces of every size to where the lower end of their datum lies in the first size.
+
+    Relaxation keeps a piece upright, but not in its place.
+    """
+    first = next(iter(garments.values()))
+    moved = {}
+    for size, garment in garments.items():
+        pieces = {}
+        for name, flat in garment.pieces.items():
+            there = first.pieces[name]
+            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
+            pieces[name] = replace(flat, positions=flat.positions + offset) if offset.any() else flat
+        moved[size] = replace(garment, pieces=pieces)
+    return moved
 
 
 def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
