@@ -223,7 +223,9 @@ def test_surfaces_have_no_ease_shape_or_mouths(tmp_path, more):
 
 
 def test_sizes_lie_upon_each_other(sewn):
-    away = {name: replace(piece, positions=np.add(piece.positions, [0.1, -0.02])) for name, piece in sewn.pieces.items()}
+    away = {
+        name: replace(piece, positions=np.add(piece.positions, [0.1, -0.02])) for name, piece in sewn.pieces.items()
+    }
     pattern, _ = pattern_of_garment({"36": sewn, "38": replace(sewn, pieces=away)}, name="block")
     first, second = (pattern.piece("back_bodice", size).outline for size in ("36", "38"))
     np.testing.assert_allclose(first, second, atol=1e-12)
