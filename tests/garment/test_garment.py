@@ -71,7 +71,7 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
         assert abs(measured.difference) < 5e-4, seam.name
         sides = [
             np.linalg.norm(np.diff(block.pieces[n].positions[v], axis=0), axis=1)
-            for n, v in zip(seam.pieces, seam.vertices, strict=True)
+            for n, v in zip(seam.pieces, seam.runs[0].vertices, strict=True)
         ]
         # 0.2 mm per 5 cm, edge by edge
         assert np.abs(sides[0] - sides[1]).max() < 2e-4 * 0.025 / 0.05, seam.name
@@ -168,8 +168,8 @@ def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
     assert {"side left", "side right", "shoulder left", "waist"} <= names
     for seam, measured in zip(block.form.seams, block.seams, strict=True):
         first, second = (block.form.pieces[name].surface.vertices for name in seam.pieces)
-        np.testing.assert_array_equal(first[seam.vertices[0]], second[seam.vertices[1]])
-        flat = [block.pieces[n].positions[v] for n, v in zip(seam.pieces, seam.vertices, strict=True)]
+        np.testing.assert_array_equal(first[seam.runs[0].vertices[0]], second[seam.runs[0].vertices[1]])
+        flat = [block.pieces[n].positions[v] for n, v in zip(seam.pieces, seam.runs[0].vertices, strict=True)]
         lengths = [np.linalg.norm(np.diff(p, axis=0), axis=1).sum() for p in flat]
         np.testing.assert_allclose(measured.lengths, lengths)
         assert measured.as_dict()["difference_mm"] == pytest.approx(1e3 * (lengths[1] - lengths[0]))

@@ -34,7 +34,7 @@ def test_shipped_forms_are_disks_with_matching_seams(body: Mannequin, name: str,
         assert np.array_equal(piece.surface.vertices, form.vertices[piece.grid_vertices])
     assert form.seams
     for seam in form.seams:
-        a, b = (form.pieces[p].surface.vertices[v] for p, v in zip(seam.pieces, seam.vertices, strict=True))
+        a, b = (form.pieces[p].surface.vertices[v] for p, v in zip(seam.pieces, seam.runs[0].vertices, strict=True))
         assert len(a) > 2
         assert np.array_equal(a, b)
 
@@ -75,7 +75,7 @@ def test_princess_dress_has_panels_and_shirt_has_sleeves(body: Mannequin) -> Non
 
 def test_ease_is_what_the_tape_reads_more(body: Mannequin) -> None:
     form = form_from_mapping(
-        "loose", {"like": "bodice", "profiles": {"bust": {"ease_cm": 8.0}, "waist": {"ease_cm": 5.0, "scale": 1.1}}}
+        "loose", {"like": "bodice", "profiles": {"waist": {"scale": 1.1}}, "ease": {"bust": 8.0, "waist": 5.0}}
     )
     made = body.form(form)
     girth = {k: convex_girth(made.vertices[body.layout.lines[k]]) for k in ("bust", "waist", "underbust")}
@@ -92,7 +92,9 @@ def test_ease_is_what_the_tape_reads_more(body: Mannequin) -> None:
 
 
 def test_offset_grows_girth_by_two_pi(body: Mannequin) -> None:
-    made = body.form(form_from_mapping("off", {"like": "skirt", "profiles": {"hip": {"offset_cm": 2.0}}}))
+    made = body.form(
+        form_from_mapping("off", {"like": "skirt", "profiles": {"hip": {"offset_cm": 2.0}}, "ease": {"hip": 0.0}})
+    )
     assert convex_girth(made.vertices[body.layout.lines["hip"]]) == pytest.approx(0.96 + 2 * np.pi * 0.02, abs=1e-6)
 
 
@@ -143,7 +145,7 @@ def test_sizes_of_one_form_correspond(body: Mannequin) -> None:
         ({}, "pieces is missing"),
         ({"pieces": {"a": {"brick": ["x"]}}}, "did you mean 'bricks'"),
         ({"pieces": {"a": {"bricks": []}}}, "bricks is empty"),
-        ({"like": "skirt", "profiles": {"hip": {"ease": 2}}}, "did you mean 'ease_cm'"),
+        ({"like": "skirt", "ease": {"hips": 2}}, "did you mean 'hip'"),
         ({"like": "skirt", "profiles": {"hip": {"scale": 40}}}, r"from 0\.5 to 6"),
         ({"like": "skirt", "profiles": {"hip": {"scale": "big"}}}, "a number"),
         ({"like": "skirt", "profiles": {"hip": {"bridge": 1}}}, "true or false"),
@@ -161,7 +163,7 @@ def test_scene_mistakes_are_named(data: dict[str, object], words: str) -> None:
 @pytest.mark.parametrize(
     ("data", "words"),
     [
-        ({"like": "skirt", "profiles": {"neck": {"ease_cm": 2}}}, "cannot be adjusted"),
+        ({"like": "skirt", "profiles": {"neck": {"scale": 2}}}, "cannot be adjusted"),
         ({"like": "skirt", "profiles": {"knee": {"like": "biceps"}}}, "level of the same part"),
         ({"like": "skirt", "profiles": {"knee": {"raise_cm": 40}}}, "less than 1 cm above"),
         ({"like": "skirt", "ruled": [["hip", "neck"]]}, "ruled"),
@@ -259,7 +261,7 @@ def test_a_collar_stand_opens_at_the_front_and_folds_at_the_back(body: Mannequin
     form = form_from_mapping("mine", {"pieces": {"stand": recipe}})
     whole = body.form(form)
     assert {"neck", "collar", "centre front", "centre front 2"} == set(whole.pieces["stand"].edges)
-    assert [seam.edges for seam in whole.seams] == [("centre front", "centre front 2")]
+    assert [run.edges for seam in whole.seams for run in seam.runs] == [("centre front", "centre front 2")]
     half = body.form(form, half=True).pieces["stand"]
     assert set(half.edges) == {"neck", "collar", "centre front", "centre back"}
     assert half.fold == "centre back"

@@ -83,6 +83,6 @@ def test_the_crotch_curve_moves_up_and_down_only(body: Mannequin) -> None:
     low = form_from_mapping("low", {"like": "trousers", "profiles": {"crotch": {"raise_cm": -4.0}}})
     drop = body.form("trousers").vertices - body.form(low).vertices
     assert drop[body.layout.crotch[body.layout.crotch_point], 1] == pytest.approx(0.025, abs=0.002)
-    wide = form_from_mapping("wide", {"like": "trousers", "profiles": {"crotch": {"ease_cm": 4.0}}})
+    wide = form_from_mapping("wide", {"like": "trousers", "profiles": {"crotch": {"offset_cm": 4.0}}})
     with pytest.raises(InputError, match="profile crotch: it moves up or down only"):
         body.form(wide)

@@ -158,7 +158,7 @@ size = "EU 38"
 resolution_mm = 40
 [[seams]]
 name = "side left"
-ease = 0.03
+fullness = 0.03
 longer = "front"
 [output]
 frames = 0

@@ -31,7 +31,7 @@ def flat_lines(folder: Path, piece: str) -> np.ndarray:
 def skirt(tmp_path_factory: pytest.TempPathFactory):
     out = tmp_path_factory.mktemp("skirt")
     asked = {
-        "seams": [{"name": "side left", "ease": 0.01, "longer": "front"}],
+        "seams": [{"name": "side left", "fullness": 0.01, "longer": "front"}],
         "constraints": [
             {"line": "hip", "straight": "weft", "piece": "front"},
             {"line": "waist", "length_mm": "body"},
@@ -142,11 +142,11 @@ def test_a_limit_that_is_too_low_is_told_apart_from_a_contradiction(tmp_path: Pa
 @pytest.mark.parametrize(
     ("base", "tables", "message"),
     [
-        (SKIRT, {"seams": [{"name": "side left"}]}, r"seams\[0\]: give either ease = 0.02"),
-        (SKIRT, {"seams": [{"name": "side left", "ease": 0.1, "gather": 2}]}, r"seams\[0\]: give either"),
+        (SKIRT, {"seams": [{"name": "side left"}]}, r"seams\[0\]: give either fullness = 0.02"),
+        (SKIRT, {"seams": [{"name": "side left", "fullness": 0.1, "gather": 2}]}, r"seams\[0\]: give either"),
         (SKIRT, {"seams": [{"name": "side left", "gather": 0.5}]}, r"seams\[0\].gather: .*greater than or equal to 1"),
-        (SKIRT, {"seams": [{"nam": "x", "ease": 0.1}]}, r"seams\[0\].nam: unknown key 'nam'; did you mean 'name'"),
-        (BODICE, {"seams": [{"name": "x", "ease": 0.1}]}, r"seams\[0\]: on a \[surface\] give the two lines"),
+        (SKIRT, {"seams": [{"nam": "x", "fullness": 0.1}]}, r"seams\[0\].nam: unknown key 'nam'; did you mean 'name'"),
+        (BODICE, {"seams": [{"name": "x", "fullness": 0.1}]}, r"seams\[0\]: on a \[surface\] give the two lines"),
         (SKIRT, {"constraints": [{"line": "hip"}]}, r"constraints\[0\]: ask for something"),
         (SKIRT, {"constraints": [{"line": "hip", "straight": "up"}]}, r"constraints\[0\].straight: .*'warp'"),
         (SKIRT, {"constraints": [{"line": "hip", "length_mm": "bdy"}]}, r"constraints\[0\].length_mm: .*'body'"),
@@ -165,7 +165,7 @@ def test_a_wrong_line_is_told_before_anything_is_flattened(tmp_path: Path):
     with pytest.raises(
         InputError, match=r"seams: seam 'side left': 'frnt' is not one of its sides; did you mean 'front'"
     ):
-        run_scene(scene(SKIRT, seams=[{"name": "side left", "ease": 0.1, "longer": "frnt"}]), tmp_path)
+        run_scene(scene(SKIRT, seams=[{"name": "side left", "fullness": 0.1, "longer": "frnt"}]), tmp_path)
 
 
 def test_an_oblique_grain_on_the_fold_is_told_before_anything_is_flattened(

@@ -61,7 +61,21 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         tables.append(_seam_table(metrics["seams"]))
     if metrics.get("constraints"):
         tables.append(_constraint_table(metrics["constraints"]))
+    if metrics.get("girths"):
+        tables.append(_girth_line(metrics["girths"]))
     return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
+
+
+def _girth_line(girths: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the line of girths: of the body and of the pattern with darts and seams closed, the ease got and wanted."""
+    parts = []
+    for level, girth in girths.items():
+        wanted = f" of {100 * girth['ease_wanted_m']:+.1f}" if "ease_wanted_m" in girth else ""
+        parts.append(
+            f"{level} {100 * girth['body_m']:.1f} / {100 * girth['form_m']:.1f} / {100 * girth['pattern_m']:.1f} "
+            f"({100 * girth['ease_m']:+.1f}{wanted})"
+        )
+    return f"girths [cm], body / form / pattern (ease): {'; '.join(parts)}"
 
 
 def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:

@@ -4,8 +4,18 @@ from __future__ import annotations
 
 import re
 import unicodedata
+from collections.abc import Container
 
-__all__ = ["MADE_TO_MEASURE", "control_in", "format_count", "one_line", "plain_letters", "quote_value", "size_words"]
+__all__ = [
+    "MADE_TO_MEASURE",
+    "control_in",
+    "find_unused_name",
+    "format_count",
+    "one_line",
+    "plain_letters",
+    "quote_value",
+    "size_words",
+]
 
 #: Letters of a message, of one of its words (a path may be one), and of the user's own words in it, at most.
 LONGEST_LINE, LONGEST_WORD, LONGEST_SHOWN = 1500, 300, 60
@@ -72,3 +82,11 @@ def plain_letters(text: str) -> str:
     """Return a text without the accents of its letters: "Ärmel" becomes "Armel"."""
     apart = unicodedata.normalize("NFKD", text.translate(_LETTERS))
     return "".join(letter for letter in apart if not unicodedata.combining(letter))
+
+
+def find_unused_name(name: str, taken: Container[str]) -> str:
+    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
+    number = 2
+    while f"{name} {number}" in taken:
+        number += 1
+    return f"{name} {number}" if name in taken else name

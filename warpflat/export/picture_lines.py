@@ -71,7 +71,9 @@ class _Names:
         stretches = {
             name: _draw_line(pen, drawn, parts, is_datum=name == datum) for name, parts in drawn.view.lines.items()
         }
-        self._lines = {name: points for name, points in stretches.items() if len(points) > 1}
+        # The legs of darts need no names: everybody sees what they are.
+        named = (name for name in stretches if not name.endswith((".left", ".right")))
+        self._lines = {name: stretches[name] for name in named if len(stretches[name]) > 1}
         _, height = pen.measure("x", LABEL_SIZE)
         self._ink = {name: points_on(line, 0.5 * height) for name, line in self._lines.items()}
         self.unplaced = list(self._lines)

@@ -1,4 +1,4 @@
-"""Constraints on a border or a line: straight, of a fixed length, the mirror image of the other side."""
+"""Constraints on a border, a line or a dart: straight, of a fixed length, symmetric, a mouth of a given width."""
 
 from __future__ import annotations
 
@@ -18,6 +18,7 @@ from warpflat.model.constraint_equations import (
     level_equations,
     mirror_equations,
     one_group,
+    seam_equations,
     smooth_equations,
     straight_equations,
 )
@@ -26,7 +27,16 @@ from warpflat.surface.mirror import mirror_partners
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
 
-__all__ = ["Constraint", "FixedLength", "Straight", "Symmetric", "equations_of_constraint", "find_piece"]
+__all__ = [
+    "Constraint",
+    "DartMouth",
+    "FixedLength",
+    "KeptGirth",
+    "Straight",
+    "Symmetric",
+    "equations_of_constraint",
+    "find_piece",
+]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -91,7 +101,50 @@ class Symmetric:
         return f"{self.piece} symmetric about {self.line}"
 
 
-Constraint = Straight | FixedLength | Symmetric
+@dataclass(frozen=True, kw_only=True)
+class DartMouth:
+    """A dart that opens by a given width, or as wide as another one of its piece.
+
+    Attributes:
+        piece, dart: names.
+        width: between the ends of its legs on the border [m]; None with `like`.
+        like: the other dart's name; None with `width`.
+    """
+
+    piece: str
+    dart: str
+    width: float | None = None
+    like: str | None = None
+    kind: ClassVar[str] = "mouth"
+
+    @property
+    def name(self) -> str:
+        """Name for reports."""
+        wanted = f"like {self.like}" if self.width is None else f"{1e3 * self.width:g} mm"
+        return f"{self.piece}.{self.dart} mouth {wanted}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class KeptGirth:
+    """A level that keeps its length on the form in one piece, in all the parts into which darts divide it.
+
+    Attributes:
+        piece, level: names.
+        lines: names of the parts.
+    """
+
+    piece: str
+    level: str
+    lines: tuple[str, ...]
+    kind: ClassVar[str] = "girth"
+
+    @property
+    def name(self) -> str:
+        """Name for reports."""
+        return f"{self.piece}.{self.level} girth"
+
+
+Constraint = Straight | FixedLength | Symmetric | DartMouth | KeptGirth
 
 
 def equations_of_constraint(
@@ -106,6 +159,11 @@ def equations_of_constraint(
     Raises:
         InputError: the piece has no such line, or the line cannot be constrained in this way.
     """
+    if isinstance(constraint, DartMouth):
+        return _mouth_equations(constraint, piece), False
+    if isinstance(constraint, KeptGirth):
+        parts = [FixedLength(piece=constraint.piece, line=line) for line in constraint.lines]
+        return one_group(*(equations_of_constraint(part, piece, fold)[0] for part in parts)), False
     surface = piece.network.surface
     line = _line(constraint, piece)
     if isinstance(constraint, FixedLength):
@@ -135,13 +193,27 @@ def equations_of_constraint(
     return mirror_equations(pairs, axis, across, float((piece.positions[axis] @ across).mean())), True
 
 
+def _mouth_equations(constraint: DartMouth, piece: Flattening) -> ConstraintEquations:
+    """Return the equation of a dart's mouth."""
+    lines = piece.network.surface.lines
+    mouths = []
+    for dart in (constraint.dart, *([] if constraint.like is None else [constraint.like])):
+        if f"{dart}.left" not in lines:
+            known = [line.removesuffix(".left") for line in lines if line.endswith(".left")]
+            raise InputError(f"piece {constraint.piece!r} has no dart {dart!r}; {nearest(dart, known)}")
+        mouths.append(np.array([lines[f"{dart}.left"][0], lines[f"{dart}.right"][-1]], dtype=np.int32))
+    if constraint.width is not None:
+        return length_equations(mouths[0], np.array([constraint.width]))
+    return seam_equations(mouths[0], mouths[1])
+
+
 def _crosses_fold(fold: IntArray | None, line: IntArray) -> bool:
     """Return whether a line ends on the fold, and does not run along it."""
     on_fold = np.isin(line, [] if fold is None else fold)
     return bool((on_fold[0] or on_fold[-1]) and not on_fold.all())
 
 
-def _line(constraint: Constraint, piece: Flattening) -> IntArray:
+def _line(constraint: FixedLength | Straight | Symmetric, piece: Flattening) -> IntArray:
     """Return the vertices of a constraint's line."""
     lines = piece.network.surface.lines
     if constraint.line not in lines:

@@ -6,15 +6,12 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from warpflat.core.errors import InputError, nearest
-from warpflat.garment.form_plan import FormPlan, plan_form
+from warpflat.garment.form_plan import plan_form
 from warpflat.garment.fullness import FullEdge
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
-    from warpflat.mannequin.pieces import FormSeam
     from warpflat.pattern.pieces import Seam
 
 __all__ = ["SeamRatios", "SeamWish", "seam_ratios"]
@@ -64,8 +61,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     """
     plan = plan_form(form)
     by_name = {seam.name: seam for seam in plan.seams}
-    of_form = [_in_plan(plan, form, seam) for seam in form.seams]
-    also = {seam.name: of_form[i][0].name for i, seam in enumerate(form.seams)}
+    also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
     ratios = [1.0] * len(form.seams)
     ease: dict[str, float] = {}
     full: dict[str, list[FullEdge]] = {}
@@ -73,7 +69,7 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
         name = _seam_name(wish, by_name, also, ease)
         longer = _longer_side(by_name[name], wish.longer)
         ease[name] = wish.factor - 1.0 if longer == 1 else 1.0 / wish.factor - 1.0
-        for number, (seam, first_side) in enumerate(of_form):
+        for number, (seam, first_side) in enumerate(plan.of_form):
             if seam.name != name:
                 continue
             side = 0 if longer == first_side else 1
@@ -81,8 +77,9 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
             if wish.factor == 1.0:
                 continue  # as long as on the body: nothing to ease in
             here = form.seams[number]
-            edge = FullEdge(vertices=here.vertices[side], factor=wish.factor, gathered=wish.gathered)
-            full.setdefault(here.pieces[side], []).append(edge)
+            full.setdefault(here.pieces[side], []).extend(
+                FullEdge(vertices=run.vertices[side], factor=wish.factor, gathered=wish.gathered) for run in here.runs
+            )
     return SeamRatios(ease=ease, ratios=tuple(ratios), full={name: tuple(edges) for name, edges in full.items()})
 
 
@@ -114,23 +111,3 @@ def _longer_side(seam: Seam, longer: str | None) -> int:
         edges = {str(side) for sides in seam.sides for side in sides}
         raise InputError(f"seam {seam.name!r}: both sides are of {longer!r}; name the edge: {', '.join(sorted(edges))}")
     return found[0]
-
-
-def _in_plan(plan: FormPlan, form: FormResult, seam: FormSeam) -> tuple[Seam, int]:
-    """Return the pattern's seam of a form's seam, and which of its sides (0 or 1) is the form's first side."""
-    parts = [_edge(plan, form, *side) for side in zip(seam.pieces, seam.edges, seam.vertices, strict=True)]
-    for found in plan.seams:
-        sides = [{str(side) for side in sides} for sides in found.sides]
-        for first in (0, 1):
-            if parts[0] in sides[first] and parts[1] in sides[1 - first]:
-                return found, first
-    raise AssertionError(f"the plan has no seam for {seam.name}")
-
-
-def _edge(plan: FormPlan, form: FormResult, piece: str, edge: str, vertices: np.ndarray) -> str:
-    """Return the "piece.edge" of the pattern in which the vertices of a form's edge lie."""
-    ids = np.asarray(form.pieces[piece].edges[edge])
-    for part in plan.edges[piece]:
-        if part.source == edge and np.isin(vertices, ids[part.first : part.last + 1]).all():
-            return f"{piece}.{part.name}"
-    raise AssertionError(f"the plan has no edge {piece}.{edge}")

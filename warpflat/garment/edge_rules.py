@@ -4,12 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, EDGE_KINDS
 
-__all__ = ["HEMMED_LEVELS", "EdgeRules", "find_unused_name"]
+__all__ = ["HEMMED_LEVELS", "EdgeRules"]
 
 #: Levels at which a free lower edge is hemmed. One at the waist or above is the line of a block, to be joined to a
 #: skirt, a band or a facing.
@@ -70,21 +69,19 @@ class EdgeRules:
             if name not in known
         }
 
-    def kind(self, piece: str, edge: str, default: str) -> str:
-        """Return the kind of an edge."""
-        return self.kinds.get(f"{piece}.{edge}", self.kinds.get(edge, default))
+    def kind(self, piece: str, edge: str, default: str, *, whole: str | None = None) -> str:
+        """Return the kind of an edge; what is said of the whole edge that it is a part of holds for it, too."""
+        return next((self.kinds[name] for name in _names(piece, edge, whole) if name in self.kinds), default)
 
-    def allowance(self, piece: str, edge: str, kind: str) -> float | None:
-        """Return the allowance [m] of an edge; None leaves it to its kind."""
+    def allowance(self, piece: str, edge: str, kind: str, *, whole: str | None = None) -> float | None:
+        """Return the allowance [m] of an edge, or of the whole one that it is a part of; None leaves it to its kind."""
         if kind == "fold":
             return None
         of_kind = {"seam": self.seam, "hem": self.hem}.get(kind)
-        return self.allowances.get(f"{piece}.{edge}", self.allowances.get(edge, of_kind))
+        named = (self.allowances[name] for name in _names(piece, edge, whole) if name in self.allowances)
+        return next(named, of_kind)
 
 
-def find_unused_name(name: str, taken: Mapping[str, Any] | set[str]) -> str:
-    """Return the name itself if it is not in `taken`, else "name 2" or the first number after that which is free."""
-    number = 2
-    while f"{name} {number}" in taken:
-        number += 1
-    return f"{name} {number}" if name in taken else name
+def _names(piece: str, edge: str, whole: str | None) -> list[str]:
+    """Return the names by which rules find an edge, the most particular first."""
+    return [name for part in (edge, whole or edge) for name in (f"{piece}.{part}", part)]

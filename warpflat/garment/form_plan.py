@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
@@ -11,7 +11,8 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules, find_unused_name
+from warpflat.core.text import find_unused_name
+from warpflat.garment.edge_rules import HEMMED_LEVELS, EdgeRules
 from warpflat.pattern.pieces import Seam, SeamSide
 
 if TYPE_CHECKING:
@@ -31,12 +32,14 @@ class EdgePlan:
     Attributes:
         name: in the pattern.
         source: the form's edge.
+        whole: the name of that edge without the darts that interrupt it.
         first, last: the points of that edge from and to which it runs.
         kind: as in `Edge`.
     """
 
     name: str
     source: str
+    whole: str
     first: int
     last: int
     kind: str
@@ -49,17 +52,19 @@ class FormPlan:
     Attributes:
         edges: by piece, counter-clockwise.
         seams: between them.
+        of_form: for each of the form's seams the seam here, and which of its sides (0 or 1) is the form's first one.
         quantities: by piece, how often it is cut.
     """
 
     edges: Mapping[str, tuple[EdgePlan, ...]]
     seams: tuple[Seam, ...]
+    of_form: tuple[tuple[Seam, int], ...]
     quantities: Mapping[str, int]
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Run:
-    """One side of a form's seam, as a stretch of an edge.
+class _Stretch:
+    """A stretch of an edge along one side of a form's seam; a side is one stretch, or several between darts.
 
     Attributes:
         seam, side: index of the seam, and 0 or 1.
@@ -89,7 +94,8 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
     below the waist or on the arm; other free edges (necks, armholes, waists of skirts) get a seam's allowance, for a
     facing or a band. An edge that is free along a part of its length is split there, and so is one that is sewn to
     parts of edges. An edge that is sewn to several whole edges (a sleeve's cap to a front's and a back's armhole) stays
-    whole, and its seams become one.
+    whole, and its seams become one. The legs of darts are edges of their own, in no seam; an edge that darts interrupt is
+    several edges, in one seam.
 
     Args:
         form: what `Mannequin.form` gives.
@@ -104,7 +110,8 @@ def plan_form(form: FormResult, rules: EdgeRules | None = None) -> FormPlan:
     rules.check({name: [plan.name for plan in plans] for name, plans in edges.items()})
     half = any(piece.fold for piece in form.pieces.values())
     quantities = {name: 1 if piece.fold or not half else 2 for name, piece in form.pieces.items()}
-    return FormPlan(edges=edges, seams=_plan_seams(form, sewing, edges, rules), quantities=quantities)
+    seams, of_form = _plan_seams(form, sewing, edges, rules)
+    return FormPlan(edges=edges, seams=seams, of_form=of_form, quantities=quantities)
 
 
 def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRules) -> tuple[EdgePlan, ...]:
@@ -113,15 +120,18 @@ def _plan_edges(form: FormResult, name: str, sewing: _FormSeams, rules: EdgeRule
     plans: list[EdgePlan] = []
     taken: set[str] = set(piece.edges)
     lowest = _lowest_edge(form, name, sewing)
+    legs = {leg for dart in piece.darts.values() for leg in dart}
     for edge, ids in piece.edges.items():
+        whole = piece.parts.get(edge, edge)
         parts = sewing.parts((name, edge), len(ids))
         # The edge's own name stays with what is sewn.
         keeper = next((number for number, (_, _, sewn) in enumerate(parts) if sewn), 0)
         for number, (first, last, sewn) in enumerate(parts):
             part = edge if number == keeper else find_unused_name(edge, taken)
             taken.add(part)
-            kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if edge == lowest else "seam"
-            plans.append(EdgePlan(name=part, source=edge, first=first, last=last, kind=rules.kind(name, part, kind)))
+            kind = "seam" if sewn else "fold" if edge == piece.fold else "hem" if whole == lowest else "seam"
+            kind = "dart" if edge in legs else rules.kind(name, part, kind, whole=whole)
+            plans.append(EdgePlan(name=part, source=edge, whole=whole, first=first, last=last, kind=kind))
     return tuple(plans)
 
 
@@ -161,55 +171,63 @@ class _FormSeams:
     """The seams of a form, edge by edge.
 
     Attributes:
-        pairs: both sides of every seam.
+        sides: the stretches along both sides of every seam, in the seam's order.
         by_edge: by piece and edge, the stretches that are sewn, in their order.
         hubs: edges that are sewn to several whole edges of other pieces, one after the other.
     """
 
     def __init__(self, form: FormResult) -> None:
         self._lengths = {(name, edge): len(ids) for name, p in form.pieces.items() for edge, ids in p.edges.items()}
-        self.pairs = [(_seam_run(form, n, 0), _seam_run(form, n, 1)) for n in range(len(form.seams))]
-        self.by_edge: dict[Place, list[_Run]] = {}
-        for run in sorted((r for pair in self.pairs for r in pair), key=lambda r: r.first):
-            self.by_edge.setdefault(run.place, []).append(run)
+        self.sides = [(_stretches(form, n, 0), _stretches(form, n, 1)) for n in range(len(form.seams))]
+        self.by_edge: dict[Place, list[_Stretch]] = {}
+        for stretch in sorted((s for sides in self.sides for side in sides for s in side), key=lambda s: s.first):
+            self.by_edge.setdefault(stretch.place, []).append(stretch)
         self.hubs = {place for place in self.by_edge if self._is_hub(place)}
 
-    def partner(self, run: _Run) -> _Run:
-        """Return the other side of a seam."""
-        return self.pairs[run.seam][1 - run.side]
+    def partners(self, stretch: _Stretch) -> tuple[_Stretch, ...]:
+        """Return the other side of a stretch's seam, in the direction of the stretch's edge."""
+        other = self.sides[stretch.seam][1 - stretch.side]
+        return other[::-1] if stretch.against else other
 
-    def covers(self, place: Place, runs: Sequence[_Run] | None = None) -> bool:
+    def covers(self, place: Place, stretches: Sequence[_Stretch] | None = None) -> bool:
         """Return whether an edge is sewn all along; by all its stretches, or by some in their order."""
-        here = self.by_edge.get(place, []) if runs is None else runs
-        ends = [0, *(run.last for run in here)]
-        joined = all(run.first == end for run, end in zip(here, ends, strict=False))
+        here = self.by_edge.get(place, []) if stretches is None else stretches
+        ends = [0, *(stretch.last for stretch in here)]
+        joined = all(stretch.first == end for stretch, end in zip(here, ends, strict=False))
         return joined and ends[-1] == self._lengths[place] - 1
 
     def parts(self, place: Place, count: int) -> list[tuple[int, int, bool]]:
         """Split an edge of `count` points: first and last point of each part, and whether it is sewn."""
         here = self.by_edge.get(place, [])
         whole = not here or place in self.hubs or (len(here) == 1 and self.covers(place))
-        ends = [] if whole else [end for run in here for end in (run.first, run.last)]
+        ends = [] if whole else [end for stretch in here for end in (stretch.first, stretch.last)]
         cuts = sorted({0, count - 1, *ends})
-        return [(a, b, any(run.first <= a and b <= run.last for run in here)) for a, b in pairwise(cuts)]
+        return [(a, b, any(stretch.first <= a and b <= stretch.last for stretch in here)) for a, b in pairwise(cuts)]
 
     def _is_hub(self, place: Place) -> bool:
         here = self.by_edge[place]
-        if len(here) < 2 or not self.covers(place):
+        if len(here) < 2 or not self.covers(place) or any(len(self.sides[s.seam][s.side]) > 1 for s in here):
             return False
-        partners = [self.partner(run) for run in here]
+        partners = [partner for stretch in here for partner in self.partners(stretch)]
         return all(len(self.by_edge[p.place]) == 1 and self.covers(p.place, [p]) and p.place != place for p in partners)
 
 
-def _seam_run(form: FormResult, number: int, side: int) -> _Run:
-    """Return one side of a form's seam as a stretch of an edge."""
-    seam = form.seams[number]
-    piece, edge, vertices = seam.pieces[side], seam.edges[side], np.asarray(seam.vertices[side])
-    ids = np.asarray(form.pieces[piece].edges[edge])
-    against = not _occurrences(ids, vertices)
-    first = _occurrences(ids, vertices[::-1] if against else vertices)[0]
-    last = first + len(vertices) - 1
-    return _Run(seam=number, side=side, piece=piece, edge=edge, first=first, last=last, against=against)
+def _stretches(form: FormResult, number: int, side: int) -> tuple[_Stretch, ...]:
+    """Return one side of a form's seam as stretches of edges; runs that follow each other along an edge are one."""
+    seam, found = form.seams[number], list[_Stretch]()
+    piece = seam.pieces[side]
+    for run in seam.runs:
+        edge, vertices = run.edges[side], np.asarray(run.vertices[side])
+        ids = np.asarray(form.pieces[piece].edges[edge])
+        against = not _occurrences(ids, vertices)
+        first = _occurrences(ids, vertices[::-1] if against else vertices)[0]
+        last = first + len(vertices) - 1
+        stretch = _Stretch(seam=number, side=side, piece=piece, edge=edge, first=first, last=last, against=against)
+        if found and found[-1].edge == edge and (found[-1].first == last if against else found[-1].last == first):
+            before = found.pop()
+            stretch = replace(stretch, first=min(first, before.first), last=max(last, before.last))
+        found.append(stretch)
+    return tuple(found)
 
 
 def _occurrences(ids: IntArray, vertices: IntArray) -> list[int]:
@@ -220,39 +238,38 @@ def _occurrences(ids: IntArray, vertices: IntArray) -> list[int]:
 
 def _plan_seams(
     form: FormResult, sewing: _FormSeams, edges: Mapping[str, Sequence[EdgePlan]], rules: EdgeRules
-) -> tuple[Seam, ...]:
-    """Return the seams of the pattern; those of a hub are one seam.
+) -> tuple[tuple[Seam, ...], tuple[tuple[Seam, int], ...]]:
+    """Return the seams of the pattern, and for each of the form's seams see `FormPlan.of_form`; a hub's are one seam.
 
     Raises:
         InputError: the rules name a seam that does not exist.
     """
     names = {(piece, plan.source, plan.first): plan.name for piece, plans in edges.items() for plan in plans}
-    seams: list[Seam] = []
-    done: set[Place] = set()
-    for first, second in sewing.pairs:
-        name = form.seams[first.seam].name
-        hub = next((run.place for run in (first, second) if run.place in sewing.hubs), None)
+
+    def chain(stretches: Sequence[_Stretch], *, turned: bool = False) -> tuple[SeamSide, ...]:
+        return tuple(
+            SeamSide(piece=s.piece, edge=names[s.piece, s.edge, s.first], reversed=s.against != turned)
+            for s in stretches
+        )
+
+    seams: dict[Place | int, Seam] = {}
+    of_form: list[tuple[Place | int, int]] = []
+    for number, both in enumerate(sewing.sides):
+        name = form.seams[number].name
+        hub = next((side[0] for side in both if side[0].place in sewing.hubs), None)
+        of_form.append((number, 0) if hub is None else (hub.place, 1 - hub.side))
         if hub is None:
-            parts = [
-                SeamSide(piece=r.piece, edge=names[r.piece, r.edge, r.first], reversed=r.against)
-                for r in (first, second)
-            ]
-            sides: Sides = ((parts[0],), (parts[1],))
-        elif hub in done:
-            continue
+            sides: Sides = (chain(both[0]), chain(both[1]))
         else:
-            done.add(hub)
-            chain = tuple(
-                SeamSide(piece=p.piece, edge=p.edge, reversed=p.against != run.against)
-                for run in sewing.by_edge[hub]
-                for p in [sewing.partner(run)]
-            )
-            sides = (chain, (SeamSide(piece=hub[0], edge=hub[1]),))
-        seams.append(Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0)))
+            around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
+            sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))
+        if of_form[-1][0] not in seams:
+            seams[of_form[-1][0]] = Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0))
+    known = [seam.name for seam in seams.values()]
     for name in rules.ease:
-        if name not in {seam.name for seam in seams}:
-            raise InputError(f"ease: there is no seam {name!r}; {nearest(name, [seam.name for seam in seams])}")
-    return tuple(seams)
+        if name not in known:
+            raise InputError(f"ease: there is no seam {name!r}; {nearest(name, known)}")
+    return tuple(seams.values()), tuple((seams[key], side) for key, side in of_form)
 
 
 def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:
@@ -261,6 +278,8 @@ def _lowest_edge(form: FormResult, name: str, sewing: _FormSeams) -> str | None:
     heights = {
         edge: float(np.mean(piece.surface.vertices[ids][:, 1]))
         for edge, ids in piece.edges.items()
-        if edge.split(" ")[0] in HEMMED_LEVELS and not sewing.covers((name, edge))
+        if piece.parts.get(edge, edge) == edge
+        and edge.split(" ")[0] in HEMMED_LEVELS
+        and not sewing.covers((name, edge))
     }
     return min(heights, key=lambda edge: heights[edge]) if heights else None

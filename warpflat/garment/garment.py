@@ -17,14 +17,17 @@ from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
-from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
+from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
+from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
+from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.mannequin.form_seams import FormSeam
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.pieces import FormPiece, FormSeam
+from warpflat.mannequin.pieces import FormPiece
 from warpflat.solver.options import RelaxOptions
 
 __all__ = ["Garment", "flatten_form"]
@@ -97,10 +100,10 @@ class Garment:
         return SeamLengths(
             name=seam.name,
             sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
-            length_3d=polyline_length(first.surface.vertices[seam.vertices[0]]),
+            length_3d=sum(polyline_length(first.surface.vertices[run.vertices[0]]) for run in seam.runs),
             lengths=(
-                polyline_length(first.positions[seam.vertices[0]]),
-                polyline_length(second.positions[seam.vertices[1]]),
+                sum(polyline_length(first.positions[run.vertices[0]]) for run in seam.runs),
+                sum(polyline_length(second.positions[run.vertices[1]]) for run in seam.runs),
             ),
             ease=1.0 / ratio - 1.0,
             cost=cost,
@@ -109,7 +112,9 @@ class Garment:
     def _measure(self, name: str) -> dict[str, Any]:
         """Build the piece's entry in `metrics.json`, with its strain energy brick by brick."""
         brick = np.array(self.form.pieces[name].face_brick)
-        return self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+        measured = self.pieces[name].measure(regions={each: brick == each for each in dict.fromkeys(brick.tolist())})
+        darts = measure_darts(self.form, name, self.pieces[name].positions)
+        return {**measured, **({"darts": darts} if darts else {})}
 
     def metrics(self) -> dict[str, Any]:
         """Return the content of `metrics.json`."""
@@ -120,6 +125,9 @@ class Garment:
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
+            "girths": pattern_girths(
+                self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
+            ),
             **({} if self.sewn is None else self._sewing()),
         }
         return run_metrics(pieces, first.network.device, more)
@@ -205,7 +213,12 @@ def flatten_form(
     expect(mannequin, Mannequin, "mannequin", "a Mannequin")
     expect_callback(callback)
     expect_each(wishes, SeamWish, "wishes", "a SeamWish")
-    expect_each(constraints, (FixedLength, Straight, Symmetric), "constraints", "a Straight, FixedLength or Symmetric")
+    expect_each(
+        constraints,
+        (DartMouth, FixedLength, Straight, Symmetric),
+        "constraints",
+        "a Straight, FixedLength, Symmetric or DartMouth",
+    )
     ratios = seam_ratios(form, wishes)
     names = list(form.pieces)
     by_name = None if callback is None else _callback_by_name(names, callback)
@@ -225,11 +238,14 @@ def flatten_form(
     for name, edges in ratios.full.items():
         pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
     pairs = [
-        SeamPair(name=seam.name, pieces=seam.pieces, vertices=seam.vertices, ratio=ratio)
+        SeamPair(name=seam.name, pieces=seam.pieces, vertices=run.vertices, ratio=ratio)
         for seam, ratio in zip(form.seams, ratios.ratios, strict=True)
+        for run in seam.runs
     ]
+    pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    result = sew(pieces, pairs, constraints=constraints, folds=folds, options=relax)
+    held = (*constraints, *dart_constraints(form), *girth_constraints(form))
+    result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
     return Garment(
         name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, ratios=ratios.ratios
     )
@@ -248,7 +264,13 @@ def _callback_by_name(
 
 def _plain_edges(form: FormResult, piece: str, full: Sequence[FullEdge]) -> list[IntArray]:
     """Return the vertices along each side of a seam of the piece that has no fullness."""
-    sides = [ids for seam in form.seams for name, ids in zip(seam.pieces, seam.vertices, strict=True) if name == piece]
+    sides = [
+        ids
+        for seam in form.seams
+        for run in seam.runs
+        for name, ids in zip(seam.pieces, run.vertices, strict=True)
+        if name == piece
+    ]
     return [ids for ids in sides if not any(ids is edge.vertices for edge in full)]
 
 

@@ -60,7 +60,7 @@ class SeamPair:
     """Two chains of vertices that are sewn together, edge by edge or from joint to joint.
 
     Attributes:
-        name: the seam's.
+        name: the seam's; pairs of one name are one seam, as where darts interrupt it.
         pieces: names of the two pieces; the same twice where one is sewn to itself.
         vertices: of the two pieces, in corresponding order.
         ratio: wished length of the first side over the second.
@@ -224,7 +224,8 @@ def _constraint_equations(
     With them come name and kind of each group, and the names of the pieces that are oriented on the cloth, which need no
     other constraint against turning.
     """
-    equations, kinds, oriented = [], [], set()
+    groups: dict[tuple[str, str], list[ConstraintEquations]] = {}
+    oriented: set[str] = set()
     on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
     for seam in seams:
         first, second = (joined.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
@@ -234,8 +235,8 @@ def _constraint_equations(
             sewn = seam_equations(first, second, seam.ratio)
         else:
             sewn = stretch_equations(first, second, seam.joints, joined.surface.vertices, unsewn, seam.ratio)
-        equations.append(one_group(sewn, *smooth))
-        kinds.append((seam.name, "seam"))
+        groups.setdefault((seam.name, "seam"), []).append(one_group(sewn, *smooth))
+    equations, kinds = [one_group(*runs) for runs in groups.values()], list(groups)
     for constraint in constraints:
         own, orients = equations_of_constraint(
             constraint, find_piece(constraint, joined.pieces), folds.get(constraint.piece)

@@ -12,8 +12,9 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.text import find_unused_name
 from warpflat.flattening.applied_cut import seam_kind
-from warpflat.garment.edge_rules import EdgeRules, find_unused_name
+from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.to_pattern import grain_of
 from warpflat.pattern.from_mesh import MeshFeatures, line_labels, piece_from_mesh
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Hole, Piece, Seam, SeamSide

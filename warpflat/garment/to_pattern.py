@@ -14,7 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.garment.edge_rules import EdgeRules, find_unused_name
+from warpflat.core.errors import InputError
+from warpflat.core.text import find_unused_name
+from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
@@ -25,7 +27,8 @@ from warpflat.garment.form_plan import (
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
-from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.surface.cut.dart_legs import are_curved, open_length
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -37,6 +40,8 @@ __all__ = ["grain_of", "pattern_of_garment"]
 
 #: A datum that strays from the grain by no more than this [m] carries the grain line.
 ON_DATUM = 1e-3
+#: Legs of a dart that overlap by no more than this [m] before its tip are closed there.
+CLOSED = 1e-4
 
 
 def pattern_of_garment(
@@ -62,6 +67,7 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
+    garments = _laid_upon_each_other(garments)
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))
     bent = _bent_folds(garments)
@@ -82,6 +88,23 @@ def pattern_of_garment(
         for piece, stray in bent.items()
     )
     return Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size), notes
+
+
+def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:
+    """Move the pieces of every size to where the lower end of their datum lies in the first size.
+
+    Relaxation keeps a piece upright, but not in its place.
+    """
+    first = next(iter(garments.values()))
+    moved = {}
+    for size, garment in garments.items():
+        pieces = {}
+        for name, flat in garment.pieces.items():
+            there = first.pieces[name]
+            offset = there.positions[there.datum[0]] - flat.positions[flat.datum[0]]
+            pieces[name] = replace(flat, positions=flat.positions + offset) if offset.any() else flat
+        moved[size] = replace(garment, pieces=pieces)
+    return moved
 
 
 def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
@@ -182,6 +205,41 @@ def _bent_folds(garments: Mapping[str, FlatGarment]) -> dict[str, float]:
     return bent
 
 
+def _clear_legs(edges: Sequence[Edge], darts: Mapping[str, tuple[str, str]], piece: str) -> list[Edge]:
+    """Move the tip of a dart whose legs overlap by less than `CLOSED` short of it back to where they meet.
+
+    Raises:
+        InputError: the legs of a dart overlap from the border on, or by more.
+    """
+    by_name = {edge.name: edge for edge in edges}
+    for dart, names in darts.items():
+        left, right = (by_name[name] for name in names)
+        count, overlap = open_length(left.points, right.points[::-1])
+        if count == 0:
+            raise InputError(
+                f"piece {piece!r}: dart {dart!r} overlaps at its mouth: the cloth wants no dart there; leave it out, or give "
+                "it a width, mouth_mm = 10"
+            )
+        if overlap > CLOSED:
+            raise InputError(
+                f"piece {piece!r}: the legs of dart {dart!r} overlap by {1e3 * overlap:.2g} mm: let it open wider, mouth_mm = 15, "
+                "or make it shorter"
+            )
+        if count == len(left.points):
+            continue
+        kept = slice(0, count)
+        tip = 0.5 * (left.points[count] + right.points[::-1][count])
+        for leg, turn in ((left, 1), (right, -1)):
+            points = np.vstack([leg.points[::turn][kept], tip])[::turn]
+            ids = (
+                None
+                if leg.vertices is None
+                else np.append(leg.vertices[::turn][kept], leg.vertices[::turn][-1])[::turn]
+            )
+            by_name[leg.name] = replace(leg, points=points, vertices=ids)
+    return list(by_name.values())
+
+
 def _piece(
     flat: Flattening,
     piece: FormPiece,
@@ -198,9 +256,17 @@ def _piece(
     for part in plan:
         vertices = np.asarray(piece.edges[part.source])[part.first : part.last + 1]
         kind = "seam" if open_fold and part.kind == "fold" else part.kind
-        allowance = rules.allowance(name, part.name, kind)
+        # A leg's allowance is for a dart that is cut away, not folded.
+        of_kind = "seam" if kind == "dart" else kind
+        allowance = rules.allowance(name, part.name, of_kind, whole=part.whole)
         points = flat.positions[vertices]
         edges.append(Edge(name=part.name, points=points, kind=kind, allowance=allowance, vertices=vertices))
+    edges = _clear_legs(edges, piece.darts, name)
+    legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
+    darts = [
+        Dart(name=dart, left=left, right=right, cut=are_curved(legs[left], legs[right]))
+        for dart, (left, right) in piece.darts.items()
+    ]
     border = list(piece.edges.values())
     along = _inner_lines({piece.datum: piece.surface.lines[piece.datum]}, border, flat.positions)
     return Piece(
@@ -209,6 +275,7 @@ def _piece(
         fabric=flat.fabric.name,
         quantity=quantity,
         edges=edges,
+        darts=darts,
         internal_lines=_inner_lines(piece.surface.lines, border, flat.positions),
         grain=grain_of(
             np.concatenate([edge.points[:-1] for edge in edges]),

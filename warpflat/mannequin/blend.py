@@ -37,7 +37,6 @@ class Adjustment:
         bridge: hollows are bridged, as cloth hangs from bust point to bust point.
         scale: blow-up about the profile's middle.
         offset_cm: distance that the profile moves outward [cm].
-        ease_cm: what a tape around the profile reads more [cm].
         raise_cm: how far the profile moves up [cm], down if negative.
     """
 
@@ -46,15 +45,13 @@ class Adjustment:
     bridge: bool = False
     scale: float = 1.0
     offset_cm: float = 0.0
-    ease_cm: float = 0.0
     raise_cm: float = 0.0
 
     @staticmethod
     def ranges() -> dict[str, tuple[float, float]]:
         """Return the least and the greatest valid value of every number."""
         return {
-            "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "ease_cm": (-30.0, 400.0),
-            "raise_cm": (-60.0, 60.0),
+            "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "raise_cm": (-60.0, 60.0),
         }  # fmt: skip
 
 
@@ -72,7 +69,11 @@ def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatAr
 
 
 def adjusted_vertices(
-    layout: Layout, vertices: FloatArray, profiles: Mapping[str, Adjustment], ruled: Sequence[tuple[str, str]] = ()
+    layout: Layout,
+    vertices: FloatArray,
+    profiles: Mapping[str, Adjustment],
+    ruled: Sequence[tuple[str, str]] = (),
+    ease: Mapping[str, float] | None = None,
 ) -> FloatArray:
     """Return the body's vertices with some profiles moved; what lies between follows smoothly.
 
@@ -81,11 +82,16 @@ def adjusted_vertices(
         vertices: #V by 3, the body [m].
         profiles: what is done, by level: a closed level of the trunk, ``chest``, an arm or a leg level; ``crotch`` moves up or down only.
         ruled: pairs of levels (upper, lower) of trunk, arms or legs between which the rows are straight.
+        ease: by level, what a tape around it reads more than around the body [cm]. Cloth with ease bridges hollows.
 
     Raises:
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
     known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
+    ease = ease or {}
+    for level in ease:
+        if level not in known or level == "crotch":
+            raise InputError(f"form: level {level!r} has no ease: {nearest(level, known)}")
     for level, change in profiles.items():
         for name in (level, change.like):
             if name is not None and name not in known:
@@ -94,25 +100,26 @@ def adjusted_vertices(
         if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
     out = vertices.copy()
-    if profiles or ruled:
-        _move_rings(out, layout, vertices, profiles, ruled)
-        _move_sheet(out, layout, vertices, profiles.get("chest"))
-        _move_arms(out, layout, vertices, profiles, ruled)
-        _move_legs(out, layout, vertices, profiles, ruled)
+    if profiles or ruled or ease:
+        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
+        _move_rings(out, layout, vertices, changes, ruled)
+        _move_sheet(out, layout, vertices, changes.get("chest"))
+        _move_arms(out, layout, vertices, changes, ruled)
+        _move_legs(out, layout, vertices, changes, ruled)
         _move_neck(out, layout, vertices)
     return out
 
 
-def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
-    """Return a closed level row, #P by 3, after one adjustment."""
+def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
+    """Return a closed level row, #P by 3, after one adjustment and with its ease."""
     new = row.copy()
     if other is not None:
         new[:, [0, 2]] += change.weight * (other - row)[:, [0, 2]]
-    if change.bridge:
+    if change.bridge or ease_cm > 0.0:
         new = _bridged(new)
     middle = 0.5 * (new.min(axis=0) + new.max(axis=0))
     new = middle + (new - middle) * np.array([change.scale, 1.0, change.scale])
-    grow = 2.0 * math.pi * change.offset_cm / 100.0 + change.ease_cm / 100.0
+    grow = 2.0 * math.pi * change.offset_cm / 100.0 + ease_cm / 100.0
     if grow:
         girth = convex_girth(new) + grow
         if girth <= 0.2 * convex_girth(row):
@@ -142,7 +149,7 @@ def _move_rings(
     out: FloatArray,
     layout: Layout,
     body: FloatArray,
-    profiles: Mapping[str, Adjustment],
+    changes: Mapping[str, tuple[Adjustment, float]],
     ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
@@ -151,9 +158,12 @@ def _move_rings(
     moves = []
     for level in RING_LEVELS:
         row = body[layout.rings[layout.level_row[level]]]
-        change = profiles.get(level)
-        other = body[layout.rings[layout.level_row[change.like]]] if change and change.like else None
-        moves.append(_changed(row, other, change) - row if change else np.zeros_like(row))
+        if level not in changes:
+            moves.append(np.zeros_like(row))
+            continue
+        change, ease_cm = changes[level]
+        other = body[layout.rings[layout.level_row[change.like]]] if change.like else None
+        moves.append(_changed(row, other, change, ease_cm) - row)
     heights = [
         float(body[layout.rings[r[0]], 1].mean() + m[:, 1].mean()) for r, m in zip(rows[:, None], moves, strict=True)
     ]
@@ -205,7 +215,7 @@ def _hull_reach(points: FloatArray, starts: FloatArray, rays: FloatArray) -> Flo
     return np.asarray(np.where(rate > 1e-12, room / np.where(rate > 1e-12, rate, 1.0), np.inf).min(axis=2))
 
 
-def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjustment | None) -> None:
+def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: tuple[Adjustment, float] | None) -> None:
     """Move chest and shoulders with the bust's rows; neckline and shoulder seams stay."""
     bust = layout.level_row["bust"]
     ids, laplacian, local = sheet_laplacian(layout, bust - 3)
@@ -217,9 +227,9 @@ def _move_sheet(out: FloatArray, layout: Layout, body: FloatArray, chest: Adjust
     if chest is not None:
         for grid in (layout.front, layout.back):
             row = grid[0]
-            distance = chest.offset_cm / 100.0 + chest.ease_cm / 200.0 / math.pi
+            distance = chest[0].offset_cm / 100.0 + chest[1] / 200.0 / math.pi
             normals = _row_normals(body[row])
-            move[row] = distance * normals + (chest.scale - 1.0) * (body[row] - body[row].mean(axis=0))
+            move[row] = distance * normals + (chest[0].scale - 1.0) * (body[row] - body[row].mean(axis=0))
             held[local[row]] = True
     _solve_moves(move, ids, laplacian, held)
     loops = _mitre_underarms(move, layout, body)
@@ -288,7 +298,7 @@ def _move_arms(
     out: FloatArray,
     layout: Layout,
     body: FloatArray,
-    profiles: Mapping[str, Adjustment],
+    changes: Mapping[str, tuple[Adjustment, float]],
     ruled: Sequence[tuple[str, str]],
 ) -> None:
     from scipy.interpolate import PchipInterpolator
@@ -297,9 +307,12 @@ def _move_arms(
         moves = [out[grid[0]] - body[grid[0]]]
         for level in ARM_LEVELS[1:]:
             row = body[grid[layout.arm_row[level]]]
-            change = profiles.get(level)
-            other = body[grid[layout.arm_row[change.like]]] if change and change.like else None
-            moves.append(_arm_move(row, other, change) if change else np.zeros_like(row))
+            if level not in changes:
+                moves.append(np.zeros_like(row))
+                continue
+            change, ease_cm = changes[level]
+            other = body[grid[layout.arm_row[change.like]]] if change.like else None
+            moves.append(_arm_move(row, other, change, ease_cm))
         rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
         out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
         for pair in ruled:
@@ -320,14 +333,14 @@ def _move_legs(
     out: FloatArray,
     layout: Layout,
     body: FloatArray,
-    profiles: Mapping[str, Adjustment],
+    changes: Mapping[str, tuple[Adjustment, float]],
     ruled: Sequence[tuple[str, str]],
 ) -> None:
     """Move crotch curve and legs, with the hip's row from which they hang."""
     from scipy.interpolate import PchipInterpolator
 
     curve = layout.crotch
-    change = profiles.get("crotch", Adjustment())
+    change = changes.get("crotch", (Adjustment(), 0.0))[0]
     if change != Adjustment(raise_cm=change.raise_cm):
         raise InputError("form: profile crotch: it moves up or down only; leave all but raise_cm out")
     ends = out[curve[[0, -1]]] - body[curve[[0, -1]]]
@@ -340,9 +353,12 @@ def _move_legs(
         moves = []
         for level in LEG_LEVELS[1:]:
             row = body[grid[layout.leg_row[level]]]
-            wished = profiles.get(level)
-            other = body[grid[layout.leg_row[wished.like]]] if wished and wished.like else None
-            moves.append(_leg_move(row, other, wished, 1.0 if side == "left" else -1.0))
+            if level not in changes:
+                moves.append(np.zeros_like(row))
+                continue
+            own, ease_cm = changes[level]
+            other = body[grid[layout.leg_row[own.like]]] if own.like else None
+            moves.append(_leg_move(row, other, own, ease_cm, 1.0 if side == "left" else -1.0))
         rows = np.array([layout.leg_row[level] for level in LEG_LEVELS[1:]])
         between = np.arange(rows[0], rows[-1] + 1)
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
@@ -356,19 +372,19 @@ def _move_legs(
                 _rule(out, grid, {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}, pair, body)
 
 
-def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment | None, sign: float) -> FloatArray:
+def _leg_move(
+    row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float
+) -> FloatArray:
     """Return the displacement of a leg's closed row; its inside runs midway between the leg and the midplane (`sign`: +1 left)."""
-    if change is None:
-        return np.zeros_like(row)
     if other is not None:
         other = other + row.mean(axis=0) - other.mean(axis=0)
-    move = _changed(row, other, change) - row
+    move = _changed(row, other, change, ease_cm) - row
     outwards = 0.5 * float((sign * row[:, 0]).min()) - float((sign * (row + move)[:, 0]).min())
     move[:, 0] += sign * max(outwards, 0.0)
     return move
 
 
-def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> FloatArray:
+def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
     """Return the displacement of an arm's closed row, in its own plane and about its middle."""
     middle = row.mean(axis=0)
     length = polyline_length(row, closed=True)
@@ -376,7 +392,7 @@ def _arm_move(row: FloatArray, other: FloatArray | None, change: Adjustment) -> 
     if other is not None:
         second = other - other.mean(axis=0)
         shape = (1.0 - change.weight) * shape + change.weight * second
-    factor = change.scale * (1.0 + (2.0 * math.pi * change.offset_cm + change.ease_cm) / 100.0 / max(length, 1e-9))
+    factor = change.scale * (1.0 + (2.0 * math.pi * change.offset_cm + ease_cm) / 100.0 / max(length, 1e-9))
     if factor <= 0.2:
         raise InputError(f"form: an arm profile of {length * 100:.0f} cm cannot shrink to {factor:.0%}")
     return middle + factor * shape - row

@@ -9,12 +9,17 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, same_file
 from warpflat.core.text import quote_value
 from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms
-from warpflat.mannequin.pieces import FormPiece, FormSeam, cut_pieces
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import FormDart, PlacedDart, place_darts
+from warpflat.mannequin.ease import ease_from
+from warpflat.mannequin.form_seams import FormSeam, find_seams
+from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.pieces import FormPiece, cut_pieces
 
 if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
@@ -52,6 +57,8 @@ class Form:
         profiles: adjustments of the body's profiles, by level.
         ruled: pairs of levels (upper, lower) between which the cloth hangs in straight lines.
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
+        darts: slits in its pieces.
+        ease: by level, how much more than around the body a tape reads around the garment [cm]; negative for knits.
 
     Raises:
         InputError: a piece's name that cannot name a file, or two that would be one file on some system.
@@ -62,6 +69,8 @@ class Form:
     profiles: Mapping[str, Adjustment] = field(default_factory=dict)
     ruled: tuple[tuple[str, str], ...] = ()
     blend: tuple[Form, float] | None = None
+    darts: tuple[FormDart, ...] = ()
+    ease: Mapping[str, float] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         files: dict[str, str] = {}
@@ -85,13 +94,17 @@ class FormResult:
         name: the form's.
         vertices: the mannequin's vertices moved to the form, #V by 3 [m]; its layout holds for them.
         pieces: by name; each is one disk.
-        seams: pairs of piece edges that are the same curve in space.
+        seams: between edges that are the same curve in space.
+        darts: of the pieces on both sides of the body.
+        ease: by level, what it asks for [cm]; without levels that have another one's outline or lie between ruled ones.
     """
 
     name: str
     vertices: FloatArray
     pieces: Mapping[str, FormPiece]
     seams: tuple[FormSeam, ...]
+    darts: tuple[PlacedDart, ...] = ()
+    ease: Mapping[str, float] = field(default_factory=dict)
 
 
 @functools.cache
@@ -122,14 +135,14 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     Args:
         name: of the form.
         data: keys ``pieces`` (by name, which names a file, too: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
-            :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``like``
-            (a shipped form whose pieces and profiles are taken over where this one gives none).
+            :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``ease`` (see
+            :func:`ease_from`), ``like`` (a shipped form whose pieces and profiles are taken over where this one gives none).
 
     Raises:
         InputError: for an unknown key, a value of the wrong kind, or a piece's name that cannot name a file.
     """
     where = f"form {name}"
-    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like"}, where)
+    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease"}, where)
     base = shipped_form(str(data["like"])) if "like" in data else None
     pieces = _pieces_from(data.get("pieces", {}), where)
     if base and "pieces" not in data:
@@ -145,7 +158,8 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     blend = base.blend if base else None
     if "blend" in data:
         blend = _blend_from(data["blend"], where)
-    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend)
+    ease = ease_from(data.get("ease", {}), where, base=base.ease if base else {})
+    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend, ease=ease)
 
 
 def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
@@ -202,12 +216,31 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     """
     vertices = _surface(layout, vertices, form)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
-    pieces, seams = cut_pieces(layout, vertices, recipes, half=half)
-    return FormResult(name=form.name, vertices=vertices, pieces=pieces, seams=seams)
+    placed: tuple[PlacedDart, ...] = ()
+    if form.darts:
+        bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
+        placed = place_darts(layout, vertices, bricks, form.darts)
+    rows: dict[str, dict[str, IntArray]] = {}
+    for dart in placed:
+        rows.setdefault(dart.piece, {})[dart.name] = dart.row
+    pieces = cut_pieces(layout, vertices, recipes, darts=rows, half=half)
+    ease = {level: cm for level, cm in form.ease.items() if _keeps_ease(form, level)}
+    return FormResult(
+        name=form.name, vertices=vertices, pieces=pieces, seams=find_seams(pieces), darts=placed, ease=ease
+    )
+
+
+def _keeps_ease(form: Form, level: str) -> bool:
+    """Return whether a level of the trunk has its own outline, so that what is asked of its ease is what it gets."""
+    if level not in RING_LEVELS or (level in form.profiles and form.profiles[level].like is not None):
+        return False
+    at = RING_LEVELS.index(level)
+    pairs = [sorted(map(RING_LEVELS.index, pair)) for pair in form.ruled if set(pair) <= set(RING_LEVELS)]
+    return not any(low < at < high for low, high in pairs)
 
 
 def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:
-    vertices = adjusted_vertices(layout, body, form.profiles, form.ruled)
+    vertices = adjusted_vertices(layout, body, form.profiles, form.ruled, form.ease)
     if form.blend is None:
         return vertices
     other, weight = form.blend

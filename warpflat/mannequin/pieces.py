@@ -1,23 +1,24 @@
-"""Pieces of a form: bricks joined into one disk each, with named edges, and the seams between them."""
+"""Pieces of a form: bricks joined into one disk each, with named edges."""
 
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
+from warpflat.core.text import find_unused_name
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.halves import check_halves, fold_among, is_side, lies_on_both
 from warpflat.mannequin.layout import Layout
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.mesh import Surface
 
-__all__ = ["FormPiece", "FormSeam", "cut_pieces"]
+__all__ = ["FormPiece", "cut_pieces", "is_part_of"]
 
 # The lines of the trunk that run on down a leg: a piece that has both has one edge, under the leg's name.
 _CONTINUED = {
@@ -26,6 +27,8 @@ _CONTINUED = {
 
 #: For each piece its brick patterns, its datum line, and the lines along which it is cut open.
 Recipes = Mapping[str, tuple[Sequence[str], str, Sequence[str]]]
+#: By piece and dart the mannequin's vertices along a dart, from the border of the piece to the tip.
+Darts = Mapping[str, Mapping[str, IntArray]]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -41,6 +44,8 @@ class FormPiece:
         fold: the edge that lies on the fold if this is a half piece, else None.
         grid_vertices: #V, for each vertex of the piece its vertex on the mannequin.
         face_brick: #F, for each face its brick's name.
+        darts: by name, the edges along the left leg, from the border to the tip, and along the right one, back to the border.
+        parts: where darts interrupt an edge, the name of the whole edge by each of its parts.
     """
 
     surface: Surface
@@ -49,34 +54,20 @@ class FormPiece:
     fold: str | None
     grid_vertices: IntArray
     face_brick: tuple[str, ...]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class FormSeam:
-    """Two edges (or parts of edges) that are sewn together: the same curve in space.
-
-    Attributes:
-        name: after the feature line.
-        pieces: names of the two pieces; the same twice where one piece is sewn to itself.
-        edges: names of the two edges.
-        vertices: vertex indices of the two pieces along the seam, in corresponding order.
-    """
-
-    name: str
-    pieces: tuple[str, str]
-    edges: tuple[str, str]
-    vertices: tuple[IntArray, IntArray]
+    darts: Mapping[str, tuple[str, str]] = field(default_factory=dict)
+    parts: Mapping[str, str] = field(default_factory=dict)
 
 
 def cut_pieces(
-    layout: Layout, vertices: FloatArray, recipes: Recipes, *, half: bool = False
-) -> tuple[dict[str, FormPiece], tuple[FormSeam, ...]]:
-    """Join bricks into pieces and find their seams.
+    layout: Layout, vertices: FloatArray, recipes: Recipes, *, darts: Darts | None = None, half: bool = False
+) -> dict[str, FormPiece]:
+    """Join bricks into pieces.
 
     Args:
         layout: the grid.
         vertices: layout.vertex_count by 3 [m].
         recipes: see :data:`Recipes`.
+        darts: see :data:`Darts`.
         half: the left half of the garment: pieces that lie on both sides of a centre line end there, on the fold, and
             those of the right side are left out, being the left ones' mirror images.
 
@@ -100,8 +91,8 @@ def cut_pieces(
     if half:
         check_halves(cuts)
         cuts = {name: cut for name, cut in cuts.items() if not all(is_side(b, "right") for b in cut[0])}
-    pieces = {name: _piece(layout, vertices, name, *cut, half) for name, cut in cuts.items()}
-    return pieces, _seams(pieces)
+    darts = darts or {}
+    return {name: _piece(layout, vertices, name, *cut, darts.get(name, {}), half) for name, cut in cuts.items()}
 
 
 def _faces_of(layout: Layout, bricks: Sequence[str]) -> NDArray[np.int64]:
@@ -132,14 +123,19 @@ def _piece(
     bricks: Sequence[str],
     datum: str,
     opened: Sequence[str],
+    darts: Mapping[str, IntArray],
     half: bool,
 ) -> FormPiece:
     folded = half and lies_on_both(bricks)
     if folded:
         bricks = [b for b in bricks if is_side(b, "left")]
     rows = _faces_of(layout, bricks)
-    corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened))
-    edges = _edges(layout, corners, grid_vertices, name, opened=bool(opened))
+    own = set(np.unique(layout.faces[rows]).tolist())
+    darts = {dart: row for dart, row in darts.items() if own.issuperset(row.tolist())}
+    slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}
+    corners, grid_vertices = _split(layout.faces[rows], _edge_set(layout, opened) | slits)
+    loop = _border(corners, name, opened=bool(opened), darts=darts)
+    edges, parts = _edges(layout, loop, grid_vertices, darts)
     lines = _lines(layout, corners, grid_vertices, edges)
     fold = fold_among(edges, opened, name) if folded else None
     surface = Surface(
@@ -147,7 +143,7 @@ def _piece(
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
     wished = datum or fold
-    along = [line for line in lines if _is_of(line, wished)] if wished else list(lines)[:1]
+    along = [line for line in lines if is_part_of(line, wished)] if wished else list(lines)[:1]
     if not along:
         raise InputError(f"form: piece {name}: its datum {datum!r} does not run through it: {nearest(datum, lines)}")
     if fold and len(np.intersect1d(lines[datum if datum in lines else along[0]], edges[fold])) == 1:
@@ -158,7 +154,8 @@ def _piece(
     names = list(layout.bricks)
     return FormPiece(
         surface=surface, edges=edges, datum=max(along, key=lambda line: len(lines[line])), fold=fold, grid_vertices=grid_vertices,
-        face_brick=tuple(names[i] for i in layout.face_brick[rows]),
+        face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
+        darts={dart: _legs(dart) for dart in darts},
     )  # fmt: skip
 
 
@@ -201,7 +198,7 @@ def _split(faces: IntArray, cut: set[tuple[int, int]]) -> tuple[IntArray, IntArr
     return corners.reshape(-1, 4), grid_vertices
 
 
-def _border(corners: IntArray, name: str, *, opened: bool) -> NDArray[np.int64]:
+def _border(corners: IntArray, name: str, *, opened: bool, darts: Collection[str]) -> NDArray[np.int64]:
     """Return the one border loop of a disk, counter-clockwise from outside."""
     ahead = np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2)
     key = np.sort(ahead, axis=1)
@@ -209,6 +206,11 @@ def _border(corners: IntArray, name: str, *, opened: bool) -> NDArray[np.int64]:
     border = ahead[counts[np.ravel(inverse)] == 1]
     follow = dict(border.tolist())
     vertex_count = int(corners.max()) + 1
+    if darts and (len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1):
+        raise InputError(
+            f"form: piece {name} is not one disk: its darts ({', '.join(darts)}) meet or part it; let each begin at the border "
+            "and end inside, two mesh edges from any other"
+        )
     if len(follow) != len(border) or vertex_count - len(edges) + len(corners) != 1 or not follow:
         raise InputError(
             f"form: piece {name} is not one disk (its bricks touch at a point, fall apart, or close to a tube); "
@@ -231,30 +233,61 @@ def _line_of_edge(layout: Layout) -> dict[tuple[int, int], str]:
     return found
 
 
-def _unique(name: str, taken: Mapping[str, object]) -> str:
-    if name not in taken:
-        return name
-    return next(f"{name} {i}" for i in itertools.count(2) if f"{name} {i}" not in taken)
+def _legs(dart: str) -> tuple[str, str]:
+    """Return the names of a dart's two edges."""
+    return f"{dart}.left", f"{dart}.right"
 
 
 def _edges(
-    layout: Layout, corners: IntArray, grid_vertices: IntArray, name: str, *, opened: bool
-) -> dict[str, IntArray]:
-    loop = _border(corners, name, opened=opened)
+    layout: Layout, loop: NDArray[np.int64], grid_vertices: IntArray, darts: Mapping[str, IntArray]
+) -> tuple[dict[str, IntArray], dict[str, str]]:
+    """Return a piece's edges, and the name of the whole edge by each part of one that darts interrupt.
+
+    The first part, counter-clockwise, has the name of the whole; names of all other edges are as without darts.
+    """
     line_of = _line_of_edge(layout)
+    leg_of: dict[tuple[int, int], str] = {}
+    for dart, row in darts.items():
+        for a, b in itertools.pairwise(row.tolist()):
+            leg_of[a, b], leg_of[b, a] = _legs(dart)
     on_grid = grid_vertices[loop]
-    labels = [
-        line_of.get((min(a, b), max(a, b)), "edge")
-        for a, b in zip(on_grid.tolist(), np.roll(on_grid, -1).tolist(), strict=True)
-    ]
+    steps = list(zip(on_grid.tolist(), np.roll(on_grid, -1).tolist(), strict=True))
+    labels = [leg_of.get((a, b)) or line_of.get((min(a, b), max(a, b)), "edge") for a, b in steps]
     labels = [_CONTINUED[label] if _CONTINUED.get(label) in labels else label for label in labels]
+    legs = set(leg_of.values())
     # A doubled line turns back on itself at its end, which starts a new edge though the label stays.
     turns = [labels[i] != labels[i - 1] or on_grid[i - 1] == on_grid[(i + 1) % len(loop)] for i in range(len(loop))]
     starts = [i for i, t in enumerate(turns) if t] or [0]
+    # Begin where a whole edge does.
+    first = next((n for n, i in enumerate(starts) if not {labels[i], labels[i - 1]} & legs), 0)
+    starts = [*starts[first:], *(i + len(loop) for i in starts[:first])]
+    stretches = [
+        (labels[a % len(loop)], loop[np.arange(a, b + 1) % len(loop)].astype(np.int32))
+        for a, b in itertools.pairwise([*starts, starts[0] + len(loop)])
+    ]
+    return _named_stretches(stretches, legs)
+
+
+def _named_stretches(
+    stretches: Sequence[tuple[str, IntArray]], legs: set[str]
+) -> tuple[dict[str, IntArray], dict[str, str]]:
+    """Give the stretches of a border their names; see :func:`_edges`."""
+    wholes: list[str] = []
+    last, taken = "", set[str]()
+    for number, (label, _) in enumerate(stretches):
+        after_dart = number > 0 and stretches[number - 1][0] in legs
+        goes_on = label not in legs and after_dart and is_part_of(last, label)
+        wholes.append(last if goes_on else find_unused_name(label, taken))
+        taken.add(wholes[-1])
+        last = last if label in legs else wholes[-1]
     edges: dict[str, IntArray] = {}
-    for a, b in zip(starts, [*starts[1:], starts[0] + len(loop)], strict=True):
-        edges[_unique(labels[a], edges)] = loop[np.arange(a, b + 1) % len(loop)].astype(np.int32)
-    return edges
+    for number, (label, ids) in enumerate(stretches):
+        first = wholes.index(wholes[number]) == number
+        name = wholes[number] if first else find_unused_name(label, taken)
+        taken.add(name)
+        edges[name] = ids
+    counts = {whole: wholes.count(whole) for whole in wholes}
+    return edges, {name: whole for name, whole in zip(edges, wholes, strict=True) if counts[whole] > 1}
 
 
 def _lines(
@@ -266,14 +299,14 @@ def _lines(
     """
     lines = dict(edges)
     for line, runs in _inner_runs(layout, corners, grid_vertices).items():
-        own = [edge for edge in edges if _is_of(edge, line)]
+        own = [edge for edge in edges if is_part_of(edge, line)]
         for run in sorted(runs, key=len, reverse=True):
             whole, border = _with_edges(run, {edge: lines[edge].tolist() for edge in own})
-            lines[border or _unique(line, lines)] = np.array(whole, np.int32)
+            lines[border or find_unused_name(line, lines)] = np.array(whole, np.int32)
     return lines
 
 
-def _is_of(name: str, line: str) -> bool:
+def is_part_of(name: str, line: str) -> bool:
     """Return whether a name is that of a feature line or of a further part of it."""
     return name == line or (name.startswith(f"{line} ") and name[len(line) + 1 :].isdigit())
 
@@ -320,47 +353,3 @@ def _inner_runs(layout: Layout, corners: IntArray, grid_vertices: IntArray) -> d
         if runs:
             found[line] = runs
     return found
-
-
-def _seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
-    """Return the seams: runs of border edges that two pieces (or two edges of one) share on the mannequin."""
-    places: dict[tuple[int, int], list[tuple[str, str, int]]] = {}
-    for name, piece in pieces.items():
-        for edge, ids in piece.edges.items():
-            for i, (a, b) in enumerate(itertools.pairwise(piece.grid_vertices[ids].tolist())):
-                places.setdefault((min(a, b), max(a, b)), []).append((name, edge, i))
-    seams: list[FormSeam] = []
-    taken: dict[str, None] = {}
-    for name, piece in pieces.items():
-        for edge, ids in piece.edges.items():
-            run: list[tuple[int, tuple[str, str, int]]] = []
-            for i, (a, b) in enumerate(itertools.pairwise(piece.grid_vertices[ids].tolist())):
-                here = (name, edge, i)
-                both = places[min(a, b), max(a, b)]
-                other = both[1] if len(both) == 2 and both[0] == here else None
-                if run and (other is None or other[:2] != run[-1][1][:2] or abs(other[2] - run[-1][1][2]) != 1):
-                    seams.append(_seam(pieces, name, edge, run, taken))
-                    run = []
-                if other is not None:
-                    run.append((i, other))
-            if run:
-                seams.append(_seam(pieces, name, edge, run, taken))
-    return tuple(seams)
-
-
-def _seam(
-    pieces: Mapping[str, FormPiece],
-    name: str,
-    edge: str,
-    run: list[tuple[int, tuple[str, str, int]]],
-    taken: dict[str, None],
-) -> FormSeam:  # fmt: skip
-    first = pieces[name].edges[edge][run[0][0] : run[-1][0] + 2]
-    other_name, other_edge = run[0][1][:2]
-    at = [o[2] for _, o in run]
-    second = pieces[other_name].edges[other_edge][min(at) : max(at) + 2]
-    if pieces[name].grid_vertices[first[0]] != pieces[other_name].grid_vertices[second[0]]:
-        second = second[::-1]
-    label = _unique(edge, taken)
-    taken[label] = None
-    return FormSeam(name=label, pieces=(name, other_name), edges=(edge, other_edge), vertices=(first, second))

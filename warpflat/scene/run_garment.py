@@ -17,12 +17,16 @@ from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
+from warpflat.mannequin.darts import FormDart
+from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.frames import FrameRecorder, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
+from warpflat.scene.schema import CutTable
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult
 
@@ -47,7 +51,38 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
             form = shipped_form(settings.form)
         else:
             form = form_from_mapping(scene.name, settings.form or {})
+    if settings.ease is not None:
+        form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
+    with errors_named(f"{scene.where}: form"):
+        form = shaped_form(mannequin.layout, form, settings.shape)
+    with errors_named(f"{scene.where}: cuts"):
+        form = replace(form, darts=_with_cuts(form.darts, settings.cuts))
         return mannequin, mannequin.form(form, half=settings.half)
+
+
+def _with_cuts(darts: Sequence[FormDart], tables: Sequence[CutTable]) -> tuple[FormDart, ...]:
+    """Return a form's darts with those of a scene; one along the same line in the same piece replaces the form's."""
+    asked = [
+        FormDart(
+            name=table.name or f"{table.line}".removesuffix(" left").removesuffix(" right"),
+            piece=table.piece or "",
+            line=table.line or "",
+            towards=table.towards,
+            between=table.between,
+            part=None if table.part is None else (table.part[0], table.part[1]),
+            tip_mm=table.tip_mm,
+            mirrored=table.mirrored,
+            mouth_mm=table.mouth_mm,
+        )
+        for table in tables
+    ]
+    places = {(dart.piece, dart.line, dart.towards): dart for dart in asked}
+    kept = []
+    for dart in darts:
+        other = places.get((dart.piece, dart.line, dart.towards))
+        kept.append(dart if other is None else replace(other, name=dart.name))
+    own = {(dart.piece, dart.line, dart.towards) for dart in darts}
+    return (*kept, *(dart for place, dart in places.items() if place not in own))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -156,21 +156,21 @@ class SeamTable(Table):
     A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
     as "left" or "piece.left"; they may be equally long.
 
-    `ease` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
+    `fullness` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
     piece. `longer` names the piece, "piece.edge" or line that is longer; the seam's second side if not given.
     """
 
     name: str = Field(min_length=1)
     sides: Annotated[list[str], Field(min_length=2, max_length=2)] | None = None
-    ease: Annotated[float, Field(ge=0, le=0.3)] | None = None
+    fullness: Annotated[float, Field(ge=0, le=0.3)] | None = None
     gather: Annotated[float, Field(ge=1, le=5)] | None = None
     longer: str | None = None
 
     @model_validator(mode="after")
     def _one_way(self) -> SeamTable:
-        given = (self.ease is not None) + (self.gather is not None)
+        given = (self.fullness is not None) + (self.gather is not None)
         if given > 1 or (given == 0 and self.sides is None):
-            raise ValueError("give either ease = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
+            raise ValueError("give either fullness = 0.02 (2 %, eased in) or gather = 1.5 (times as long)")
         return self
 
 
@@ -285,6 +285,10 @@ class SceneTable(Table):
     """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
+    shape: Literal["none", "darts", "princess"] = "none"
+    """How a form's pieces are shaped: not, by the darts of a pattern book's block, or by seams along the princess lines."""
+    ease: str | dict[str, Any] | None = None
+    """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
@@ -317,6 +321,12 @@ class SceneTable(Table):
 
     def _check_surface(self) -> None:
         """Refuse what belongs to the form on a mannequin."""
+        if self.shape != "none":
+            raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+        if self.ease is not None:
+            raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
+        for number, cut in enumerate(self.cuts):
+            cut.check_for_surface(f"cuts[{number}]")
         if self.half:
             raise ValueError(
                 "half belongs to a form's pieces; on a [surface] give the half's mesh, and in [pattern] "
@@ -333,8 +343,10 @@ class SceneTable(Table):
         """Refuse what belongs to a surface."""
         if self.lines or self.datum:
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.cuts or self.auto_cut:
-            raise ValueError("cuts and auto_cut belong to a [surface]")
+        if self.auto_cut:
+            raise ValueError('auto_cut belongs to a [surface]; a form has shape = "darts" or "princess"')
+        for number, cut in enumerate(self.cuts):
+            cut.check_for_form(f"cuts[{number}]")
         for number, seam in enumerate(self.seams):
             if seam.sides is not None:
                 raise ValueError(
@@ -371,6 +383,11 @@ class CutTable(Table):
     `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
     straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
     between points or along a plane runs through are divided. Tables with one `name` are one cut.
+
+    On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
+    "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
+    the waist in a skirt, the dart ends. `towards` puts it between two lines, `between` at that share of the way. `mouth_mm` is
+    how wide it opens; the energy that this costs is told. It is `mirrored` unless that is false.
     """
 
     name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
@@ -382,6 +399,30 @@ class CutTable(Table):
     plane: CutPlane | None = None
     tip_back: Annotated[float, Field(ge=0.0)] = 0.0
     """How far the tips of its darts are drawn back, [m]."""
+    piece: str | None = None
+    towards: str | None = None
+    between: Share = 0.5
+    tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
+    mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
+    mirrored: bool = True
+
+    def check_for_form(self, where: str) -> None:
+        """Refuse what a dart in a form does not have."""
+        if self.line is None or self.piece is None:
+            raise ValueError(
+                f"{where}: on a form a dart needs its piece and a line of it, as "
+                'piece = "front_bodice", line = "princess front left"'
+            )
+        if self.tip_back:
+            raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
+        if self.part is not None and (self.tip_mm is not None or self.towards is not None):
+            raise ValueError(f"{where}: give part, or tip_mm and towards")
+
+    def check_for_surface(self, where: str) -> None:
+        """Refuse what only a dart in a form has."""
+        given = self.model_fields_set & {"piece", "towards", "between", "tip_mm", "mouth_mm", "mirrored"}
+        if given:
+            raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
 
     @model_validator(mode="after")
     def _one_way(self) -> CutTable:

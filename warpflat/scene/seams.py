@@ -18,7 +18,7 @@ def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
     return [
         SeamWish(
             name=table.name,
-            factor=table.gather if table.gather is not None else 1.0 + (table.ease or 0.0),
+            factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),
             gathered=table.gather is not None,
             longer=table.longer,
         )
@@ -51,7 +51,7 @@ def scene_surface_seams(tables: Sequence[SeamTable], piece: str) -> list[NamedSe
             NamedSeam(
                 name=table.name,
                 sides=(first, second),
-                factor=table.gather if table.gather is not None else 1.0 + (table.ease or 0.0),
+                factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),
                 gathered=table.gather is not None,
                 longer=(first, second).index(longer),
             )

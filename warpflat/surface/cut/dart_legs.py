@@ -7,7 +7,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 
-__all__ = ["are_curved", "check_tip_back", "pull_back", "pull_back_eye"]
+__all__ = ["are_curved", "check_tip_back", "open_length", "pull_back", "pull_back_eye"]
 
 
 #: Legs are straight if they stray from their chord by no more than this [m], or this share of its length.
@@ -23,6 +23,20 @@ def are_curved(*legs: FloatArray) -> bool:
         if shapely.distance(chord, shapely.points(leg)).max() > max(STRAIGHT, STRAIGHT_SHARE * chord.length):
             return True
     return False
+
+
+def open_length(left: FloatArray, right: FloatArray) -> tuple[int, float]:
+    """Return how many of their points, from the border, two matched legs are open, and how far they overlap after that [m].
+
+    Args:
+        left, right: #P by 2 [m], from the border to the tip, which they share; the wedge lies on the right of the left leg.
+    """
+    middle = 0.5 * (left + right)
+    along = np.gradient(middle, axis=0)
+    across = right - left
+    gap = (along[:, 1] * across[:, 0] - along[:, 0] * across[:, 1]) / np.maximum(np.linalg.norm(along, axis=1), 1e-12)
+    closed = np.flatnonzero(gap[:-1] <= 0.0)
+    return (int(closed[0]) if len(closed) else len(left)), float(max(0.0, -gap[:-1].min()))
 
 
 def check_tip_back(tip_back: float, room: float, of: str = "dart's length") -> None:

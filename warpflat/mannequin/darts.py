@@ -1,0 +1,286 @@
+"""Darts of a form: which stretch of the grid is slit, from the border of a piece to the dart's tip."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.core.polyline import arc_lengths
+from warpflat.mannequin.halves import is_side
+from warpflat.mannequin.layout import Layout
+
+__all__ = ["FormDart", "PlacedDart", "place_darts", "standard_darts"]
+
+#: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
+#: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
+#: Pattern Cutting, and the usual 2 to 3 cm from the bust point.
+_TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0}
+#: A skirt's second dart lies half-way from the first to the side and is this share as long.
+_SECOND = 0.9
+
+
+@dataclass(frozen=True, kw_only=True)
+class FormDart:
+    """A dart as it is asked for.
+
+    Attributes:
+        name: of the dart; with its mirror image "NAME left" and "NAME right".
+        piece: name of the piece that gets it.
+        line: the feature line along which it lies.
+        towards: another line: it lies between the two, at the share `between` of the way. Only for lines that run up and down.
+        between: 0 to 1.
+        part: shares of the line's length within the piece, from the mouth, 0 or 1, to the tip; None for the default.
+        tip_mm: how far before the bust point, or below the waist in a skirt, it ends [mm]; None for the default.
+        mirrored: its mirror image is a dart, too, in the same piece or in the mirror image of that.
+        mouth_mm: how wide it opens at the border [mm]; None leaves it to the cloth.
+        like: name of another dart of the piece that opens as wide; None leaves it to the cloth.
+    """
+
+    name: str
+    piece: str
+    line: str
+    towards: str | None = None
+    between: float = 0.5
+    part: tuple[float, float] | None = None
+    tip_mm: float | None = None
+    mirrored: bool = True
+    mouth_mm: float | None = None
+    like: str | None = None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlacedDart:
+    """A dart on a form's grid.
+
+    Attributes:
+        name, piece: names.
+        asked: what was asked for.
+        row: the mannequin's vertices from the mouth to the tip.
+        to_point: distance from the tip to the bust point or to the bust's level along the line [m]; None where it points to
+            neither.
+    """
+
+    name: str
+    piece: str
+    asked: FormDart
+    row: IntArray
+    to_point: float | None
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Cloth:
+    """A piece on the grid: its inner mesh edges, in both directions, and the vertices of its border."""
+
+    inner: frozenset[tuple[int, int]]
+    border: frozenset[int]
+
+
+def place_darts(
+    layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]], darts: Sequence[FormDart]
+) -> tuple[PlacedDart, ...]:
+    """Find the grid vertices of darts.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        bricks: by piece, both sides of the body.
+        darts: what is asked for.
+
+    Raises:
+        InputError: an unknown piece or line, a line that does not run from the border into the piece, or two darts of one name.
+    """
+    if not darts:
+        return ()
+    cloths = {name: _cloth(layout, own) for name, own in bricks.items()}
+    found: list[PlacedDart] = []
+    for dart in darts:
+        where = f"dart {dart.name!r}"
+        if dart.piece not in cloths:
+            raise InputError(f"{where}: no piece {dart.piece!r}; {nearest(dart.piece, cloths)}")
+        placed = _place(layout, vertices, cloths[dart.piece], dart)
+        image = layout.mirror[placed.row]
+        partner = next((name for name, cloth in cloths.items() if _holds(cloth, image)), None)
+        if dart.mirrored and partner is not None and not np.array_equal(image, placed.row):
+            side, other = ("left", "right") if _lies_left(layout, placed.row) else ("right", "left")
+            found.append(replace(placed, name=f"{dart.name} {side}"))
+            found.append(replace(placed, name=f"{dart.name} {other}", piece=partner, row=image))
+        else:
+            found.append(placed)
+    seen: set[tuple[str, str]] = set()
+    for each in found:
+        if (each.piece, each.name) in seen:
+            raise InputError(f"piece {each.piece!r}: dart {each.name!r} occurs twice; give each a name of its own")
+        seen.add((each.piece, each.name))
+    return tuple(found)
+
+
+def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
+    """Return the darts of a pattern book's block that fit the pieces (Aldrich, Metric Pattern Cutting for Women's Wear).
+
+    Bust and waist darts in the front bodice, a waist dart in the back; in the skirt one a side in front, two in the back.
+
+    Args:
+        layout: the grid.
+        bricks: by piece, both sides of the body.
+    """
+    found: list[FormDart] = []
+    for piece, own in bricks.items():
+        cloth = _cloth(layout, own)
+        if _bust_mouth(layout, cloth, "bust") is not None:
+            found.append(FormDart(name="bust dart", piece=piece, line="bust"))
+        for face in ("front", "back"):
+            dart = FormDart(name="waist dart", piece=piece, line=f"princess {face} left")
+            run = _longest_run(_grid_line(layout, dart), cloth)
+            at_waist = {int(run[at]) for at in (0, -1)} & set(layout.lines["waist"].tolist()) if len(run) else set()
+            if not at_waist:
+                continue
+            found.append(dart)
+            if int(run[-1]) in at_waist and face == "back":
+                found.append(replace(dart, name="second waist dart", towards="side left", like=dart.name))
+    return tuple(found)
+
+
+def _cloth(layout: Layout, bricks: Sequence[str]) -> _Cloth:
+    index = {b: i for i, b in enumerate(layout.bricks)}
+    corners = layout.faces[np.isin(layout.face_brick, [index[b] for b in bricks])]
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    edges, counts = np.unique(ends, axis=0, return_counts=True)
+    inner = edges[counts == 2].tolist()
+    return _Cloth(
+        inner=frozenset((a, b) for u, v in inner for a, b in ((u, v), (v, u))),
+        border=frozenset(np.unique(edges[counts == 1]).tolist()),
+    )
+
+
+def _holds(cloth: _Cloth, row: IntArray) -> bool:
+    """Return whether a row begins on the border of a piece and runs on inside."""
+    ids = row.tolist()
+    return (
+        ids[0] in cloth.border and cloth.border.isdisjoint(ids[1:]) and cloth.inner.issuperset(itertools.pairwise(ids))
+    )
+
+
+def _lies_left(layout: Layout, row: IntArray) -> bool:
+    """Return whether a row lies on the left of the body."""
+    left = np.concatenate([grid.ravel() for name, grid in layout.bricks.items() if is_side(name, "left")])
+    return bool(np.isin(row, left).all())
+
+
+def _grid_line(layout: Layout, dart: FormDart) -> list[int]:
+    """Return the vertices of the line along which a dart lies, a closed one without its repeated first vertex."""
+    for name in (dart.line, *([] if dart.towards is None else [dart.towards])):
+        if name not in layout.lines:
+            raise InputError(f"dart {dart.name!r}: line {name!r} is unknown: {nearest(name, layout.lines)}")
+    line = layout.lines[dart.line].tolist()
+    if dart.towards is None:
+        return line
+    ends = []
+    for name in (dart.line, dart.towards):
+        columns = [np.flatnonzero(row == v) for row in layout.rings for v in (layout.lines[name][:1])]
+        here = np.unique(np.concatenate(columns))
+        if len(here) != 1:
+            raise InputError(f"dart {dart.name!r}: line {name!r} does not run up and down the trunk; leave out towards")
+        ends.append(int(here[0]))
+    return layout.rings[:, round((1.0 - dart.between) * ends[0] + dart.between * ends[1])].tolist()
+
+
+def _runs(line: Sequence[int], cloth: _Cloth) -> list[list[int]]:
+    """Return the stretches of a line inside a piece; those of a closed line join over its first vertex."""
+    runs: list[list[int]] = []
+    for a, b in itertools.pairwise(line):
+        if (a, b) not in cloth.inner:
+            continue
+        if runs and runs[-1][-1] == a:
+            runs[-1].append(b)
+        else:
+            runs.append([a, b])
+    if len(runs) > 1 and line[0] == line[-1] and runs[-1][-1] == runs[0][0]:
+        runs[0] = [*runs.pop(), *runs[0][1:]]
+    return runs
+
+
+def _longest_run(line: Sequence[int], cloth: _Cloth) -> list[int]:
+    return max(_runs(line, cloth), key=len, default=[])
+
+
+def _place(layout: Layout, vertices: FloatArray, cloth: _Cloth, dart: FormDart) -> PlacedDart:
+    where = f"dart {dart.name!r}"
+    run = _longest_run(_grid_line(layout, dart), cloth)
+    if not run or not {run[0], run[-1]} & cloth.border:
+        raise InputError(f"{where}: line {dart.line!r} does not run from the border into piece {dart.piece!r}")
+    point: int | None = None
+    if dart.part is not None:
+        row = _part_of(vertices, run, dart)
+    else:
+        run, point, length = _default_run(layout, vertices, cloth, run, dart)
+        arc = arc_lengths(vertices[run])
+        # One mesh edge short of the point at least: tips that meet there part the cloth.
+        last = int(np.abs(arc - length).argmin())
+        row = run[: max(1, last if point is None else min(last, run.index(point) - 1)) + 1]
+    row_ids = np.array(row, np.int32)
+    if not _holds(cloth, row_ids):
+        raise InputError(f"{where}: it must begin at the border of piece {dart.piece!r} and end inside it")
+    to_point = None
+    if point is not None:
+        whole = vertices[run[: run.index(point) + 1]]
+        to_point = float(arc_lengths(whole)[-1] - arc_lengths(vertices[row_ids])[-1])
+    return PlacedDart(name=dart.name, piece=dart.piece, asked=dart, row=row_ids, to_point=to_point)
+
+
+def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:
+    """Return the part of a run between two shares of its length, from the mouth."""
+    assert dart.part is not None
+    first, last = dart.part
+    if first not in (0.0, 1.0):
+        first, last = last, first
+    if first not in (0.0, 1.0) or first == last:
+        raise InputError(
+            f"dart {dart.name!r}: part = [{dart.part[0]:g}, {dart.part[1]:g}] does not reach the border of piece "
+            f"{dart.piece!r}; begin at 0 or 1"
+        )
+    if first == 1.0:
+        run, last = run[::-1], 1.0 - last
+    arc = arc_lengths(vertices[run])
+    return run[: max(1, int(np.abs(arc - last * arc[-1]).argmin())) + 1]
+
+
+def _bust_mouth(layout: Layout, cloth: _Cloth, line: str) -> list[int] | None:
+    """Return the run of the bust line from the left side of a front piece; None if it does not run from there to a bust point."""
+    run = _longest_run(layout.lines[line].tolist(), cloth)
+    side = int(layout.rings[layout.level_row["bust"], layout.quarter])
+    if side not in (run[0], run[-1]) if run else True:
+        return None
+    run = run if run[0] == side else run[::-1]
+    apex = int(layout.rings[layout.level_row["bust"], layout.to_princess])
+    return run if apex in run[2:-1] else None
+
+
+def _default_run(
+    layout: Layout, vertices: FloatArray, cloth: _Cloth, run: list[int], dart: FormDart
+) -> tuple[list[int], int | None, float]:
+    """Return a run from the mouth, the vertex that the dart points to (None in a skirt), and the dart's length [m]."""
+    if dart.line == "bust" and (from_side := _bust_mouth(layout, cloth, "bust")) is not None:
+        apex = int(layout.rings[layout.level_row["bust"], layout.to_princess])
+        reach = float(arc_lengths(vertices[from_side[: from_side.index(apex) + 1]])[-1])
+        return from_side, apex, reach - _tip(dart, "bust")
+    waist = set(layout.lines["waist"].tolist())
+    face = "front" if "front" in dart.line else "back"
+    if run[-1] in waist and run[0] not in waist:
+        short = _SECOND if dart.towards is not None else 1.0
+        return run[::-1], None, _tip(dart, f"{face} skirt") * (short if dart.tip_mm is None else 1.0)
+    bust = [v for v in run if v in set(layout.lines["bust"].tolist())]
+    if run[0] in waist and bust:
+        reach = float(arc_lengths(vertices[run[: run.index(bust[0]) + 1]])[-1])
+        return run, bust[0], reach - _tip(dart, face)
+    raise InputError(
+        f"dart {dart.name!r}: no usual dart lies along {dart.line!r} in piece {dart.piece!r}; give its part, "
+        "from the mouth to the tip, as part = [0, 0.3]"
+    )
+
+
+def _tip(dart: FormDart, kind: str) -> float:
+    return 1e-3 * (_TIPS[kind] if dart.tip_mm is None else dart.tip_mm)

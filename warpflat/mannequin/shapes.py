@@ -1,0 +1,56 @@
+"""Shaping of a form: the same pieces with darts, or parted along the princess lines."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Literal
+
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import standard_darts
+from warpflat.mannequin.forms import Form, PieceRecipe
+from warpflat.mannequin.halves import is_side
+from warpflat.mannequin.layout import Layout
+
+__all__ = ["shaped_form"]
+
+_HOLLOW = (("bust", "waist"),)
+
+
+def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "princess"]) -> Form:
+    """Return a form whose pieces are shaped: by the darts of a pattern book's block, or by princess seams.
+
+    With a bust dart the cloth hangs straight from the bust to the waist.
+
+    Raises:
+        InputError: an unknown brick.
+    """
+    if shape == "none":
+        return form
+    bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
+    if shape == "darts":
+        darts = standard_darts(layout, bricks)
+        # Legs are straight where the cloth hangs straight, over the hollow under the bust.
+        ruled = _HOLLOW if any(dart.line == "bust" for dart in darts) else ()
+        return replace(form, darts=(*form.darts, *darts), ruled=(*form.ruled, *ruled))
+    pieces: dict[str, PieceRecipe] = {}
+    for name, recipe in form.pieces.items():
+        pieces |= _parted(name, recipe, bricks[name])
+    return replace(form, pieces=pieces)
+
+
+def _parted(name: str, recipe: PieceRecipe, bricks: list[str]) -> dict[str, PieceRecipe]:
+    """Part a piece along the princess lines; one that none of them runs through stays."""
+    centre = [b for b in bricks if b.endswith("-centre")]
+    parts = {f"{name}_centre": (centre, recipe.datum)}
+    for side in ("left", "right"):
+        own = [b for b in bricks if b.endswith("-side") and is_side(b, side)]
+        faces = {b.partition("/")[2].split("-")[0] for b in own}
+        if len(faces) == 1:
+            parts[f"{name}_side_{side}"] = (own, f"princess {faces.pop()} {side}")
+    if not centre or sum(len(own) for own, _ in parts.values()) != len(bricks) or len(parts) == 1:
+        return {name: recipe}
+    return {
+        part: replace(recipe, bricks=tuple(own), datum=datum, open=recipe.open if own is centre else ())
+        for part, (own, datum) in parts.items()
+        if own
+    }
