@@ -31,6 +31,7 @@ _UNITS = {
     "stiffness_warp": "N/m",
     "stiffness_weft": "N/m",
     "shear_stiffness": "N/m per rad",
+    "bending": "N m",
 }
 
 
