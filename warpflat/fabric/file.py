@@ -95,7 +95,7 @@ class KesTable(Table):
 
 
 class FastTable(Table):
-    """Readings of FAST: extensions E5, E20, E100 [%] along warp and weft, bias extension EB5 [%], bending length C [mm], weight W [g/m2]."""
+    """Readings of FAST: extensions E5, E20, E100 [%] along warp and weft, bias extension EB5 [%], bending length C [mm], W [g/m2]."""
 
     e5_warp: float | None = Field(default=None, gt=0)
     e5_weft: float | None = Field(default=None, gt=0)
