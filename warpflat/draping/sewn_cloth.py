@@ -99,7 +99,8 @@ class SewnCloth:
     def vertex_areas(self) -> FloatArray:
         """Return #V, a third of the flat area of the cells at each vertex [m2]."""
         corner, _, _, area = self.cells()
-        return np.bincount(corner.ravel(), np.repeat(area / 3.0, 3), minlength=len(self.designed))
+        summed = np.bincount(corner.ravel(), np.repeat(area / 3.0, 3), minlength=len(self.designed))
+        return summed.astype(np.float64)
 
 
 def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Sequence[Seam] = ()) -> SewnCloth:
