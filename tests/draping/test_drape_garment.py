@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import warpflat
+from warpflat.cli.tables import warnings_of
 from warpflat.core.errors import InputError
 from warpflat.draping.hollows import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import sew_cloth
@@ -111,4 +112,6 @@ def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
     assert {"dome.draped.obj", "drape.png"} <= set(result.files)
     entry = json.loads((tmp_path / "out" / "metrics.json").read_text())["drape"]
     assert entry["steps"] <= 300
+    fallen = {**result.metrics, "drape": {**entry, "converged": False, "distance_m": {"mean": 2.0}}}
+    assert any("slipped off its body" in line for line in warnings_of(fallen))
     assert {"distance_m", "misfit_m", "bridged_m", "gap_m", "strain_warp", "pressure_pa", "places"} <= set(entry)

@@ -27,6 +27,8 @@ __all__ = [
 
 # A seam or constraint that fails by more than this gets a warning [mm].
 _WARNED_MISS = 0.2
+# Cloth that is so far from its designed surface has fallen off the body [m].
+_FALLEN = 0.3
 _UNITS = {
     "areal_density": "kg/m2",
     "stiffness_warp": "N/m",
@@ -119,9 +121,9 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     drape = metrics.get("drape", {"converged": True})
     if not drape["converged"]:
         left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
-        lines.append(
-            f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): raise max_steps in [drape]"
-        )
+        fallen = drape["distance_m"]["mean"] > _FALLEN
+        way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]")
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [
