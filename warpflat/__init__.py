@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from warpflat.cutting.ledger import make_ledger
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
+    from warpflat.draping.drape_garment import drape
+    from warpflat.draping.options import DrapeOptions
+    from warpflat.draping.result import Drape
+    from warpflat.draping.write import save_drape
     from warpflat.export.read_pattern_json import read_pattern_json
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
@@ -87,6 +91,8 @@ _find_kernels()
 _HOME = {
     "Cloth": "pattern.marker",
     "CutPlan": "cutting.cut_plan",
+    "Drape": "draping.result",
+    "DrapeOptions": "draping.options",
     "EdgeRules": "garment.edge_rules",
     "Fabric": "fabric.fabric",
     "FixedLength": "garment.constraints",
@@ -111,6 +117,7 @@ _HOME = {
     "compare_fabrics": "scene.compare",
     "cut": "cutting.cut_piece",
     "draft_garment": "pattern.draft",
+    "drape": "draping.drape_garment",
     "find_fabric": "fabric.library",
     "flatten": "flattening.flatten_piece",
     "flatten_all": "flattening.flatten_all",
@@ -135,6 +142,7 @@ _HOME = {
     "read_surface": "surface.io.read",
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
+    "save_drape": "draping.write",
     "separate": "cutting.separate_pieces",
     "sew": "garment.sewing",
     "shipped_form": "mannequin.forms",
@@ -147,6 +155,8 @@ _HOME = {
 __all__ = [
     "Cloth",
     "CutPlan",
+    "Drape",
+    "DrapeOptions",
     "EdgeRules",
     "Fabric",
     "FixedLength",
@@ -172,6 +182,7 @@ __all__ = [
     "compare_fabrics",
     "cut",
     "draft_garment",
+    "drape",
     "find_fabric",
     "flatten",
     "flatten_all",
@@ -196,6 +207,7 @@ __all__ = [
     "read_surface",
     "run_scene",
     "save_comparison",
+    "save_drape",
     "separate",
     "sew",
     "shipped_form",

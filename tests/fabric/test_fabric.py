@@ -67,7 +67,7 @@ def test_the_library_holds_the_entries_of_the_literature_table():
 
 @pytest.mark.parametrize("fabric", load_library().values(), ids=lambda fabric: fabric.name)
 def test_every_shipped_value_says_where_it_comes_from(fabric: Fabric):
-    assert set(MEASURED) | {"strain_limit"} <= set(fabric.provenance)
+    assert set(MEASURED) | {"strain_limit", "bending"} <= set(fabric.provenance)
     assert fabric.description
     for key, origin in fabric.provenance.items():
         assert origin.source not in ("", "not stated"), key
@@ -222,6 +222,7 @@ def test_a_file_with_plain_numbers_units_readings_and_a_base(tmp_path: Path):
         emt_weft = 8.0
         lt_warp = 0.7
         g = 0.6
+        b = 0.05
         w = 18.0
         [by-fast]
         areal_density = 0.2
@@ -231,6 +232,8 @@ def test_a_file_with_plain_numbers_units_readings_and_a_base(tmp_path: Path):
         e100_warp = 4.6
         e100_weft = 5.87
         eb5 = 4.7
+        c = 15.0
+        w = 168.0
         [softer-denim]
         base = "denim"
         stiffness_warp = 300.0
@@ -249,10 +252,12 @@ def test_a_file_with_plain_numbers_units_readings_and_a_base(tmp_path: Path):
     assert kes.areal_density == pytest.approx(0.18)
     assert kes.curve_warp
     assert not kes.curve_weft
+    assert kes.bending == pytest.approx(4.903e-6, rel=1e-3)
     fast = library["by-fast"]
     assert fast.stiffness_weft == pytest.approx(1670, rel=1e-3)
     assert fast.shear_stiffness == pytest.approx(26.2, rel=1e-2)
     assert fast.areal_density == 0.2
+    assert fast.bending == pytest.approx(5.56e-6, rel=1e-3)  # as the report says that these readings give
     assert len(fast.curve_warp) == 3
     assert not fast.curve_weft
     softer = library["softer-denim"]
@@ -326,7 +331,7 @@ def test_files_that_are_none_are_refused(tmp_path: Path):
 
 def test_every_measured_value_is_listed():
     assert set(value_names()) == {
-        *MEASURED, "poisson_ratio", "strain_limit", "compression_factor", "curve_warp", "curve_weft"
+        *MEASURED, "poisson_ratio", "strain_limit", "compression_factor", "bending", "curve_warp", "curve_weft"
     }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ import click
 from warpflat._version import __version__
 from warpflat.cli.compare import compare
 from warpflat.cli.cuts import cuts
+from warpflat.cli.drape import drape
 from warpflat.cli.export import export
 from warpflat.cli.fabrics import fabrics
 from warpflat.cli.flatten import flatten
@@ -62,6 +63,7 @@ def cli(context: click.Context) -> None:
       warpflat run scenes/dome.toml                       a scene file, into out/dome
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
+      warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
@@ -70,7 +72,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, mannequin, compare, fabrics, cuts, export):
+for _command in (run, flatten, drape, mannequin, compare, fabrics, cuts, export):
     cli.add_command(_command)
 
 

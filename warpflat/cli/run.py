@@ -66,7 +66,7 @@ def start_warp_silently() -> None:
 
 def report_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool) -> int:
     """Print the result of a run, and return the exit code."""
-    from warpflat.cli.tables import run_summary, warnings_of
+    from warpflat.cli.tables import drape_lines, run_summary, warnings_of
     from warpflat.flattening.fit_report import fit_lines
 
     warnings = warnings_of(result.metrics)
@@ -80,6 +80,6 @@ def report_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool)
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
     elif not quiet:
         click.echo(run_summary(result.metrics, result.files, str(folder)))
-        for line in fit_lines(result.metrics):
+        for line in (*fit_lines(result.metrics), *drape_lines(result.metrics)):
             click.echo(line)
     return NOT_CONVERGED if warnings else DONE

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.nearest_size import SizeDifference
 
 __all__ = [
+    "drape_lines",
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
@@ -26,11 +27,14 @@ __all__ = [
 
 # A seam or constraint that fails by more than this gets a warning [mm].
 _WARNED_MISS = 0.2
+# Cloth that is so far from its designed surface has fallen off the body [m].
+_FALLEN = 0.3
 _UNITS = {
     "areal_density": "kg/m2",
     "stiffness_warp": "N/m",
     "stiffness_weft": "N/m",
     "shear_stiffness": "N/m per rad",
+    "bending": "N m",
 }
 
 
@@ -128,6 +132,12 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
             for name, by in amiss
             if by > _WARNED_MISS
         ]
+    drape = metrics.get("drape", {"converged": True})
+    if not drape["converged"]:
+        left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
+        fallen = drape["distance_m"]["mean"] > _FALLEN
+        way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]")
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [
@@ -136,6 +146,19 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         if f"not_{done}" in metrics.get(what, {})
     ]
     return lines
+
+
+def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
+    """Return what a drape has found, a sentence a line; none without one."""
+    if "drape" not in metrics:
+        return []
+    drape = metrics["drape"]
+    misfit, distance = drape["misfit_m"], drape["distance_m"]
+    first = (
+        f"worn: {1e3 * distance['mean']:.2f} mm from the designed surface, of which {1e3 * misfit['mean']:.2f} mm is misfit "
+        f"(95 %: {1e3 * misfit['p95']:.1f}, at most {1e3 * misfit['max']:.1f} mm)"
+    )
+    return [first, *(f"  {place['words']}" for place in drape["places"])]
 
 
 def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDifference | None = None) -> str:

@@ -36,6 +36,7 @@ _RANGES: dict[str, tuple[float, float, str]] = {
     "poisson_ratio": (0.0, 0.99, ""),
     "strain_limit": (0.001, 2.0, ""),
     "compression_factor": (0.001, 1.0, ""),
+    "bending": (1e-8, 0.1, "N m"),
 }
 
 
@@ -83,6 +84,8 @@ class Fabric:
         strain_limit: strain a pattern may ask of the cloth, either sign; 0.05 is usual for wovens.
         compression_factor: stiffness under in-plane compression over that under tension. Cloth wrinkles instead of
             being pressed together, so less than 1 is real; 1 keeps springs that act alike both ways.
+        bending: bending moment per width per curvature, warp and weft averaged [N m]; only a drape needs it. A medium
+            plain weave has 5e-6 to 1e-5.
         curve_warp: (strain, tension [N/m]) points of a J-shaped curve along the warp, both rising from the origin,
             which is not listed; empty where the secant stiffness is all that is known.
         curve_weft: such points along the weft.
@@ -99,6 +102,7 @@ class Fabric:
     poisson_ratio: float = 0.0
     strain_limit: float = 0.05
     compression_factor: float = 1.0
+    bending: float = 1e-5
     curve_warp: Curve = ()
     curve_weft: Curve = ()
     description: str = ""
@@ -213,6 +217,8 @@ def _range_text(lowest: float, highest: float, unit: str) -> str:
 def _unit_hint(key: str, value: float) -> str:
     if key == "areal_density" and 5.0 < value <= 5000.0:
         return f" (if that is in g/m2, write {value / 1000.0:g})"
+    if key == "bending" and 0.1 < value <= 1e5:
+        return f" (if that is in uN m, write {1e-6 * value:g})"
     if key == "strain_limit" and 2.0 < value <= 200.0:
         return f" (if that is in percent, write {value / 100.0:g})"
     return ""

@@ -18,7 +18,9 @@ from warpflat.fabric.fabric import Curve, Fabric, Provenance, fabric_called
 from warpflat.fabric.instruments import (
     FAST_LOADS,
     GF_PER_CM,
+    KES_BENDING_UNIT,
     KES_SHEAR_UNIT,
+    bending_from_fast,
     curve_from_fast,
     curve_from_kes,
     shear_stiffness_from_fast,
@@ -37,6 +39,7 @@ _UNITS: dict[str, dict[str, float]] = {
     "poisson_ratio": {"1": 1.0},
     "strain_limit": {"1": 1.0, "percent": 0.01},
     "compression_factor": {"1": 1.0, "percent": 0.01},
+    "bending": {"N m": 1.0, "uN m": 1e-6, "gf cm2/cm": KES_BENDING_UNIT},
 }
 
 # Points into which a stretch of linearly varying secant stiffness (a parabola) is cut.
@@ -77,7 +80,7 @@ class CurveTable(_Origin):
 
 
 class KesTable(Table):
-    """Readings of KES-F: EMT [%], LT, the maximum load [gf/cm], shear G [gf/(cm deg)], weight W [mg/cm2]."""
+    """Readings of KES-F: EMT [%], LT, the maximum load [gf/cm], shear G [gf/(cm deg)], bending B [gf cm2/cm], weight W [mg/cm2]."""
 
     emt_warp: float = Field(gt=0)
     emt_weft: float = Field(gt=0)
@@ -85,13 +88,14 @@ class KesTable(Table):
     lt_weft: float | None = Field(default=None, gt=0, le=1)
     max_load: float = Field(default=500.0, gt=0)
     g: float | None = Field(default=None, gt=0)
+    b: float | None = Field(default=None, gt=0)
     w: float | None = Field(default=None, gt=0)
     source: str = "KES-F readings"
     grade: Grade | None = None
 
 
 class FastTable(Table):
-    """Readings of FAST: extensions E5, E20, E100 [%] along warp and weft, bias extension EB5 [%], weight W [g/m2]."""
+    """Readings of FAST: extensions E5, E20, E100 [%] along warp and weft, bias extension EB5 [%], bending length C [mm], W [g/m2]."""
 
     e5_warp: float | None = Field(default=None, gt=0)
     e5_weft: float | None = Field(default=None, gt=0)
@@ -100,9 +104,16 @@ class FastTable(Table):
     e100_warp: float = Field(gt=0)
     e100_weft: float = Field(gt=0)
     eb5: float | None = Field(default=None, gt=0)
+    c: float | None = Field(default=None, gt=0)
     w: float | None = Field(default=None, gt=0)
     source: str = "FAST readings"
     grade: Grade | None = None
+
+    @model_validator(mode="after")
+    def _weight_of_bending(self) -> FastTable:
+        if self.c is not None and self.w is None:
+            raise ValueError("c, the bending length, gives a bending rigidity only with the weight: give w [g/m2], too")
+        return self
 
 
 def _number_or_table(value: Any) -> str:
@@ -128,6 +139,7 @@ class FabricTable(Table):
     poisson_ratio: Quantity | None = None
     strain_limit: Quantity | None = None
     compression_factor: Quantity | None = None
+    bending: Quantity | None = None
     curve_warp: CurveTable | None = None
     curve_weft: CurveTable | None = None
     kes: KesTable | None = None
@@ -307,6 +319,9 @@ def _readings(table: FabricTable) -> tuple[dict[str, Any], dict[str, Provenance]
         if kes.g is not None:
             values["shear_stiffness"] = shear_stiffness_from_kes(kes.g)
             origins["shear_stiffness"] = Provenance(source=kes.source, grade=kes.grade or "", unit="gf/(cm deg)")
+        if kes.b is not None:
+            values["bending"] = kes.b * KES_BENDING_UNIT
+            origins["bending"] = Provenance(source=kes.source, grade=kes.grade or "", unit="gf cm2/cm")
         if kes.w is not None:
             values["areal_density"] = kes.w * 0.01
             origins["areal_density"] = Provenance(source=kes.source, grade=kes.grade or "", unit="mg/cm2")
@@ -331,6 +346,9 @@ def _fast(fast: FastTable, values: dict[str, Any], origins: dict[str, Provenance
     if fast.eb5 is not None:
         values["shear_stiffness"] = shear_stiffness_from_fast(fast.eb5)
         origins["shear_stiffness"] = Provenance(source=fast.source, grade=grade, unit="percent", test_load="EB5")
+    if fast.c is not None and fast.w is not None:
+        values["bending"] = bending_from_fast(fast.c, fast.w)
+        origins["bending"] = Provenance(source=fast.source, grade=grade, unit="mm", test_load="bending length")
     if fast.w is not None:
         values["areal_density"] = fast.w * 1e-3
         origins["areal_density"] = Provenance(source=fast.source, grade=grade, unit="g/m2")

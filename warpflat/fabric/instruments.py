@@ -9,7 +9,9 @@ from warpflat.core.errors import InputError
 __all__ = [
     "FAST_LOADS",
     "GF_PER_CM",
+    "KES_BENDING_UNIT",
     "KES_SHEAR_UNIT",
+    "bending_from_fast",
     "curve_from_fast",
     "curve_from_kes",
     "shear_stiffness_from_fast",
@@ -22,6 +24,9 @@ GF_PER_CM = 0.980665
 
 KES_SHEAR_UNIT = GF_PER_CM * 180.0 / math.pi
 """One gf/(cm degree) [N/m per rad]: 56.19."""
+
+KES_BENDING_UNIT = 1e-4 * GF_PER_CM
+"""One gf cm2/cm of KES bending's B [N m]: 98.07e-6."""
 
 FAST_LOADS = {"e5": 5 * GF_PER_CM, "e20": 20 * GF_PER_CM, "e100": 100 * GF_PER_CM}
 """Loads of FAST-2's three extensions [N/m]: 4.9, 19.6, 98.1."""
@@ -54,6 +59,15 @@ def shear_stiffness_from_fast(eb5: float) -> float:
         InputError: a reading that is not above zero.
     """
     return 123.0 / _positive("eb5", eb5)
+
+
+def bending_from_fast(c: float, w: float) -> float:
+    """Return bending rigidity [N m] from FAST-2's bending length [mm] and the weight [g/m2]: B = g W c^3.
+
+    Raises:
+        InputError: a reading that is not above zero.
+    """
+    return 9.80665 * 1e-3 * _positive("w", w) * (1e-3 * _positive("c", c)) ** 3
 
 
 def curve_from_kes(emt: float, linearity: float, load: float) -> tuple[tuple[float, float], ...]:

@@ -86,6 +86,7 @@ def _run_surface(
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
     from warpflat.export.usd import FrameWriter
+    from warpflat.scene.drape import write_drape
     from warpflat.scene.frames import FrameRecorder
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
@@ -110,13 +111,15 @@ def _run_surface(
 
         result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
     pieces = [advise(piece) for piece in separate(result)]
+    drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
     return write_surface(
         scene,
         pieces,
         folder,
         drawing=drawing,
         seams=seams,
-        more={} if sewn is None else sewn.metrics(),
+        more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
+        files=drape_files,
         frames=wanted,
         notes=(*result.messages, *sequence.notes),
     )
@@ -132,6 +135,8 @@ def files_of_run(scene: Scene) -> list[str]:
         f"{name}.obj": not garment,
         "frames.usdc": FrameSchedule(output).wanted,
         "picture.png": output.picture,
+        "drape.png": output.picture and settings.drape is not None,
+        f"{name}.draped.obj": settings.drape is not None and not garment,
         "wear.png": worn and garment,
         f"{name}.wear.png": worn and not garment,
         **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},

@@ -23,6 +23,7 @@ from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
+from warpflat.scene.drape import write_drape
 from warpflat.scene.frames import FrameRecorder, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
@@ -182,6 +183,8 @@ def run_garment(
 
     plan = plan_garment(scene, device=device)
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
+    if scene.settings.drape is not None:
+        expect_files(out, [f"{name}.draped.obj" for name in plan.form.pieces])
     others = _other_sizes(scene)
     garment = _flatten_with_frames(plan, out, on_progress=on_progress)
     report_activity("measuring how it fits")
@@ -191,7 +194,8 @@ def run_garment(
         size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
         for size, (body, form) in others.items()
     }
-    return _write_garment(plan, garment, graded, out)
+    draped = write_drape(scene, garment, out, device=device)
+    return _write_garment(plan, garment, graded, out, draped=draped)
 
 
 def _flatten_with_frames(
@@ -221,7 +225,14 @@ def _flatten_with_frames(
     return garment
 
 
-def _write_garment(plan: GarmentPlan, garment: Garment, graded: Mapping[str, Garment], out: Path) -> SceneResult:
+def _write_garment(
+    plan: GarmentPlan,
+    garment: Garment,
+    graded: Mapping[str, Garment],
+    out: Path,
+    *,
+    draped: tuple[dict[str, Any], list[str]],
+) -> SceneResult:
     """Write all files of a garment but its frames, and remove what earlier runs have left.
 
     Args:
@@ -229,11 +240,12 @@ def _write_garment(plan: GarmentPlan, garment: Garment, graded: Mapping[str, Gar
         garment: in the mannequin's own size.
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
+        draped: entries and files of the drape.
     """
     from warpflat.export.letters import note_on_names
 
     scene, settings = plan.scene, plan.scene.settings
-    files = [*garment.write_files(out, picture=settings.output.picture), "metrics.json"]
+    files = [*garment.write_files(out, picture=settings.output.picture), *draped[1], "metrics.json"]
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_sheet
 
@@ -252,7 +264,7 @@ def _write_garment(plan: GarmentPlan, garment: Garment, graded: Mapping[str, Gar
     )
     metrics, manifest_notes = remove_stale(
         out,
-        {**garment.metrics(), **_metrics_of_sizes(graded), **pattern.metrics},
+        {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics},
         name=scene.name,
         files=(*files, *pattern.files),
     )

@@ -209,6 +209,16 @@ class WearTable(Table):
     pressure: float | None = None
 
 
+class DrapeTable(Table):
+    """The garment is sewn and put on its body (see `warpflat.drape`)."""
+
+    friction: Annotated[float, Field(ge=0, le=2)] = 0.3
+    tolerance: Annotated[float, Field(ge=1e-6, le=1)] = 5e-3
+    max_steps: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
+    hold: list[str] = Field(default_factory=list)
+    """Lines and edges that stay where they are: "piece.line", or "line" for every piece that has one."""
+
+
 class OutputTable(Table):
     """Files written besides `metrics.json` and `NAME.obj`."""
 
@@ -300,6 +310,7 @@ class SceneTable(Table):
     grain_angle: Annotated[float, Field(ge=-360, le=360)] = 0.0
     model: Literal["springs", "membrane"] = "springs"
     wear: WearTable | None = None
+    drape: DrapeTable | None = None
     device: str | None = None
     relax: RelaxTable = Field(default_factory=RelaxTable)
     output: OutputTable = Field(default_factory=OutputTable)
@@ -317,6 +328,12 @@ class SceneTable(Table):
         else:
             self._check_garment()
         self._check_sizes()
+        return self
+
+    @model_validator(mode="after")
+    def _whole_drape(self) -> SceneTable:
+        if self.drape is not None and self.half:
+            raise ValueError("a drape needs the whole garment: leave out half, or [drape]")
         return self
 
     def _check_surface(self) -> None:

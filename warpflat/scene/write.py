@@ -39,6 +39,7 @@ def write_surface(
     drawing: PatternOptions,
     seams: Sequence[NamedSeam],
     more: Mapping[str, Any],
+    files: Sequence[str] = (),
     frames: bool,
     notes: Sequence[str],
 ) -> SceneResult:
@@ -51,6 +52,7 @@ def write_surface(
         drawing: options of the pattern files.
         seams: named seams of the surface's border.
         more: entries of `metrics.json` besides the pieces.
+        files: that have been written already, by name.
         frames: whether `frames.usdc` has been written.
         notes: what was repaired or chosen until now.
 
@@ -64,8 +66,7 @@ def write_surface(
     from warpflat.garment.pattern_files import surface_files
 
     settings = scene.settings
-    files = write_files(pieces, folder, picture=settings.output.picture, frames=False)
-    files.append("metrics.json")
+    files = [*files, *write_files(pieces, folder, picture=settings.output.picture, frames=False), "metrics.json"]
     if settings.wear is not None and settings.output.picture:
         from warpflat.flattening.fit_picture import write_wear_picture
 

@@ -1,0 +1,280 @@
+"""Cloth in space: forces of the membrane and of bending, contact with a body, and steps of dynamic relaxation.
+
+The membrane is that of `membrane.py`, with F = dX/dx now a 3 by 2 matrix: psi = W(e_warp, e_weft) + 1/2 G gamma^2 per
+flat area, where the rest state is the flat pattern in its own thread directions. Bending is the quadratic energy of
+cloth that hardly stretches, 1/2 B |Laplacian of x|^2 (Wardetzky et al. 2007), with the cotangent Laplacian of the flat
+pieces at the vertices inside. By edges, as Bergou et al. 2006 have it, grids are three times too stiff along their
+lines. The body is one plane per vertex, which is renewed every few steps; friction is Coulomb's. The relaxation is
+explicit with fictitious masses, and all velocities are set to zero when the forces begin to do negative work (kinetic
+damping: Cundall 1976, Barnes 1999).
+"""
+
+import warp as wp
+
+from .indices import natural
+from .membrane import Cloth, sheared_threads, stretched_sheet
+
+wp.set_module_options({"enable_backward": False})
+
+# Distance from its plane at which a vertex rests on the body [m].
+TOUCH = wp.constant(wp.float64(1.0e-6))
+# Way per step below which a vertex does not slide [m].
+STILL = wp.constant(wp.float64(1.0e-7))
+TINY = wp.constant(wp.float64(1.0e-30))
+
+
+@wp.struct
+class Motion:
+    """The state of the vertices, each #V.
+
+    position: [m]. velocity: way per step [m]. mass: fictitious [N/m]. weight: [N]. fixed: 1 where a vertex is held.
+    """
+
+    position: wp.array(dtype=wp.vec3d)
+    velocity: wp.array(dtype=wp.vec3d)
+    mass: wp.array(dtype=wp.float64)
+    weight: wp.array(dtype=wp.float64)
+    fixed: wp.array(dtype=wp.int8)
+
+
+@wp.struct
+class Contact:
+    """The body as one plane per vertex.
+
+    centre: #V, the nearest place of the body [m]. normal: #V, outwards; zero where no body is near.
+    friction: Coulomb's coefficient. longest_step: bound of the way in one step [m].
+    """
+
+    centre: wp.array(dtype=wp.vec3d)
+    normal: wp.array(dtype=wp.vec3d)
+    friction: wp.float64
+    longest_step: wp.float64
+
+
+@wp.struct
+class Bending:
+    """The rows of the flat cloth's symmetric Laplacian L, and its stiffness: the energy is 1/2 sum_i s_i |sum_j L_ij x_j|^2.
+
+    offset: #V+1. neighbor, weight: the vertices and entries of each row. stiffness: #V, s, zero at a border [N/m].
+    """
+
+    offset: wp.array(dtype=wp.int32)
+    neighbor: wp.array(dtype=wp.int32)
+    weight: wp.array(dtype=wp.float64)
+    stiffness: wp.array(dtype=wp.float64)
+
+
+@wp.kernel
+def evaluate_cloth(
+    position: wp.array(dtype=wp.vec3d),
+    corner: wp.array(dtype=wp.vec3i),
+    gradient: wp.array(dtype=wp.vec4d),
+    area: wp.array(dtype=wp.float64),
+    cloth: Cloth,
+    first: int,
+    # outputs
+    force: wp.array(dtype=wp.vec3d),
+):
+    """Compute the membrane's forces on the corners of each cell, minus the gradient of (flat area) psi.
+
+    position: #V [m]. corner: #C. gradient: #C, of the weight of corner 1 along warp and weft, then of corner 2 [1/m].
+    area: #C, flat [m2]. force: 3 #C [N].
+    """
+    c = natural(wp.tid() + first)
+    at = corner[c]
+    g = gradient[c]
+    origin = position[natural(at[0])]
+    d1 = position[natural(at[1])] - origin
+    d2 = position[natural(at[2])] - origin
+    warp = d1 * g[0] + d2 * g[2]
+    weft = d1 * g[1] + d2 * g[3]
+    length_warp = wp.max(wp.length(warp), TINY)
+    length_weft = wp.max(wp.length(weft), TINY)
+    e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
+    law = stretched_sheet(e, cloth)
+    tau = sheared_threads(wp.dot(warp, weft), cloth)[0]
+    pull_warp = (warp * (law[0] / length_warp) + weft * tau) * area[c]
+    pull_weft = (weft * (law[1] / length_weft) + warp * tau) * area[c]
+    f1 = -(pull_warp * g[0] + pull_weft * g[1])
+    f2 = -(pull_warp * g[2] + pull_weft * g[3])
+    force[natural(3 * c)] = -(f1 + f2)
+    force[natural(3 * c + 1)] = f1
+    force[natural(3 * c + 2)] = f2
+
+
+@wp.kernel
+def evaluate_curvature(
+    position: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    first: int,
+    # outputs
+    moment: wp.array(dtype=wp.vec3d),
+):
+    """Compute s sum_j L_ij x_j at each vertex, the bending energy's derivative by the curvature there.
+
+    position: #V [m]. moment: #V [N].
+    """
+    i = natural(wp.tid() + first)
+    total = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    s = natural(bending.offset[i])
+    end = bending.offset[i + 1]
+    while s < end:
+        total += position[natural(bending.neighbor[s])] * bending.weight[s]
+        s += 1
+    moment[i] = total * bending.stiffness[i]
+
+
+@wp.kernel
+def find_planes(
+    mesh: wp.uint64,
+    body_normal: wp.array(dtype=wp.vec3),
+    position: wp.array(dtype=wp.vec3d),
+    reach: wp.float32,
+    first: int,
+    # outputs
+    centre: wp.array(dtype=wp.vec3d),
+    normal: wp.array(dtype=wp.vec3d),
+):
+    """Find the body's plane at each vertex: the nearest place of its surface and the interpolated normal there.
+
+    A sign is not asked for, as it is arbitrary at distance zero.
+
+    mesh: the body. body_normal: its normals at its vertices. position: #V [m]. reach: longest distance [m]. centre: #V [m].
+    normal: #V, zero where the body is out of reach.
+    """
+    i = natural(wp.tid() + first)
+    p = position[i]
+    query = wp.mesh_query_point_no_sign(mesh, wp.vec3(wp.float32(p[0]), wp.float32(p[1]), wp.float32(p[2])), reach)
+    normal[i] = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    if query.result:
+        face = 3 * query.face
+        indices = wp.mesh_get(mesh).indices
+        place = wp.mesh_eval_position(mesh, query.face, query.u, query.v)
+        n = wp.normalize(
+            query.u * body_normal[indices[face]]
+            + query.v * body_normal[indices[face + 1]]
+            + (1.0 - query.u - query.v) * body_normal[indices[face + 2]]
+        )
+        centre[i] = wp.vec3d(wp.float64(place[0]), wp.float64(place[1]), wp.float64(place[2]))
+        normal[i] = wp.vec3d(wp.float64(n[0]), wp.float64(n[1]), wp.float64(n[2]))
+
+
+@wp.func
+def gather(
+    i: int,
+    offset: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.int32),
+    force: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    moment: wp.array(dtype=wp.vec3d),
+):
+    """Return the forces of the membrane and of bending on a vertex, in the order of their lists [N]."""
+    total = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    s = natural(offset[i])
+    end = offset[i + 1]
+    while s < end:
+        total += force[natural(entry[s])]
+        s += 1
+    s = natural(bending.offset[i])
+    end = bending.offset[i + 1]
+    while s < end:
+        total -= moment[natural(bending.neighbor[s])] * bending.weight[s]
+        s += 1
+    return total
+
+
+@wp.func
+def rub(force: wp.vec3d, slide: wp.vec3d, most: wp.float64):
+    """Return the tangential force with Coulomb's friction, which is at most `most` [N]; zero where the vertex sticks.
+
+    force: tangential [N]. slide: tangential way per step [m].
+    """
+    pull = wp.length(force)
+    way = wp.length(slide)
+    against = force / wp.max(pull, TINY)
+    if way >= STILL:
+        against = slide / way
+    elif pull <= most:
+        return wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    return force - against * most
+
+
+@wp.kernel
+def advance_drape(
+    motion: Motion,
+    contact: Contact,
+    offset: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.int32),
+    force: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    moment: wp.array(dtype=wp.vec3d),
+    halted: wp.array(dtype=wp.int32),
+    first: int,
+    # outputs
+    power: wp.array(dtype=wp.float64),
+    residual: wp.array(dtype=wp.float64),
+    pressing: wp.array(dtype=wp.float64),
+):
+    """Take one step of dynamic relaxation at each vertex; contact and friction act on the gathered forces.
+
+    motion: moved in place. offset: #V+1, entry: where in `force` those of the cells on
+    each vertex are [N]. moment: as of `evaluate_curvature`. halted: one number, 1
+    if the velocities count as zero. power: #V, force times velocity [N m]. residual: #V, the force that is left [N].
+    pressing: #V, the normal force on the body [N].
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.vec3d(wp.float64(0.0), wp.float64(0.0), wp.float64(0.0))
+    power[i] = wp.float64(0.0)
+    residual[i] = wp.float64(0.0)
+    pressing[i] = wp.float64(0.0)
+    if motion.fixed[i] != wp.int8(0):
+        motion.velocity[i] = zero
+        return
+    x = motion.position[i]
+    v = motion.velocity[i]
+    if halted[0] != 0:
+        v = zero
+    f = gather(i, offset, entry, force, bending, moment) - wp.vec3d(wp.float64(0.0), motion.weight[i], wp.float64(0.0))
+    n = contact.normal[i]
+    near = wp.dot(n, n) > wp.float64(0.5)
+    if near and wp.dot(x - contact.centre[i], n) < TOUCH:
+        push = -wp.dot(f, n)
+        if push > wp.float64(0.0):
+            pressing[i] = push
+            v = v - n * wp.min(wp.dot(v, n), wp.float64(0.0))
+            slide = v - n * wp.dot(v, n)
+            before = f + n * push
+            f = rub(before, slide, contact.friction * push)
+            if wp.length(slide) < STILL and wp.length(f) == wp.float64(0.0):
+                v = zero
+    residual[i] = wp.length(f)
+    power[i] = wp.dot(f, v)
+    v = v + f / motion.mass[i]
+    way = wp.length(v)
+    if way > contact.longest_step:
+        v = v * (contact.longest_step / way)
+    x = x + v
+    if near:
+        depth = wp.dot(x - contact.centre[i], n)
+        if depth < wp.float64(0.0):
+            x = x - n * depth
+            v = v - n * wp.min(wp.dot(v, n), wp.float64(0.0))
+    motion.position[i] = x
+    motion.velocity[i] = v
+
+
+@wp.kernel
+def watch_power(
+    power: wp.array(dtype=wp.float64),
+    first: int,
+    # outputs
+    halted: wp.array(dtype=wp.int32),
+):
+    """Say whether the forces have done negative work: power has a sum for each of some blocks; halted: one number."""
+    total = wp.float64(0.0)
+    i = natural(wp.tid() + first)
+    count = power.shape[0]
+    while i < count:
+        total += power[i]
+        i += 1
+    halted[0] = wp.where(total < wp.float64(0.0), 1, 0)

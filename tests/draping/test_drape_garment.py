@@ -1,0 +1,117 @@
+"""A garment sewn, draped, measured and written."""
+
+from __future__ import annotations
+
+import dataclasses
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import warpflat
+from warpflat.cli.tables import warnings_of
+from warpflat.core.errors import InputError
+from warpflat.draping.hollows import HOLLOW_REACH, hollow_depths
+from warpflat.draping.sewn_cloth import sew_cloth
+
+
+@pytest.fixture(scope="module")
+def bodice() -> warpflat.Garment:
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=20.0)
+    return warpflat.flatten_form(body, body.form("bodice"), fabric="woven")
+
+
+@pytest.fixture(scope="module")
+def worn(bodice: warpflat.Garment) -> warpflat.Drape:
+    return warpflat.drape(bodice)
+
+
+def test_seams_are_welded_and_the_rest_state_is_the_flat_pattern(bodice: warpflat.Garment):
+    cloth = sew_cloth(bodice)
+    twice = sum(len(np.unique(seam.vertices[0])) for seam in bodice.form.seams)
+    pieces = bodice.pieces.values()
+    assert len(cloth.designed) == sum(len(piece.positions) for piece in pieces) - twice
+    np.testing.assert_allclose(cloth.vertex_areas().sum(), sum(piece.worn.area.sum() for piece in pieces), rtol=1e-12)
+    laplacian, stiffness = cloth.laplacian()
+    np.testing.assert_allclose((laplacian @ np.ones(len(cloth.designed))), 0.0, atol=1e-12)
+    assert (stiffness > 0.0).sum() > 0.8 * len(stiffness)
+
+
+def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):
+    measures = worn.measures()
+    assert measures["converged"]
+    assert measures["residual"] <= 5e-3
+    assert measures["deepest_m"] < 1e-4
+    for side in ("left", "right"):
+        assert measures["gap_m"][f"front.armhole {side}"] > 0.015
+        assert measures["gap_m"][f"back.armhole {side}"] < 0.003
+    np.testing.assert_allclose(worn.misfit + worn.bridged, worn.distance)
+    worst = measures["places"][0]
+    assert worst["kind"] == "misfit"
+    assert "armhole" in worst["line"]
+    assert f"gapes by {1e3 * worst['gap_m']:.1f} mm" in worst["words"]
+    # What presses on the body carries the weight that does not hang from friction alone.
+    assert worn.pressure[worn.gap > 2e-3].max() == 0.0
+
+
+def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path: Path):
+    names = warpflat.save_drape(worn, tmp_path)
+    assert names == ["front.draped.obj", "back.draped.obj", "drape.png"]
+    rows = [line.split() for line in (tmp_path / names[0]).read_text().splitlines()]
+    space = np.array([row[1:] for row in rows if row[0] == "v"], dtype=float)
+    np.testing.assert_array_equal(space, worn.positions[worn.cloth.welded[worn.cloth.piece_vertices["front"]]])
+    assert (tmp_path / "drape.png").stat().st_size > 10_000
+
+
+def test_a_cut_is_closed_again():
+    surface = warpflat.make_shape("dome", resolution=17)
+    piece = warpflat.flatten(surface, fabric="woven")
+    line = next(iter(piece.surface.lines))
+    cut = warpflat.cut(
+        piece, warpflat.CutPlan(name="dart", paths=(warpflat.line_part(piece.surface, line, (0.0, 0.4)),))
+    )
+    assert len(cut.positions) > len(piece.positions)
+    assert len(sew_cloth(cut).designed) == len(piece.positions)
+
+
+def test_a_hollow_is_as_deep_as_taut_cloth_stands_off():
+    """A groove of depth d and half width b: over its middle d, at half its width d / 2; a ridge has none."""
+    across, along = (each.ravel() for each in np.meshgrid(np.linspace(-0.1, 0.1, 41), np.linspace(-0.1, 0.1, 21)))
+    depth, half = 0.01, 0.05
+    groove = -depth * np.maximum(1.0 - np.abs(across) / half, 0.0)
+    up = np.tile([0.0, 0.0, 1.0], (len(across), 1))
+    middle = np.flatnonzero((np.abs(along) < 1e-9) & np.isin(np.round(across, 3), (0.0, 0.025, 0.07)))
+    found = hollow_depths(np.column_stack([across, along, groove]), up, middle)
+    np.testing.assert_allclose(found, [depth, depth / 2, 0.0], atol=1e-5)
+    np.testing.assert_allclose(hollow_depths(np.column_stack([across, along, -groove]), up, middle)[0], 0.0, atol=1e-5)
+    assert half < HOLLOW_REACH
+
+
+def test_what_cannot_be_draped_is_refused(bodice: warpflat.Garment):
+    with pytest.raises(InputError, match=r"line 'shoulder lefd' is unknown: did you mean 'shoulder left'"):
+        warpflat.drape(bodice, hold=["shoulder lefd"])
+    front, back = bodice.pieces.values()
+    other = dataclasses.replace(back, fabric=warpflat.find_fabric("denim"))
+    with pytest.raises(InputError, match=r"different cloths \(denim and woven\)"):
+        warpflat.drape([front, other])
+    half = bodice.mannequin.form("bodice", half=True)
+    with pytest.raises(InputError, match="half a piece on the fold"):
+        warpflat.drape(dataclasses.replace(bodice, form=half))
+    with pytest.raises(InputError, match="there is no piece"):
+        warpflat.drape([])
+    with pytest.raises(InputError, match="friction = -1"):
+        warpflat.DrapeOptions(friction=-1.0)
+
+
+def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
+    text = 'fabric = "woven"\n[surface]\nshape = "dome"\nresolution = 13\n[drape]\nmax_steps = 300\n'
+    path = tmp_path / "dome.toml"
+    path.write_text(text + "[output]\nframes = 0\n[pattern]\nformats = []\n")
+    result = warpflat.run_scene(warpflat.load_scene(path), tmp_path / "out")
+    assert {"dome.draped.obj", "drape.png"} <= set(result.files)
+    entry = json.loads((tmp_path / "out" / "metrics.json").read_text())["drape"]
+    assert entry["steps"] <= 300
+    fallen = {**result.metrics, "drape": {**entry, "converged": False, "distance_m": {"mean": 2.0}}}
+    assert any("slipped off its body" in line for line in warnings_of(fallen))
+    assert {"distance_m", "misfit_m", "bridged_m", "gap_m", "strain_warp", "pressure_pa", "places"} <= set(entry)

@@ -1,0 +1,146 @@
+"""Forces of cloth in space, contact and friction against NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import warp as wp
+from devices import DEVICE
+from warpflat.kernels.drape import (
+    Bending,
+    Contact,
+    Motion,
+    advance_drape,
+    evaluate_cloth,
+    evaluate_curvature,
+    watch_power,
+)
+
+from warpflat.core.launch import launch_each
+from warpflat.fabric.fabric import Fabric
+from warpflat.model.membrane import make_cloth
+
+CURVE = ((0.02, 20.0), (0.05, 100.0))
+CLOTH = Fabric(
+    name="cloth", stiffness_warp=1900.0, stiffness_weft=1200.0, shear_stiffness=26.0, areal_density=0.15,
+    curve_warp=CURVE, compression_factor=0.1,
+)  # fmt: skip
+FLAT = np.array([[0.0, 0.0], [0.01, 0.002], [0.003, 0.012]])
+GRADIENT = np.linalg.inv(np.stack([FLAT[1] - FLAT[0], FLAT[2] - FLAT[0]], axis=-1))
+AREA = 0.5 * abs(np.linalg.det(np.stack([FLAT[1] - FLAT[0], FLAT[2] - FLAT[0]], axis=-1)))
+
+
+def on(values: object, dtype: object) -> wp.array:
+    return wp.array(np.ascontiguousarray(values), dtype=dtype, device=DEVICE)
+
+
+def membrane_energy(x: np.ndarray) -> float:
+    """Area times psi: warp is y and weft x, both sheet and wrinkled sheet by hand."""
+    F = np.stack([x[1] - x[0], x[2] - x[0]], axis=-1) @ GRADIENT
+    weft, warp = F.T
+    e_warp, e_weft, gamma = np.linalg.norm(warp) - 1, np.linalg.norm(weft) - 1, warp @ weft
+    energy = 0.0
+    for e, k in ((e_warp, 1900.0), (e_weft, 1200.0)):
+        energy += 0.5 * k * e * e * (1.0 if e > 0 else CLOTH.compression_factor)
+    if e_warp > 0.0:
+        places = np.linspace(0.0, e_warp, 20001)
+        energy += np.trapezoid(CLOTH.tension(places), places) - 0.5 * 1900.0 * e_warp**2
+    beyond = max(abs(gamma) - np.sqrt(0.5), 0.0)
+    return AREA * (energy + 0.5 * 26.0 * gamma**2 + 0.5 * 600.0 * beyond**2)
+
+
+@pytest.mark.parametrize("stretch", [(1.03, 1.01, 0.1), (0.97, 1.03, 0.0), (0.95, 0.98, 0.2), (1.1, 0.9, 0.9)])
+def test_membrane_forces_are_minus_the_gradient_of_its_energy(stretch: tuple[float, float, float]):
+    x = np.column_stack([FLAT, np.zeros(3)]) * [stretch[0], stretch[1], 1.0]
+    x[:, 0] += stretch[2] * x[:, 1]
+    x = x @ np.linalg.qr(np.random.default_rng(1).normal(size=(3, 3)))[0]
+    along = GRADIENT[:, ::-1]
+    force = wp.zeros(3, dtype=wp.vec3d, device=DEVICE)
+    law = make_cloth(CLOTH, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), wp.get_device(DEVICE))
+    inputs = [
+        on(x, wp.vec3d),
+        on([[0, 1, 2]], wp.vec3i),
+        on(along.reshape(1, 4), wp.vec4d),
+        on([AREA], wp.float64),
+        law,
+    ]
+    launch_each(evaluate_cloth, 1, inputs, [force], device=DEVICE)
+    step, by_hand = 1e-7, np.zeros((3, 3))
+    for place in np.ndindex(3, 3):
+        away = np.zeros((3, 3))
+        away[place] = step
+        by_hand[place] = -(membrane_energy(x + away) - membrane_energy(x - away)) / (2 * step)
+    np.testing.assert_allclose(force.numpy(), by_hand, atol=2e-5 * np.abs(by_hand).max())
+    np.testing.assert_allclose(force.numpy().sum(axis=0), 0.0, atol=1e-12 * np.abs(by_hand).max())
+
+
+def make_bending(weights: np.ndarray, stiffness: np.ndarray) -> Bending:
+    bending = Bending()
+    bending.offset = on(np.arange(0, weights.size + 1, len(weights)), wp.int32)
+    bending.neighbor = on(np.tile(np.arange(len(weights)), len(weights)), wp.int32)
+    bending.weight, bending.stiffness = on(weights.ravel(), wp.float64), on(stiffness, wp.float64)
+    return bending
+
+
+def test_moments_are_the_laplacian_times_the_stiffness():
+    rng = np.random.default_rng(2)
+    x, weights, stiffness = rng.normal(size=(4, 3)), rng.normal(size=(4, 4)), rng.random(4)
+    moment = wp.zeros(4, dtype=wp.vec3d, device=DEVICE)
+    launch_each(evaluate_curvature, 4, [on(x, wp.vec3d), make_bending(weights, stiffness)], [moment], device=DEVICE)
+    np.testing.assert_allclose(moment.numpy(), stiffness[:, None] * (weights @ x), rtol=1e-12)
+
+
+def advance(force: np.ndarray, velocity: np.ndarray, *, height: float = 0.0, fixed: int = 0, halted: int = 0) -> dict:
+    """One vertex of weight 2 N and mass 8 N/m above the level plane y = 0, friction 0.5."""
+    motion, contact = Motion(), Contact()
+    motion.position, motion.velocity = on([[0.0, height, 0.0]], wp.vec3d), on([velocity], wp.vec3d)
+    motion.mass, motion.weight, motion.fixed = on([8.0], wp.float64), on([2.0], wp.float64), on([fixed], wp.int8)
+    contact.centre, contact.normal = on([[0.0, 0.0, 0.0]], wp.vec3d), on([[0.0, 1.0, 0.0]], wp.vec3d)
+    contact.friction, contact.longest_step = 0.5, 1.0
+    outputs = [wp.zeros(1, dtype=wp.float64, device=DEVICE) for _ in range(3)]
+    lists = [on([0, 2], wp.int32), on([1, 0], wp.int32), on([0.25 * force, 1.75 * force], wp.vec3d)]
+    # Bending takes back what the cells give too much.
+    lists += [make_bending(np.full((1, 1), 2.0), np.ones(1)), on([0.5 * force], wp.vec3d)]
+    launch_each(advance_drape, 1, [motion, contact, *lists, on([halted], wp.int32)], outputs, device=DEVICE)
+    power, residual, pressing = (float(values.numpy()[0]) for values in outputs)
+    x, v = motion.position.numpy()[0], motion.velocity.numpy()[0]
+    return {"x": x, "v": v, "power": power, "residual": residual, "pressing": pressing}
+
+
+STILL = np.zeros(3)
+
+
+def test_a_free_vertex_moves_by_its_force_and_weight():
+    moved = advance(np.array([4.0, 10.0, 0.0]), np.array([0.1, 0.0, 0.0]), height=0.5)
+    np.testing.assert_allclose(moved["v"], [0.1 + 0.5, 1.0, 0.0] / np.hypot(0.6, 1.0))  # no step is longer than 1 m
+    np.testing.assert_allclose(moved["x"], moved["v"] + [0.0, 0.5, 0.0])
+    assert (moved["power"], moved["pressing"]) == (pytest.approx(0.4), 0.0)
+    assert moved["residual"] == pytest.approx(np.hypot(4.0, 8.0))
+    assert advance(np.array([4.0, 10.0, 0.0]), np.array([0.1, 0.0, 0.0]), height=0.5, halted=1)["power"] == 0.0
+
+
+def test_a_vertex_on_the_body_sticks_slides_or_lifts_off():
+    sticks = advance(np.array([0.9, 0.0, 0.0]), STILL)
+    assert (sticks["pressing"], sticks["residual"]) == (pytest.approx(2.0), 0.0)
+    assert not sticks["x"].any()
+    begins = advance(np.array([3.0, 0.0, 4.0]), STILL)
+    np.testing.assert_allclose(begins["v"], np.array([3.0, 0.0, 4.0]) * (1 - 1.0 / 5.0) / 8.0)
+    slides = advance(np.array([0.0, -2.0, 0.0]), np.array([0.08, -0.3, 0.0]))
+    assert slides["pressing"] == pytest.approx(4.0)
+    np.testing.assert_allclose(slides["v"], [0.08 - 2.0 / 8.0, 0.0, 0.0])
+    lifts = advance(np.array([0.0, 3.0, 0.0]), STILL)
+    assert (lifts["pressing"], lifts["residual"]) == (0.0, pytest.approx(1.0))
+    assert lifts["x"][1] == pytest.approx(1.0 / 8.0)
+
+
+def test_no_vertex_is_left_inside_the_body_and_a_fixed_one_stays():
+    assert advance(np.array([1.0, -50.0, 0.0]), STILL, height=0.1)["x"][1] == 0.0
+    assert advance(STILL, STILL, height=-0.3)["x"][1] == 0.0
+    np.testing.assert_array_equal(advance(np.ones(3), np.ones(3), height=0.2, fixed=1)["x"], [0.0, 0.2, 0.0])
+
+
+@pytest.mark.parametrize(("sums", "halts"), [([1.0, -0.5], 0), ([1.0, -1.5], 1), ([0.0, 0.0], 0)])
+def test_motion_halts_when_the_forces_do_negative_work(sums: list[float], halts: int):
+    halted = wp.zeros(1, dtype=wp.int32, device=DEVICE)
+    launch_each(watch_power, 1, [on(sums, wp.float64)], [halted], device=DEVICE)
+    assert halted.numpy()[0] == halts

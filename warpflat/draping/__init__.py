@@ -1,0 +1,1 @@
+"""The sewn garment on the body in space: it is draped, measured and drawn."""

@@ -1,0 +1,53 @@
+"""The body under the cloth: a triangle mesh that is asked for its nearest places."""
+
+from __future__ import annotations
+
+import numpy as np
+import warp as wp
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.launch import launch_each
+from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.kernels.drape import find_planes
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["Body"]
+
+_FAR = 1e3  # [m]
+
+
+class Body:
+    """A surface that cloth lies on, with its search tree on a device.
+
+    Attributes:
+        vertices: #V by 3 [m].
+        triangles: #T by 3.
+        mesh: Warp's mesh.
+        normals: #V, unit normals on the device.
+    """
+
+    def __init__(self, vertices: FloatArray, faces: IntArray, *, device: wp.Device) -> None:
+        """Build the search tree of a surface (#V by 3 [m], #F by 4), wound counter-clockwise from outside."""
+        self.vertices, self.device = vertices, device
+        self.triangles, _ = triangulate(faces)
+        normals = vertex_normals(area_vectors(vertices, self.triangles), self.triangles, len(vertices))
+        self.normals = wp.array(normals.astype(np.float32), dtype=wp.vec3, device=device)
+        self.mesh = wp.Mesh(
+            points=wp.array(vertices.astype(np.float32), dtype=wp.vec3, device=device),
+            indices=wp.array(self.triangles.ravel(), dtype=wp.int32, device=device),
+        )
+
+    def nearest(self, points: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the nearest place of the surface (#P by 3 [m]) and its interpolated unit normal there, for #P by 3 points [m]."""
+        given = wp.array(points, dtype=wp.vec3d, device=self.device)
+        centre, normal = (wp.zeros(len(points), dtype=wp.vec3d, device=self.device) for _ in range(2))
+        inputs = [wp.uint64(self.mesh.id), self.normals, given, _FAR]
+        launch_each(find_planes, len(points), inputs, [centre, normal], device=self.device, least=256)
+        return centre.numpy().copy(), normal.numpy().copy()
+
+    def gaps(self, points: FloatArray) -> FloatArray:
+        """Return #P, the distance of points (#P by 3) from the surface, negative inside [m]."""
+        centre, normal = self.nearest(points)
+        away = points - centre
+        distance = np.linalg.norm(away, axis=1)
+        return np.where(np.einsum("ij,ij->i", away, normal) < 0.0, -distance, distance)

@@ -1,0 +1,80 @@
+"""A garment is sewn, put on a body, and comes to rest there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import warp as wp
+
+from warpflat.core.arrays import BoolArray
+from warpflat.core.errors import InputError, nearest
+from warpflat.draping.body import Body
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.relax_drape import relax_drape
+from warpflat.draping.result import Drape
+from warpflat.draping.sewn_cloth import SewnCloth, sew_cloth
+from warpflat.flattening.result import Flattening
+from warpflat.garment.garment import Garment
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.surface.mesh import Surface
+
+__all__ = ["drape"]
+
+
+def drape(
+    garment: Garment | Flattening | Sequence[Flattening],
+    body: Mannequin | Surface | None = None,
+    *,
+    hold: Sequence[str] = (),
+    options: DrapeOptions | None = None,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> Drape:
+    """Sew flat pieces, put them on a body and let them come to rest under gravity, contact and friction.
+
+    The cloth starts at the designed surface; its rest state is the flat pattern in its own thread directions.
+
+    Args:
+        garment: of :func:`warpflat.flatten_form`, or pieces whose cuts are closed.
+        body: a mannequin or a surface, such as a scan's; a garment's own mannequin, or a piece's own surface, if not given.
+        hold: lines and edges that stay where they are, as "piece.line", or "line" for every piece that has one: those that
+            would be sewn to what is not there.
+        options: friction, tolerance and limits.
+        callback: called with the number of steps and the residual now and then.
+        device: Warp device.
+
+    Returns:
+        the drape; `converged` is False if it met the step limit before it was at rest.
+
+    Raises:
+        InputError: no piece, pieces of different cloths, half pieces, mirrored faces, or an unknown line.
+    """
+    cloth = sew_cloth(garment)
+    where = wp.get_device(device)
+    designed = Body(cloth.designed, cloth.faces, device=where)
+    if body is None:
+        body = garment.mannequin if isinstance(garment, Garment) else None
+    surface = body.surface() if isinstance(body, Mannequin) else body
+    solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
+    options = options or DrapeOptions()
+    worn = relax_drape(cloth, solid, options=options, held=_held(cloth, hold), callback=callback)
+    if isinstance(garment, Garment):
+        pieces = dict(garment.pieces)
+    else:
+        given = [garment] if isinstance(garment, Flattening) else list(garment)
+        pieces = {piece.surface.name: piece for piece in given}
+    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, pieces=pieces, options=options)
+
+
+def _held(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:
+    """Return which vertices (#V) lie on lines that are held."""
+    held = np.zeros(len(cloth.designed), dtype=bool)
+    for name in hold:
+        lines = [line for line in cloth.lines if name in (line, line.partition(".")[2])]
+        if not lines:
+            known = [*cloth.lines, *(line.partition(".")[2] for line in cloth.lines)]
+            raise InputError(f"drape: hold: line {name!r} is unknown: {nearest(name, known)}")
+        for line in lines:
+            held[cloth.lines[line]] = True
+    return held

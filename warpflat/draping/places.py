@@ -1,0 +1,153 @@
+"""The worst places of a drape, each with a sentence."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.surface.connectivity import join_labels
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["Place", "find_places"]
+
+# From here on a distance is worth a sentence [m], and a place its own one [m2].
+_WORTH, _LEAST_AREA = 3e-3, 2e-4
+_MOST = 6
+
+
+@dataclass(frozen=True, kw_only=True)
+class Place:
+    """A connected place where the cloth does not lie as designed.
+
+    Attributes:
+        kind: "misfit", "bridged" or "strain".
+        line: the feature line or edge next to its worst vertex, "piece.line".
+        worst: the largest distance from the designed surface [m], or strain.
+        gap: the distance from the body there [m].
+        area: flat area [m2].
+        words: a sentence.
+    """
+
+    kind: str
+    line: str
+    worst: float
+    gap: float
+    area: float
+    words: str
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry of `metrics.json`."""
+        return {
+            "kind": self.kind, "line": self.line, "worst": self.worst, "gap_m": self.gap, "area_m2": self.area,
+            "words": self.words,
+        }  # fmt: skip
+
+
+def find_places(
+    cloth: SewnCloth,
+    areas: FloatArray,
+    *,
+    misfit: FloatArray,
+    bridged: FloatArray,
+    lift: FloatArray,
+    gap: FloatArray,
+    strains: Mapping[str, FloatArray],
+) -> tuple[Place, ...]:
+    """Find the connected places of misfit, bridged hollows and strain beyond the cloth's limit, the largest first.
+
+    Args:
+        cloth: the sewn cloth.
+        areas: #V, flat areas [m2].
+        misfit, bridged: #V, parts of the distance from the designed surface [m].
+        lift: #V, how much farther than designed the cloth is from the body [m].
+        gap: #V, the distance from the body [m].
+        strains: #F along warp and weft.
+    """
+    found = []
+    for kind, values in (("misfit", misfit), ("bridged", bridged)):
+        for part in _parts(cloth, values > _WORTH):
+            if areas[part].sum() >= _LEAST_AREA:
+                found.append(_distance_place(cloth, areas, part, values=values, kind=kind, lift=lift, gap=gap))
+    limit = cloth.fabric.strain_limit
+    for direction, values in strains.items():
+        at_vertices = _means_at_vertices(cloth, values)
+        for part in _parts(cloth, np.abs(at_vertices) > limit):
+            if areas[part].sum() >= _LEAST_AREA:
+                worst = int(part[np.abs(at_vertices[part]).argmax()])
+                line, area, strain = _line_at(cloth, worst), float(areas[part].sum()), float(at_vertices[worst])
+                how = "stretched" if strain > 0.0 else "pressed together"
+                words = (
+                    f"{_called(line)} is {how} by {100 * abs(strain):.1f} % along the {direction}, beyond the cloth's "
+                    f"limit of {100 * limit:g} %, over {1e4 * area:.0f} cm2"
+                )
+                found.append(
+                    Place(kind="strain", line=line, worst=strain, gap=float(gap[worst]), area=area, words=words)
+                )
+    order = {"misfit": 0, "strain": 1, "bridged": 2}
+    found.sort(key=lambda place: (order[place.kind], -abs(place.worst) * place.area))
+    return tuple(found[:_MOST])
+
+
+def _distance_place(
+    cloth: SewnCloth,
+    areas: FloatArray,
+    part: IntArray,
+    *,
+    values: FloatArray,
+    kind: str,
+    lift: FloatArray,
+    gap: FloatArray,
+) -> Place:
+    worst = int(part[values[part].argmax()])
+    line, area, distance = _line_at(cloth, worst), float(areas[part].sum()), float(values[worst])
+    size = f"over {1e4 * area:.0f} cm2"
+    if kind == "bridged":
+        words = f"{_called(line)} bridges a hollow, {1e3 * distance:.1f} mm off, {size}"
+    elif lift[worst] > 0.5 * distance:
+        words = f"{_called(line)} gapes by {1e3 * gap[worst]:.1f} mm {size}"
+    elif lift[worst] < -0.5 * distance:
+        words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
+    else:
+        words = f"{_called(line)} has moved by {1e3 * distance:.1f} mm {size}"
+    return Place(kind=kind, line=line, worst=distance, gap=float(gap[worst]), area=area, words=words)
+
+
+def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:
+    """Return the chosen vertices (#V) in connected parts."""
+    triangles, _ = triangulate(cloth.faces)
+    a, b = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    inside = chosen[a] & chosen[b]
+    label = join_labels(len(chosen), a[inside], b[inside])
+    members = np.flatnonzero(chosen).astype(np.int32)
+    if not len(members):
+        return []
+    order = np.argsort(label[members], kind="stable")
+    members = members[order]
+    return np.split(members, np.flatnonzero(np.diff(label[members])) + 1)
+
+
+def _means_at_vertices(cloth: SewnCloth, values: FloatArray) -> FloatArray:
+    """Return #V, the mean of the values (#F) of the faces at each vertex."""
+    used = cloth.faces >= 0
+    vertex, value = cloth.faces[used], np.broadcast_to(values[:, None], used.shape)[used]
+    count = np.bincount(vertex, minlength=len(cloth.designed))
+    return np.asarray(np.bincount(vertex, value, minlength=len(cloth.designed)) / np.maximum(count, 1))
+
+
+def _line_at(cloth: SewnCloth, vertex: int) -> str:
+    """Return the line nearest to a vertex on the designed surface."""
+    place = cloth.designed[vertex]
+    distances = {
+        name: float(np.linalg.norm(cloth.designed[ids] - place, axis=1).min()) for name, ids in cloth.lines.items()
+    }
+    return min(distances, key=distances.__getitem__) if distances else ""
+
+
+def _called(line: str) -> str:
+    piece, _, name = line.partition(".")
+    return f"{piece.replace('_', ' ')} near {name}" if name else "the cloth"

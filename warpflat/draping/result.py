@@ -1,0 +1,176 @@
+"""The result of a drape: the worn cloth, and its measures."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.sums import weighted_percentiles
+from warpflat.draping.body import Body
+from warpflat.draping.hollows import hollow_depths
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.places import Place, find_places
+from warpflat.draping.relax_drape import DrapedCloth
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.flattening.result import Flattening
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["Drape"]
+
+# Distances up to this are not looked into [m].
+_NEGLIGIBLE = 1e-3
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Drape:
+    """A sewn garment at rest on a body.
+
+    Distances are of the worn cloth's vertices from the designed surface. Of each the *bridged* part is what taut cloth over
+    that surface's hollows may stand off (see `warpflat.draping.hollows`), and *misfit* is the rest.
+
+    Attributes:
+        cloth: the sewn cloth.
+        worn: where it lies.
+        body: what it lies on.
+        designed: the designed surface.
+        pieces: the flat pieces by name.
+        options: friction, tolerance and limits.
+    """
+
+    cloth: SewnCloth
+    worn: DrapedCloth
+    body: Body
+    designed: Body
+    pieces: Mapping[str, Flattening]
+    options: DrapeOptions
+
+    @property
+    def converged(self) -> bool:
+        """Whether the cloth is at rest."""
+        return self.worn.converged
+
+    @property
+    def positions(self) -> FloatArray:
+        """#V by 3, the worn vertices [m]."""
+        return self.worn.positions
+
+    @cached_property
+    def areas(self) -> FloatArray:
+        """#V, the flat areas of the vertices [m2]."""
+        return self.cloth.vertex_areas()
+
+    @cached_property
+    def gap(self) -> FloatArray:
+        """#V, the distance from the body, negative inside [m]."""
+        return self.body.gaps(self.positions)
+
+    @cached_property
+    def designed_gap(self) -> FloatArray:
+        """#V, the distance of the designed surface from the body, negative inside [m]."""
+        return self.body.gaps(self.cloth.designed)
+
+    @cached_property
+    def _off(self) -> FloatArray:
+        """#V, the distance from the designed surface, negative on its inner side [m]."""
+        return self.designed.gaps(self.positions)
+
+    @property
+    def distance(self) -> FloatArray:
+        """#V, the distance from the designed surface [m]."""
+        return np.abs(self._off)
+
+    @cached_property
+    def bridged(self) -> FloatArray:
+        """#V, the part of the distance by which taut cloth may stand off a hollow [m]."""
+        bridged = np.zeros(len(self._off))
+        at = np.flatnonzero(self._off > _NEGLIGIBLE)
+        triangles, _ = triangulate(self.cloth.faces)
+        designed = self.cloth.designed
+        normals = vertex_normals(area_vectors(designed, triangles), triangles, len(designed))
+        bridged[at] = np.minimum(self._off[at], hollow_depths(designed, normals, at.astype(np.int32)))
+        return bridged
+
+    @property
+    def misfit(self) -> FloatArray:
+        """#V, the distance that no hollow explains [m]."""
+        return np.asarray(self.distance - self.bridged)
+
+    @cached_property
+    def strains(self) -> dict[str, FloatArray]:
+        """Strain of each face along warp, weft and the more strained of the two diagonals between them ("bias"), #F each."""
+        corner, face, gradient, area = self.cloth.cells()
+        x = self.positions[corner]
+        d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+        warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
+        weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
+        both = [np.linalg.norm(warp + sign * weft, axis=1) / np.sqrt(2.0) - 1.0 for sign in (1.0, -1.0)]
+        strains = {
+            "warp": np.linalg.norm(warp, axis=1) - 1.0,
+            "weft": np.linalg.norm(weft, axis=1) - 1.0,
+            "bias": np.where(np.abs(both[0]) > np.abs(both[1]), both[0], both[1]),
+        }
+        total = np.bincount(face, area)
+        return {name: np.bincount(face, area * values) / total for name, values in strains.items()}
+
+    @cached_property
+    def face_areas(self) -> FloatArray:
+        """#F, flat areas [m2]."""
+        _, face, _, area = self.cloth.cells()
+        return np.bincount(face, area).astype(np.float64)
+
+    @property
+    def pressure(self) -> FloatArray:
+        """#V, normal force on the body over area [Pa]."""
+        return np.asarray(self.worn.pressing / self.areas)
+
+    @cached_property
+    def places(self) -> tuple[Place, ...]:
+        """The worst places, the worst first."""
+        return find_places(
+            self.cloth, self.areas, misfit=self.misfit, bridged=self.bridged, lift=self.gap - self.designed_gap, gap=self.gap,
+            strains={name: self.strains[name] for name in ("warp", "weft")},
+        )  # fmt: skip
+
+    def measures(self) -> dict[str, Any]:
+        """Return the entry `drape` of `metrics.json`."""
+        limit, areas = self.cloth.fabric.strain_limit, self.areas
+        found: dict[str, Any] = {
+            "converged": self.worn.converged,
+            "residual": self.worn.residual,
+            "steps": self.worn.steps,
+            "seconds": self.worn.seconds,
+            "vertices": len(self.positions),
+            "friction": self.options.friction,
+            "bending_n_m": self.cloth.fabric.bending,
+            "distance_m": _spread(self.distance, areas),
+            "misfit_m": _spread(self.misfit, areas),
+            "bridged_m": _spread(self.bridged, areas),
+            "deepest_m": max(0.0, -float(self.gap.min())),
+            "gap_m": {line: float(self.gap[ids].max()) for line, ids in self.cloth.lines.items()},
+            "strain_limit": limit,
+        }
+        for name, values in self.strains.items():
+            low, high = weighted_percentiles(values, self.face_areas, [0.05, 0.95])
+            beyond = float(self.face_areas[np.abs(values) > limit].sum() / self.face_areas.sum())
+            found[f"strain_{name}"] = {
+                "p5": low, "p95": high, "min": float(values.min()), "max": float(values.max()), "beyond_limit": beyond,
+            }  # fmt: skip
+        touching = self.worn.pressing > 0.0
+        pressure = (
+            _spread(self.pressure[touching], areas[touching]) if touching.any() else _spread(np.zeros(1), np.ones(1))
+        )
+        found["pressure_pa"] = {**pressure, "touching": float(areas[touching].sum() / areas.sum())}
+        found["places"] = [place.as_dict() for place in self.places]
+        return found
+
+
+def _spread(values: FloatArray, weights: FloatArray) -> dict[str, float]:
+    """Return mean, 95th percentile by area and maximum."""
+    mean = float((values * weights).sum() / weights.sum())
+    return {"mean": mean, "p95": weighted_percentiles(values, weights, [0.95])[0], "max": float(values.max())}

@@ -1,0 +1,46 @@
+"""The garment of a scene is draped, if the scene says so."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from warpflat.core.activity import report_activity
+from warpflat.scene.load import Scene, errors_named
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.garment import Garment
+
+__all__ = ["write_drape"]
+
+
+def write_drape(
+    scene: Scene, garment: Garment | Flattening, folder: Path, *, device: str | None = None
+) -> tuple[dict[str, Any], list[str]]:
+    """Drape a scene's garment or piece, and write its files.
+
+    Args:
+        scene: the scene.
+        garment: flattened.
+        folder: an existing one.
+        device: Warp device.
+
+    Returns:
+        The entries of `metrics.json`, and the names of the files; none of both without a `[drape]` table.
+
+    Raises:
+        InputError: an unknown line, or the folder cannot be written.
+    """
+    from warpflat.draping.drape_garment import drape
+    from warpflat.draping.options import DrapeOptions
+    from warpflat.draping.write import write_drape_files
+
+    table = scene.settings.drape
+    if table is None:
+        return {}, []
+    report_activity("draping")
+    with errors_named(scene.where):
+        options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+        draped = drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
+    return {"drape": draped.measures()}, write_drape_files(draped, folder, picture=scene.settings.output.picture)
