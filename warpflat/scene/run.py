@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -84,8 +83,7 @@ def _run_surface(
 ) -> SceneResult:
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
-    from warpflat.export.usd import FrameWriter
-    from warpflat.scene.frames import FrameRecorder
+    from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
 
@@ -98,9 +96,8 @@ def _run_surface(
     _check_edges(scene, sequence, drawing.rules)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
-    with ExitStack() as stack:
-        writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
-        recorder = FrameRecorder(writer, sequence.surface, lambda: FrameSchedule(settings.output))
+    with Film(folder, settings.output, [sequence.surface]) as film:
+        recorder = film.recorders[sequence.surface.name]
 
         def each_step(progress: Progress) -> None:
             recorder(progress)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -20,7 +19,7 @@ from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.table import mannequin_from_table
-from warpflat.scene.frames import FrameRecorder, FrameSchedule
+from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
@@ -163,26 +162,20 @@ def _flatten_with_frames(
     plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], None] | None = None
 ) -> Garment:
     """Flatten and sew the garment, and write `frames.usdc` if the scene wants frames."""
-    from warpflat.export.usd import FrameWriter
-
     output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
-    wanted = FrameSchedule(output).wanted
-    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=wanted)
-    with ExitStack() as stack:
-        writer = stack.enter_context(FrameWriter(out / "frames.usdc")) if wanted else None
-        recorders = {
-            name: FrameRecorder(writer, piece.surface, lambda: FrameSchedule(output))
-            for name, piece in plan.form.pieces.items()
-        }
+    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=FrameSchedule(output).wanted)
+    with Film(out, output, surfaces) as film:
 
         def each_step(name: str, progress: Progress) -> None:
-            recorders[name](progress)
+            film.recorders[name](progress)
             if on_progress is not None:
                 on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
         for name, piece in garment.pieces.items():
-            recorders[name].record_result(piece)
+            if piece.unsewn is not None:
+                film.recorders[name].record_result(piece.unsewn)
+            film.recorders[name].record_result(piece)
     return garment
 
 
