@@ -33,8 +33,9 @@ ROOMS = {
     "cutting": "core surface model solver export flattening",
     "mannequin": "core surface export",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
-    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment scene",
+    "review": "core surface export",
+    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment review",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment scene review",
     "kernels": "",
 }
 

@@ -217,7 +217,7 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
     result = run_scene(scene, tmp_path / "out", on_progress=lambda progress: steps.append(progress.step))
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(result.files)
     pattern = {"trial.dxf", "trial.svg", "pattern.pdf", "pattern.json"}
-    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", *pattern}
+    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", "review.html", *pattern}
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert metrics == json.loads(json.dumps(result.metrics))
     piece = metrics["pieces"]["trial"]

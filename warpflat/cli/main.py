@@ -20,6 +20,7 @@ from warpflat.cli.fabrics import fabrics
 from warpflat.cli.flatten import flatten
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
+from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.core.errors import InputError
@@ -63,6 +64,7 @@ def cli(context: click.Context) -> None:
       warpflat flatten front.obj --units cm --fabric denim
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
+      warpflat review out/dome                            one page to review a run
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
     """
@@ -70,7 +72,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, mannequin, compare, fabrics, cuts, export):
+for _command in (run, flatten, mannequin, compare, fabrics, cuts, export, review):
     cli.add_command(_command)
 
 

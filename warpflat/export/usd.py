@@ -304,7 +304,7 @@ class FrameWriter:
         high = np.max([vertices.max(axis=0) for vertices in space], axis=0)
         gap = 0.15 * max(float(np.max(high - low)), *(float(np.max(piece.high - piece.low)) for piece in shown))
         middle = 0.5 * (low + high)
-        corners = rows_on_table(np.array([piece.high - piece.low for piece in shown]), gap)
+        corners = rows_on_table(np.array([piece.high - piece.low for piece in shown]), 0.4 * gap)
         table = np.max([corner + piece.high - piece.low for corner, piece in zip(corners, shown, strict=True)], axis=0)
         origin = np.array([high[0] + gap, middle[1] - 0.5 * table[1]])
         for piece, corner in zip(shown, corners, strict=True):

@@ -90,15 +90,24 @@ def add_light(stage: Any) -> None:
 
 
 def rows_on_table(sizes: FloatArray, gap: float) -> FloatArray:
-    """Return the lower left corner of each of several boxes, laid out from left to right in rows about as wide as high.
+    """Return the lower left corner of each of several boxes, laid out in rows, so many that the whole is near to 16 by 9.
 
     Args:
         sizes: #B by 2 [m].
         gap: between boxes and between rows [m].
     """
-    area = float((sizes + gap).prod(axis=1).sum())
-    # A table half as wide again as it is deep, and no narrower than the widest piece.
-    width = max(math.sqrt(1.5 * area), float(sizes[:, 0].max()))
+    whole = float((sizes[:, 0] + gap).sum())
+    layouts = [_rows(sizes, gap, max(1.05 * whole / rows, float(sizes[:, 0].max()))) for rows in range(1, 5)]
+
+    def unlikeness(corners: FloatArray) -> float:
+        wide, high = (corners + sizes).max(axis=0)
+        return abs(math.log(max(wide, 1e-9) / max(high, 1e-9) * 9.0 / 16.0))
+
+    return min(layouts, key=unlikeness)
+
+
+def _rows(sizes: FloatArray, gap: float, width: float) -> FloatArray:
+    """Return the lower left corners of boxes in rows of at most this width [m]."""
     corners = np.zeros_like(sizes)
     x = y = deep = 0.0
     for number, (wide, high) in enumerate(sizes.tolist()):

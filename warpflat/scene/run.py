@@ -128,6 +128,7 @@ def files_of_run(scene: Scene) -> list[str]:
         f"{name}.obj": not garment,
         "frames.usdc": FrameSchedule(output).wanted,
         "picture.png": output.picture,
+        "review.html": output.picture and output.review,
         "wear.png": worn and garment,
         f"{name}.wear.png": worn and not garment,
         **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},

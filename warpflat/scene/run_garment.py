@@ -23,7 +23,7 @@ from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult
+from warpflat.scene.write import SceneResult, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
 
@@ -208,15 +208,12 @@ def _write_garment(plan: GarmentPlan, garment: Garment, graded: Mapping[str, Gar
         options=plan.drawing,
         sample_size=own,
     )
-    metrics, manifest_notes = remove_stale(
-        out,
-        {**garment.metrics(), **_metrics_of_sizes(graded), **pattern.metrics},
-        name=scene.name,
-        files=(*files, *pattern.files),
-    )
+    measured = {**garment.metrics(), **_metrics_of_sizes(graded), **pattern.metrics}
+    files += [*pattern.files, *review_files(scene, measured, out, (*files, *pattern.files))]
+    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *pattern.notes, *name_notes, *manifest_notes)
-    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+    return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
 
 
 def _metrics_of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:

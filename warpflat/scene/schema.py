@@ -217,6 +217,8 @@ class OutputTable(Table):
     frame_every: Annotated[int, Field(ge=1)] | None = None
     """A frame every so many steps instead, as they are."""
     picture: bool = True
+    review: bool = True
+    """Whether a run with a picture writes `review.html`, too."""
 
 
 class PatternTable(Table):
