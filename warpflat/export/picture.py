@@ -16,6 +16,7 @@ from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
+from warpflat.export.picture_garment import Body, GarmentViews
 from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
@@ -61,6 +62,7 @@ def write_picture(
     *,
     quantity: str = "strain energy density",
     scale: float | None = None,
+    body: Body | None = None,
 ) -> None:
     """Draw every piece twice, on the body and as pattern, at one scale of length and one of energy; atomically.
 
@@ -68,6 +70,7 @@ def write_picture(
         path: the file, ``*.png``.
         pieces: one row each.
         quantity: what the colours show, written beside the colour bar.
+        body: on which all pieces are shown together first, from the front, the side and the back; none if not given.
         scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
 
     Raises:
@@ -88,14 +91,21 @@ def write_picture(
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    height = lay_out(pen, rows)
+    worn = None
+    if body is not None:
+        worn = GarmentViews(body, [piece.surface for piece in pieces], [row.density for row in rows])
+    height = lay_out(pen, rows) + (0.0 if worn is None else worn.height)
     figure.set_size_inches(PAGE_WIDTH, height)
     pen.open_page(figure, height)
     top = height - TOP_MARGIN
+    if worn is not None:
+        worn.draw(pen, top, scale)
+        top -= worn.height
+    band_top = top
     for row in rows:
         draw_row(pen, row, top, scale)
         top -= row.height
-    draw_colour_bar(pen, rows[0], scale, density, areas, quantity)
+    draw_colour_bar(pen, rows[0], scale, density, areas, quantity, top=band_top)
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 

@@ -31,6 +31,7 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.export.picture import PicturePiece
+    from warpflat.export.picture_garment import Body
 
 __all__ = ["Flattening", "run_metrics", "write_files"]
 
@@ -276,7 +277,9 @@ def run_metrics(
     }
 
 
-def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool) -> list[str]:
+def write_files(
+    results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool, body: Body | None = None
+) -> list[str]:
     """Write the files of several pieces, but not `metrics.json`, and return their names.
 
     Args:
@@ -284,6 +287,7 @@ def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, f
         folder: an existing one, in a block of :func:`warpflat.core.atomic_files.output_folder`.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
+        body: on which the picture shows them first; none if not given.
 
     Raises:
         InputError: the folder cannot be written.
@@ -296,7 +300,7 @@ def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, f
         _write_frames(folder / files[-1], results)
     if picture:
         files.append("picture.png")
-        write_picture(folder / files[-1], [result.picture_piece() for result in results])
+        write_picture(folder / files[-1], [result.picture_piece() for result in results], body=body)
     return files
 
 

@@ -168,7 +168,10 @@ class Garment:
         Raises:
             InputError: the folder cannot be written.
         """
-        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False)
+        from warpflat.export.picture_garment import Body
+
+        body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
+        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False, body=body)
 
 
 def flatten_form(
