@@ -23,7 +23,7 @@ from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
-__all__ = ["PicturePiece", "write_picture"]
+__all__ = ["PicturePiece", "draw_figure", "write_picture"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,13 +77,31 @@ def write_picture(
         InputError: the file cannot be written.
         ValueError: there is no piece.
     """
+    require_writable(path)
+    report_activity(f"drawing {Path(path).name}")
+    figure = draw_figure(pieces, quantity=quantity, scale=scale, body=body)
+    with atomic_path(path) as temporary:
+        save_png(temporary, figure, {"Software": "warpflat"})
+
+
+@all_letters()
+def draw_figure(
+    pieces: Sequence[PicturePiece],
+    *,
+    quantity: str = "strain energy density",
+    scale: float | None = None,
+    body: Body | None = None,
+) -> Any:
+    """Return the Matplotlib figure that :func:`write_picture` saves; see there for the arguments.
+
+    Raises:
+        ValueError: there is no piece.
+    """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     if not pieces:
         raise ValueError("a picture needs at least one piece")
-    require_writable(path)
-    report_activity(f"drawing {Path(path).name}")
     shown_names = titles([piece.name for piece in pieces], is_drawn)
     rows = [_prepared(piece, shown_names[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
@@ -106,8 +124,7 @@ def write_picture(
         draw_row(pen, row, top, scale)
         top -= row.height
     draw_colour_bar(pen, rows[0], scale, density, areas, quantity, top=band_top)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    return figure
 
 
 def _prepared(piece: PicturePiece, title: str) -> Row:

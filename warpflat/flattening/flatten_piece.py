@@ -45,7 +45,7 @@ def flatten(
     model: Model = "springs",
     wear: Wear | None = None,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> Flattening:
     """Flatten one piece: develop it from its datum line, then relax its mass-spring model to the minimum of its energy.
@@ -61,7 +61,7 @@ def flatten(
             minimised is reported as `model_energy_j` for both.
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         relax: options of the relaxation.
-        callback: called with a `Progress` for the development (step 0) and after every step.
+        callback: called with a `Progress` for the development (step 0) and after every step; True stops there, and the result is kept.
         device: Warp device, "cpu" or "cuda:0"; Warp's own choice if not given.
 
     Raises:
@@ -164,7 +164,7 @@ def develop_piece(
     surface: Surface,
     datum: str | ArrayLike | None,
     settings: FlattenSettings,
-    callback: Callable[[Progress], None] | None,
+    callback: Callable[[Progress], bool | None] | None,
 ) -> DevelopedPiece:
     """Develop a piece from its datum and measure its network there: the first half of `flatten`.
 

@@ -76,6 +76,38 @@ class Flattening:
     unsewn: Flattening | None = None
     remedies: tuple[Remedy, ...] = ()
 
+    def __post_init__(self) -> None:
+        """Make the layout read-only for whoever holds the result."""
+        shown = self.positions.view()
+        shown.flags.writeable = False
+        object.__setattr__(self, "positions", shown)
+
+    def __repr__(self) -> str:
+        last = self.stages[-1]
+        return (
+            f"<Flattening {self.surface.name!r}: {len(self.positions):,} vertices, {len(self.faces):,} faces, {self.fabric.name},\n"
+            f" strain energy {last.strain_energy_j:.4g} J after {' > '.join(stage.name for stage in self.stages)},\n"
+            f" {'at rest' if self.converged else 'NOT at rest'}, {self.flipped_faces} flipped faces>"
+        )
+
+    def plot(self) -> Any:
+        """Return a Matplotlib figure of the piece, on the body and in the plane, coloured by strain energy density."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        from warpflat.export.picture import draw_figure
+
+        figure = draw_figure([self.picture_piece()])
+        FigureCanvasAgg(figure)
+        return figure
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture that a notebook shows."""
+        from io import BytesIO
+
+        stream = BytesIO()
+        self.plot().savefig(stream, format="png")
+        return stream.getvalue()
+
     @property
     def faces(self) -> IntArray:
         """#F by 4, the surface's faces in the pattern's numbering, in which cuts have doubled vertices."""

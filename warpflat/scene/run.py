@@ -38,7 +38,7 @@ def run_scene(
     scene: Scene,
     out: str | Path,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
     cuts: CutSequence | None = None,
 ) -> SceneResult:
@@ -77,7 +77,7 @@ def _run_surface(
     scene: Scene,
     folder: Path,
     *,
-    on_progress: Callable[[Progress], None] | None,
+    on_progress: Callable[[Progress], bool | None] | None,
     device: str | None,
     cuts: CutSequence | None,
 ) -> SceneResult:
@@ -99,10 +99,9 @@ def _run_surface(
     with Film(folder, settings.output, [sequence.surface]) as film:
         recorder = film.recorders[sequence.surface.name]
 
-        def each_step(progress: Progress) -> None:
+        def each_step(progress: Progress) -> bool | None:
             recorder(progress)
-            if on_progress is not None:
-                on_progress(progress)
+            return None if on_progress is None else on_progress(progress)
 
         result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
     pieces = [advise(piece) for piece in separate(result)]
@@ -144,7 +143,7 @@ def flatten_scene(
     sequence: CutSequence,
     *,
     recorder: FrameRecorder | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> tuple[Flattening, SewnSurface | None]:
     """Flatten, cut and sew the scene's surface; return the piece, and how it was sewn, if it was.
@@ -207,7 +206,7 @@ def _flatten(
     surface: Surface,
     relax: RelaxOptions,
     *,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> Flattening:
     from warpflat.flattening.flatten_piece import flatten

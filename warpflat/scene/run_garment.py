@@ -70,7 +70,7 @@ class GarmentPlan:
     constraints: Sequence[Constraint]
     settings: Mapping[str, Any]
 
-    def flatten(self, *, callback: Callable[[str, Progress], None] | None = None) -> Garment:
+    def flatten(self, *, callback: Callable[[str, Progress], bool | None] | None = None) -> Garment:
         """Flatten and sew the garment.
 
         Raises:
@@ -137,7 +137,7 @@ def run_garment(
     scene: Scene,
     out: Path,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
@@ -159,17 +159,16 @@ def run_garment(
 
 
 def _flatten_with_frames(
-    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], None] | None = None
+    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], bool | None] | None = None
 ) -> Garment:
     """Flatten and sew the garment, and write `frames.usdc` if the scene wants frames."""
     output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
     require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=FrameSchedule(output).wanted)
     with Film(out, output, surfaces) as film:
 
-        def each_step(name: str, progress: Progress) -> None:
+        def each_step(name: str, progress: Progress) -> bool | None:
             film.recorders[name](progress)
-            if on_progress is not None:
-                on_progress(progress)
+            return None if on_progress is None else on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
         for name, piece in garment.pieces.items():
