@@ -60,7 +60,7 @@ def energy_table(metrics: Metrics) -> str:
                     _joules(stage["model_energy_j"]),
                     f"{stage['steps']:,}",
                     f"{stage['seconds']:.2f} s",
-                    "yes" if stage["converged"] else "NO",
+                    "" if stage["name"] == "develop" else "yes" if stage["converged"] else "NO",
                 )
             )
     head = ("piece", "stage", "strain energy", "since whole", "model energy", "steps", "time", "at rest")
