@@ -20,6 +20,7 @@ from typing import Any, BinaryIO, cast
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
 from warpflat.export.geometry import Polylines
 
 __all__ = ["FilmStage", "Frame", "Key", "KeyFile"]
@@ -82,8 +83,9 @@ class KeyFile:
     """A file without a name, in which computed layouts are kept until the end of the run; used in a ``with`` block."""
 
     def __init__(self, folder: Path) -> None:
-        self._file = cast(BinaryIO, TemporaryFile(dir=folder))  # noqa: SIM115 (open as long as the film)
+        self._file = cast(BinaryIO, TemporaryFile(dir=folder, buffering=0))  # noqa: SIM115 (open as long as the film)
         self._end = 0
+        self._folder = folder
 
     def __enter__(self) -> KeyFile:
         return self
@@ -94,11 +96,23 @@ class KeyFile:
         self._file.close()
 
     def append(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> Key:
-        """Write a layout (#P by 2 [m]) and its energies per face (#F [J/m2])."""
+        """Write a layout (#P by 2 [m]) and its energies per face (#F [J/m2]).
+
+        Raises:
+            InputError: there is no room for it.
+        """
         key = Key(place=self._end, measures=dict(measures))
-        self._file.seek(self._end)
-        for values in (positions, density):
-            self._end += self._file.write(np.ascontiguousarray(values, dtype=np.float32).tobytes())
+        try:
+            self._file.seek(self._end)
+            for values in (positions, density):
+                left = memoryview(np.ascontiguousarray(values, dtype=np.float32).tobytes())
+                while left:
+                    # Unbuffered, a write may take only a part.
+                    written = self._file.write(left)
+                    self._end, left = self._end + written, left[written:]
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise InputError(f"cannot write {self._folder / 'frames.usdc'}: {reason}") from error
         return key
 
     def positions(self, stage: FilmStage, key: Key) -> FloatArray:
@@ -111,7 +125,10 @@ class KeyFile:
 
     def _read(self, place: int, count: int) -> FloatArray:
         self._file.seek(place)
-        return np.frombuffer(self._file.read(4 * count), dtype=np.float32).astype(np.float64)
+        content = bytearray()
+        while len(content) < 4 * count:
+            content += self._file.read(4 * count - len(content))
+        return np.frombuffer(content, dtype=np.float32).astype(np.float64)
 
     def displacement(self, stage: FilmStage) -> float:
         """Return how far the vertex that moves farthest comes from its place at the start of a stage [m]."""
