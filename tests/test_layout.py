@@ -34,8 +34,9 @@ ROOMS = {
     "mannequin": "core surface export",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
     "draping": "core surface fabric model solver export flattening mannequin garment kernels",
-    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping scene",
+    "review": "core surface export",
+    "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
     "kernels": "",
 }
 

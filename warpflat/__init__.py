@@ -39,6 +39,7 @@ if TYPE_CHECKING:
     from warpflat.flattening.flatten_piece import flatten
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
+    from warpflat.flattening.step_by_step import RelaxationStep, relaxation
     from warpflat.garment.constraints import FixedLength, Straight
     from warpflat.garment.ease import SeamWish
     from warpflat.garment.edge_rules import EdgeRules
@@ -104,6 +105,7 @@ _HOME = {
     "PatternOptions": "garment.pattern_files",
     "Progress": "flattening.progress",
     "RelaxOptions": "solver.options",
+    "RelaxationStep": "flattening.step_by_step",
     "Remedy": "flattening.fit_report",
     "ScanOptions": "mannequin.scan_pose",
     "SeamWish": "garment.ease",
@@ -140,6 +142,7 @@ _HOME = {
     "pattern_of_garment": "garment.to_pattern",
     "read_pattern_json": "export.read_pattern_json",
     "read_surface": "surface.io.read",
+    "relaxation": "flattening.step_by_step",
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
     "save_drape": "draping.write",
@@ -168,6 +171,7 @@ __all__ = [
     "PatternOptions",
     "Progress",
     "RelaxOptions",
+    "RelaxationStep",
     "Remedy",
     "ScanOptions",
     "SeamWish",
@@ -205,6 +209,7 @@ __all__ = [
     "pattern_of_garment",
     "read_pattern_json",
     "read_surface",
+    "relaxation",
     "run_scene",
     "save_comparison",
     "save_drape",

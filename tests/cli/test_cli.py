@@ -68,7 +68,7 @@ def test_flatten_writes_its_files_and_a_summary(warpflat: Run):
     assert "out/cloth: " in out
     assert "it/s" not in err
     assert {path.name for path in Path("out/cloth").iterdir()} == {
-        "metrics.json", "cloth.obj", "frames.usdc", "picture.png", *PATTERN_FILES
+        "metrics.json", "cloth.obj", "frames.usdc", "picture.png", "review.html", *PATTERN_FILES
     }  # fmt: skip
     assert json.loads(Path("out/cloth/metrics.json").read_text())["pieces"]["cloth"]["fabric"] == "denim"
 

@@ -23,6 +23,7 @@ from warpflat.export.labels import (
 )
 from warpflat.export.letters import all_letters, is_drawn, note_on_names, titles
 from warpflat.export.picture import PicturePiece, write_picture
+from warpflat.export.picture_garment import Body
 from warpflat.export.picture_pen import GREY, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.raster import Lighting, Samples, rasterise, shade
@@ -70,6 +71,31 @@ def test_picture_shows_both_views_in_the_colours_of_the_scale(tmp_path: Path) ->
     body = pixels[:, : width // 2]
     assert (body.min(axis=-1) < 0.9).sum() > 100_000
     assert near(pixels, np.ones(3)) > 0.4 * height * width
+
+
+def test_a_garment_is_shown_on_its_body_from_three_sides(tmp_path: Path) -> None:
+    shape = dome(9)
+    rng = np.linspace(0.0, 2.0 * np.pi, 40, endpoint=False)
+    ring = np.stack([0.3 * np.cos(rng), np.zeros(40), 0.3 * np.sin(rng)], axis=1)
+    vertices = np.concatenate([ring + np.array([0.0, y, 0.0]) for y in np.linspace(-0.6, 0.6, 30)])
+    index = np.arange(40 * 30).reshape(30, 40)
+    around = np.roll(index, -1, axis=1)
+    faces = np.stack([index[:-1], index[1:], around[1:], around[:-1]], axis=-1).reshape(-1, 4).astype(np.int32)
+    worn = find_piece(shape, np.full(64, 0.5))
+    write_picture(tmp_path / "bare.png", [worn], scale=1.0)
+    write_picture(tmp_path / "worn.png", [worn], scale=1.0, body=Body(vertices=vertices, faces=faces))
+    bare, both = pixels_of(tmp_path / "bare.png"), pixels_of(tmp_path / "worn.png")
+    band = len(both) - len(bare)
+    assert band > 450
+    np.testing.assert_array_equal(
+        both[band + 60 :, : int(0.85 * both.shape[1])], bare[60:, : int(0.85 * both.shape[1])]
+    )
+    hue = both[:band, :, 0] - both[:band, :, 2]
+    front, side, back = np.array_split(hue[:, 80:1610], 3, axis=1)
+    # The cloth lies on the front: half as much of it shows from the side, nothing from behind.
+    assert (front > 0.25).sum() > 30_000
+    assert 0 < (side > 0.25).sum() < 0.7 * (front > 0.25).sum()
+    assert (back > 0.25).sum() == 0
 
 
 def test_a_name_that_no_font_can_write_is_a_number_in_pictures(tmp_path: Path) -> None:

@@ -37,6 +37,14 @@ def mesh_at(stage: Any, path: str) -> Any:
     return UsdGeom.Mesh(stage.GetPrimAtPath(path))
 
 
+def pieces_of(stage: Any) -> list[Any]:
+    from pxr import Kind, Usd
+
+    return [
+        prim for prim in stage.GetDefaultPrim().GetChildren() if Usd.ModelAPI(prim).GetKind() == Kind.Tokens.component
+    ]
+
+
 def density_of(mesh: Any, time: float) -> np.ndarray:
     return np.asarray(mesh.GetPrim().GetAttribute("primvars:strainEnergyDensity").Get(time))
 
@@ -88,7 +96,7 @@ def test_stage_says_what_it_is(tmp_path: Path) -> None:
     assert UsdGeom.GetStageUpAxis(stage) == UsdGeom.Tokens.y
     assert (stage.GetStartTimeCode(), stage.GetEndTimeCode(), stage.GetTimeCodesPerSecond()) == (1, 3, 30)
     assert stage.GetDefaultPrim().GetPath() == "/World"
-    (piece,) = stage.GetDefaultPrim().GetChildren()
+    (piece,) = pieces_of(stage)
     assert piece.GetDisplayName() == "Ärmel links"
     assert Usd.ModelAPI(stage.GetDefaultPrim()).GetKind() == Kind.Tokens.assembly
     assert Usd.ModelAPI(piece).GetKind() == Kind.Tokens.component
@@ -146,8 +154,31 @@ def test_surfaces_and_patterns_lie_side_by_side(tmp_path: Path) -> None:
     front_surface, front_pattern, sleeve_surface, sleeve_pattern = boxes(tmp_path / "frames.usdc")
     surfaces = max(front_surface[1][0], sleeve_surface[1][0])
     assert front_pattern[0][0] > surfaces + 0.01
-    assert sleeve_pattern[0][0] > front_pattern[1][0] + 0.01
+    assert sleeve_pattern[0][0] > surfaces + 0.01
+    apart = np.maximum(sleeve_pattern[0] - front_pattern[1], front_pattern[0] - sleeve_pattern[1])
+    assert apart[:2].max() > 0.01
     np.testing.assert_allclose(front_surface[0], front.vertices.min(axis=0), atol=1e-7)
+
+
+def test_a_viewer_finds_cameras_light_material_and_texture(tmp_path: Path) -> None:
+    from pxr import UsdGeom, UsdLux, UsdShade
+
+    cut_film(tmp_path / "frames.usdc")
+    stage = open_stage(tmp_path / "frames.usdc")
+    last = stage.GetEndTimeCode()
+    assert [prim.GetName() for prim in stage.Traverse() if prim.IsA(UsdGeom.Camera)] == ["all", "patterns"]
+    assert any(prim.HasAPI(UsdLux.LightAPI) for prim in stage.Traverse())
+    pattern, surface = mesh_at(stage, "/World/front/pattern"), mesh_at(stage, "/World/front/surface")
+    corners = np.asarray(pattern.GetPointsAttr().Get(last))[np.asarray(pattern.GetFaceVertexIndicesAttr().Get(last))]
+    for mesh in (pattern, surface):
+        assert UsdShade.MaterialBindingAPI(mesh).ComputeBoundMaterial()[0].GetPath() == "/World/Looks/energy"
+        np.testing.assert_array_equal(np.asarray(UsdGeom.PrimvarsAPI(mesh).GetPrimvar("st").Get()), corners[:, :2])
+    lines = UsdGeom.Imageable(stage.GetPrimAtPath("/World/front/pattern_lines/bust_line"))
+    assert lines.ComputePurpose() == UsdGeom.Tokens.guide
+    cache = UsdGeom.BBoxCache(last, [UsdGeom.Tokens.default_])
+    box = cache.ComputeWorldBound(stage.GetDefaultPrim()).ComputeAlignedRange()
+    frustum = UsdGeom.Camera(stage.GetPrimAtPath("/World/cameras/all")).GetCamera(last).frustum
+    assert all(frustum.Intersects(box.GetCorner(number)) for number in range(8))
 
 
 def cut_film(path: Path) -> tuple[np.ndarray, np.ndarray, list[list[int]]]:
@@ -280,7 +311,7 @@ def test_names_stay_apart(tmp_path: Path) -> None:
         with pytest.raises(ValueError, match="already"):
             writer.add_piece("1 a", shape)
     stage = open_stage(tmp_path / "a.usdc")
-    assert len({prim.GetName() for prim in stage.GetDefaultPrim().GetChildren()}) == 3
+    assert len({prim.GetName() for prim in pieces_of(stage)}) == 3
 
 
 def test_arrays_that_do_not_fit_are_refused(tmp_path: Path) -> None:

@@ -554,8 +554,8 @@ def test_a_folder_where_a_file_is_to_be_is_told_before_anything_is_written(tmp_p
 
 
 def test_a_tube_closed_at_one_end_is_crushed_and_flagged_and_its_film_is_written(tmp_path):
-    from warpflat.export.usd import FrameWriter
-    from warpflat.scene.frames import FrameRecorder
+    from warpflat.scene.frames import Film
+    from warpflat.scene.schema import OutputTable
     from warpflat.surface.repair.validate import make_surface
 
     around, up = 16, 80
@@ -571,12 +571,8 @@ def test_a_tube_closed_at_one_end_is_crushed_and_flagged_and_its_film_is_written
     cap = np.column_stack([last, np.roll(last, -1), np.full(around, top), np.full(around, -1)])
     tube = make_surface(np.vstack([*rings, [[0.0, 2.001, 0.0]]]), np.concatenate([quads, cap]))
 
-    class Seldom:
-        def is_due(self, step: int, max_steps: int) -> bool:
-            return step % 50 == 0
-
-    with FrameWriter(tmp_path / "frames.usdc") as writer:
-        recorder = FrameRecorder(writer, tube, Seldom)
+    with Film(tmp_path, OutputTable(frame_every=50), [tube]) as film:
+        recorder = film.recorders[tube.name]
         result = flatten(tube, relax=RelaxOptions(max_steps=100), callback=recorder)
         recorder.record_result(result)
     assert result.flipped_faces > 0

@@ -217,7 +217,7 @@ def test_a_run_leaves_the_files_of_the_contract(tmp_path: Path):
     result = run_scene(scene, tmp_path / "out", on_progress=lambda progress: steps.append(progress.step))
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == sorted(result.files)
     pattern = {"trial.dxf", "trial.svg", "pattern.pdf", "pattern.json"}
-    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", *pattern}
+    assert set(result.files) == {"metrics.json", "trial.obj", "frames.usdc", "picture.png", "review.html", *pattern}
     metrics = json.loads((tmp_path / "out" / "metrics.json").read_text())
     assert metrics == json.loads(json.dumps(result.metrics))
     piece = metrics["pieces"]["trial"]
@@ -303,3 +303,17 @@ def test_the_scripted_scene_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
         assert len(energies) >= 5
         assert energies == sorted(energies, reverse=True)
     assert (tmp_path / "out" / "scripted" / "denim" / "metrics.json").exists()
+
+
+def test_the_kernels_driven_by_hand_come_to_rest(capsys: pytest.CaptureFixture[str]):
+    runpy.run_path(str(SCENES / "kernels.py"), run_name="__main__")
+    energies, wide, residuals = (
+        [float(text) for text in re.findall(pattern, told)]
+        for told in [capsys.readouterr().out]
+        for pattern in (r"([0-9.]+) mJ", r"([0-9.]+) cm wide", r"residual ([0-9.e+-]+) N")
+    )
+    developed, free, pulled = energies
+    assert free < pulled
+    assert free < developed
+    assert wide[2] < wide[1], "one's own force makes it narrower"
+    assert max(residuals) < 1e-3

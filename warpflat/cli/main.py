@@ -21,6 +21,7 @@ from warpflat.cli.fabrics import fabrics
 from warpflat.cli.flatten import flatten
 from warpflat.cli.mannequin import mannequin
 from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
+from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
 from warpflat.core.errors import InputError
@@ -65,6 +66,7 @@ def cli(context: click.Context) -> None:
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
+      warpflat review out/dome                            one page to review a run
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
     """
@@ -72,7 +74,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, drape, mannequin, compare, fabrics, cuts, export):
+for _command in (run, flatten, drape, mannequin, compare, fabrics, cuts, export, review):
     cli.add_command(_command)
 
 

@@ -31,6 +31,7 @@ What comes out, in DIR:
   NAME.obj      the surface [m] with the pattern [m] as texture coordinates
   frames.usdc   surface and pattern from the development to the end, coloured by energy
   picture.png   both side by side, with a scale in J/m2
+  review.html   all of it on one page, with the film; needs no network
   NAME.dxf      the pattern for apparel CAD: cut and sewing lines, notches, grain
   NAME.svg      the same for screen and plotter, in millimetres
   pattern.pdf   the same in true size, tiled on A4

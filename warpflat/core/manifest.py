@@ -21,7 +21,9 @@ __all__ = ["record_file", "remove_stale", "require_own_metrics", "write_metrics"
 Record = dict[str, dict[str, str]]
 
 #: Files that bear no name: in a folder with several runs they are taken to be the last one's.
-_NAMELESS = ("frames.usdc", "picture.png", "wear.png", "drape.png", "pattern.pdf", "pattern.json")
+_NAMELESS = (
+    "frames.usdc", "picture.png", "wear.png", "drape.png", "pattern.pdf", "pattern.json", "review.html", "film.webp", "contact_sheet.png",
+)  # fmt: skip
 
 
 def write_metrics(folder: Path, metrics: Mapping[str, Any]) -> None:

@@ -23,7 +23,7 @@ def cut(
     plan: CutPlan | str,
     *,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
 ) -> Flattening:
     """Cut a flattened piece and relax it further from its present layout.
 

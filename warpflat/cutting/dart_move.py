@@ -58,7 +58,7 @@ def move_dart(
     plan: CutPlan,
     *,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
 ) -> DartMove:
     """Rotate a dart to another line: open the new one, then sew the old one shut and relax.
 

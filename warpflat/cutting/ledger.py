@@ -280,7 +280,7 @@ def cut_automatically(
     auto: AutoCut,
     *,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     fully: bool = True,
 ) -> tuple[Flattening, tuple[Ledger, ...]]:
     """Cut greedily: try all candidates, make the best that does not overlap, relax, and again until it is enough.

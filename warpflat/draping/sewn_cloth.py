@@ -13,6 +13,7 @@ from warpflat.core.errors import InputError
 from warpflat.export.geometry import outline_edges
 from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.flattening.result import Flattening
+from warpflat.garment.darts import dart_pairs
 from warpflat.garment.garment import Garment
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.triangles import corner_triangles
@@ -120,7 +121,8 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
                 f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
             )
         pieces = dict(garment.pieces)
-        seams = [*((seam.pieces, seam.vertices) for seam in garment.form.seams), *seams]
+        runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
+        seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
     else:
         given = [garment] if isinstance(garment, Flattening) else list(garment)
         pieces = {piece.surface.name: piece for piece in given}

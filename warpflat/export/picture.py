@@ -16,13 +16,14 @@ from warpflat.core.atomic_files import atomic_path, require_writable
 from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
+from warpflat.export.picture_garment import Body, GarmentViews
 from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
 from warpflat.surface.mesh import Surface
 
-__all__ = ["PicturePiece", "write_picture"]
+__all__ = ["PicturePiece", "draw_figure", "write_picture"]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -61,6 +62,7 @@ def write_picture(
     *,
     quantity: str = "strain energy density",
     scale: float | None = None,
+    body: Body | None = None,
 ) -> None:
     """Draw every piece twice, on the body and as pattern, at one scale of length and one of energy; atomically.
 
@@ -68,10 +70,31 @@ def write_picture(
         path: the file, ``*.png``.
         pieces: one row each.
         quantity: what the colours show, written beside the colour bar.
+        body: on which all pieces are shown together first, from the front, the side and the back; none if not given.
         scale: upper end of the colours [J/m2]; if not given, 98 % of the area of all pieces lies below it.
 
     Raises:
         InputError: the file cannot be written.
+        ValueError: there is no piece.
+    """
+    require_writable(path)
+    report_activity(f"drawing {Path(path).name}")
+    figure = draw_figure(pieces, quantity=quantity, scale=scale, body=body)
+    with atomic_path(path) as temporary:
+        save_png(temporary, figure, {"Software": "warpflat"})
+
+
+@all_letters()
+def draw_figure(
+    pieces: Sequence[PicturePiece],
+    *,
+    quantity: str = "strain energy density",
+    scale: float | None = None,
+    body: Body | None = None,
+) -> Any:
+    """Return the Matplotlib figure that :func:`write_picture` saves; see there for the arguments.
+
+    Raises:
         ValueError: there is no piece.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -79,8 +102,6 @@ def write_picture(
 
     if not pieces:
         raise ValueError("a picture needs at least one piece")
-    require_writable(path)
-    report_activity(f"drawing {Path(path).name}")
     shown_names = titles([piece.name for piece in pieces], is_drawn)
     rows = [_prepared(piece, shown_names[piece.name]) for piece in pieces]
     density = np.concatenate([np.asarray(piece.face_energy_density, dtype=np.float64) for piece in pieces])
@@ -88,16 +109,22 @@ def write_picture(
     scale = energy_scale(density, areas) if scale is None else scale
     figure = Figure(figsize=(PAGE_WIDTH, 4.0), dpi=DPI, facecolor="white")
     pen = Pen(FigureCanvasAgg(figure).get_renderer())
-    height = lay_out(pen, rows)
+    worn = None
+    if body is not None:
+        worn = GarmentViews(body, [piece.surface for piece in pieces], [row.density for row in rows])
+    height = lay_out(pen, rows) + (0.0 if worn is None else worn.height)
     figure.set_size_inches(PAGE_WIDTH, height)
     pen.open_page(figure, height)
     top = height - TOP_MARGIN
+    if worn is not None:
+        worn.draw(pen, top, scale)
+        top -= worn.height
+    band_top = top
     for row in rows:
         draw_row(pen, row, top, scale)
         top -= row.height
-    draw_colour_bar(pen, rows[0], scale, density, areas, quantity)
-    with atomic_path(path) as temporary:
-        save_png(temporary, figure, {"Software": "warpflat"})
+    draw_colour_bar(pen, rows[0], scale, density, areas, quantity, top=band_top)
+    return figure
 
 
 def _prepared(piece: PicturePiece, title: str) -> Row:

@@ -274,15 +274,17 @@ def draw_colour_bar(
     density: FloatArray,
     areas: FloatArray,
     quantity: str,
+    *,
+    top: float,
 ) -> None:
-    """Draw the colour bar beside the first row, and the share of the area above its end."""
+    """Draw the colour bar beside the first row, whose upper edge is at `top` [in], and the share of the area above its end."""
     from matplotlib.patches import Polygon
 
     from warpflat.export.picture_pixels import Pixels
 
     above = density > scale
     tall = float(np.clip(row.band, *_COLOUR_BAR))
-    top = pen.page_height - TOP_MARGIN - row.head - max(0.0, 0.5 * (row.band - tall))
+    top = top - row.head - max(0.0, 0.5 * (row.band - tall))
     left, bottom = PAGE_WIDTH - _RIGHT + 0.45, max(top - tall, 0.75)
     right = left + _BAR_WIDTH
     end = bottom + (top - bottom) / (1.0 + _BAR_TIP) if above.any() else top

@@ -22,6 +22,7 @@ class Pen:
 
     def __init__(self, renderer: Any) -> None:
         self._renderer = renderer
+        self.dpi = DPI
         self._measured: dict[tuple[str, float, str], tuple[float, float]] = {}
         self.axes: Any = None
         self.page_height = 0.0

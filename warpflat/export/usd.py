@@ -36,6 +36,7 @@ from warpflat.export.usd_prims import (
     usd_errors,
     valid_name,
 )
+from warpflat.export.usd_scene import add_cameras, add_light, add_material, add_texture_coordinates, rows_on_table
 from warpflat.surface.mesh import Surface
 from warpflat.surface.triangles import triangulate
 
@@ -44,6 +45,10 @@ __all__ = ["FrameWriter"]
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
 _COLOUR_STEPS = 1024
+# USD's type of a measure; a bool is an int, too.
+_TYPES = {bool: "Bool", int: "Int", float: "Double", str: "String"}
+
+Measure = bool | int | float | str
 
 
 class FrameWriter:
@@ -83,7 +88,7 @@ class FrameWriter:
         self._save_every = int(save_every)
         self._scale = scale
         self._pieces: dict[str, FramePiece] = {}
-        self._used_names: set[str] = set()
+        self._used_names = {"Looks", "cameras", "light"}
         self._unsaved = 0
         self._stage: Any = None
         self._hidden = ExitStack()
@@ -131,6 +136,7 @@ class FrameWriter:
             if kind is None:
                 with usd_errors(self._final):
                     self._place()
+                    self._dress()
                     self._colour()
                     self._author_defaults()
                     self._save()
@@ -194,7 +200,7 @@ class FrameWriter:
         faces: ArrayLike | None = None,
         lines: Mapping[str, Any] | None = None,
         cuts: Mapping[str, Any] | None = None,
-        measures: Mapping[str, float] | None = None,
+        measures: Mapping[str, Measure] | None = None,
     ) -> int:
         """Append the next frame of a piece and return its number.
 
@@ -207,7 +213,7 @@ class FrameWriter:
             lines: feature lines in the pattern's numbering, where they change; each a vertex-index array or a list of
                 them. At first those of the surface.
             cuts: cut lines in the same form (say, both sides of a crack). At first none.
-            measures: numbers of this frame, kept in double precision as ``/World/NAME.warpflat:KEY``.
+            measures: of this frame, as ``/World/NAME.warpflat:KEY`` of their own type: bool, int, double or string.
 
         Raises:
             ValueError: the arrays do not fit together, or hold NaN.
@@ -232,7 +238,7 @@ class FrameWriter:
         self._measure(piece, measures or {}, time)
 
         piece.frames += 1
-        piece.last_density = density
+        piece.last_density, piece.last_positions = density, flat
         low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
@@ -264,14 +270,15 @@ class FrameWriter:
             space = np.asarray(piece.surface.vertices, dtype=np.float32)
             piece.surface_cuts.write(time, piece.cuts_on_surface(), space, changed=True)
 
-    def _measure(self, piece: FramePiece, measures: Mapping[str, float], time: Any) -> None:
+    def _measure(self, piece: FramePiece, measures: Mapping[str, Measure], time: Any) -> None:
         """Author a frame's measures."""
         from pxr import Sdf
 
         prim = self._stage.GetPrimAtPath(piece.path)
         for key, value in measures.items():
-            attribute = prim.CreateAttribute(f"warpflat:{key}", Sdf.ValueTypeNames.Double, custom=True)
-            attribute.Set(float(value), time)
+            kind = next(name for known, name in _TYPES.items() if isinstance(value, known))
+            attribute = prim.CreateAttribute(f"warpflat:{key}", getattr(Sdf.ValueTypeNames, kind), custom=True)
+            attribute.Set(value, time)
 
     def _save_every_few_frames(self) -> None:
         """Count a frame, and save the working file if it is time."""
@@ -286,7 +293,7 @@ class FrameWriter:
         self._unsaved = 0
 
     def _place(self) -> None:
-        """Place the patterns in a row to the right of all surfaces, by the room that each took over the whole time."""
+        """Place the patterns beside the surfaces, as on a table, by the room that each took over the whole time; add cameras."""
         from pxr import Gf, UsdGeom
 
         shown = [piece for piece in self._pieces.values() if piece.frames]
@@ -297,15 +304,26 @@ class FrameWriter:
         high = np.max([vertices.max(axis=0) for vertices in space], axis=0)
         gap = 0.15 * max(float(np.max(high - low)), *(float(np.max(piece.high - piece.low)) for piece in shown))
         middle = 0.5 * (low + high)
-        right = float(high[0]) + gap
-        for piece in shown:
-            offset = Gf.Vec3d(
-                right - float(piece.low[0]), float(middle[1] - 0.5 * (piece.low[1] + piece.high[1])), float(middle[2])
-            )
+        corners = rows_on_table(np.array([piece.high - piece.low for piece in shown]), 0.4 * gap)
+        table = np.max([corner + piece.high - piece.low for corner, piece in zip(corners, shown, strict=True)], axis=0)
+        origin = np.array([high[0] + gap, middle[1] - 0.5 * table[1]])
+        for piece, corner in zip(shown, corners, strict=True):
+            offset = Gf.Vec3d(*(origin + corner - piece.low).tolist(), float(middle[2]))
             for prim in (piece.on_pattern.mesh.GetPrim(), piece.pattern_lines.prim, piece.pattern_cuts.prim):
                 if prim is not None:
                     UsdGeom.Xformable(prim).AddTranslateOp().Set(offset)
-            right += float(piece.high[0] - piece.low[0]) + gap
+        patterns = np.array([[*origin, middle[2]], [*(origin + table), middle[2]]])
+        boxes = np.stack([low, high, *patterns])
+        add_cameras(self._stage, np.stack([boxes.min(axis=0), boxes.max(axis=0)]), patterns)
+
+    def _dress(self) -> None:
+        """Author light, material and texture coordinates."""
+        add_light(self._stage)
+        shown = [piece for piece in self._pieces.values() if piece.frames]
+        add_material(self._stage, [samples.mesh for piece in shown for samples in (piece.on_surface, piece.on_pattern)])
+        for piece in shown:
+            for samples in (piece.on_surface, piece.on_pattern):
+                add_texture_coordinates(samples.mesh, piece.surface, piece.faces, piece.last_positions)
 
     def _colour(self) -> None:
         """Author the colours of all frames, from their energies, on one scale."""

@@ -38,6 +38,7 @@ class FramePiece:
     cuts: dict[str, Polylines] = field(default_factory=dict)
     frames: int = 0
     last_density: NDArray[np.float32] | None = None
+    last_positions: FloatArray = field(default_factory=lambda: np.empty((0, 2)))
     low: FloatArray = field(default_factory=lambda: np.full(2, np.inf))
     high: FloatArray = field(default_factory=lambda: np.full(2, -np.inf))
 

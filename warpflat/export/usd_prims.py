@@ -164,8 +164,11 @@ class SampledLines:
 
     def write(self, time: Any, lines: Mapping[str, Polylines], points: NDArray[np.float32], *, changed: bool) -> None:
         """Write each line's points at `time`; `changed` says that the lines or the mesh under them are new."""
+        from pxr import UsdGeom
+
         if lines and self.prim is None:
             self.prim = define_group(self.stage, self.path)
+            UsdGeom.Imageable(self.prim).CreatePurposeAttr(UsdGeom.Tokens.guide)
         for name, parts in lines.items():
             if name not in self._members:
                 path = f"{self.path}/{valid_name(name, self._used_names)}"

@@ -44,7 +44,7 @@ def change_fabric(
     fabric: Fabric | str,
     *,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
 ) -> Flattening:
     """Change the cloth of a piece and relax it further from its layout, which takes a fraction of the time of `flatten`.
 
@@ -70,7 +70,7 @@ def change_surface(
     surface: Surface | ArrayLike,
     *,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
 ) -> Flattening:
     """Move the vertices of a piece's surface and relax it further from its layout, as for a moved feature line or another size.
 
@@ -200,7 +200,7 @@ def relax_cut(
     stage: str,
     cuts: Sequence[AppliedCut],
     options: RelaxOptions,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
 ) -> Flattening:
     """Relax a piece whose topology has changed, as `warpflat.cutting.cut_piece.cut` changes it, further from a layout.
 
@@ -224,7 +224,7 @@ def _continuation_task(
     fabric: Fabric,
     stage: str,
     options: RelaxOptions,
-    callback: Callable[[Progress], None] | None,
+    callback: Callable[[Progress], bool | None] | None,
 ) -> RelaxationTask:
     """Make the task that relaxes a piece further from a result."""
     require_unsewn(result)

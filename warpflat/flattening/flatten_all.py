@@ -32,7 +32,7 @@ def flatten_all(
     model: Model = "springs",
     wear: Wear | None = None,
     relax: RelaxOptions | None = None,
-    callback: Callable[[int, Progress], None] | None = None,
+    callback: Callable[[int, Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> list[Flattening]:
     """Flatten several pieces at once, say all of a garment or one in ten sizes: the patterns that :func:`warpflat.flatten` gives of

@@ -48,7 +48,7 @@ def flatten(
     wear: Wear | None = None,
     start: ArrayLike | None = None,
     relax: RelaxOptions | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> Flattening:
     """Flatten one piece: develop it from its datum line, then relax its mass-spring model to the minimum of its energy.
@@ -65,7 +65,7 @@ def flatten(
         wear: the stretch or pressure it is meant to be worn with; the pattern is cut so much smaller.
         start: a layout of one's own to be relaxed from, #V by 2 in any unit; no face of it may be mirrored.
         relax: options of the relaxation.
-        callback: called with a `Progress` for the development (step 0) and after every step.
+        callback: called with a `Progress` for the development (step 0) and after every step; True stops there, and the result is kept.
         device: Warp device, "cpu" or "cuda:0"; Warp's own choice if not given.
 
     Raises:
@@ -168,7 +168,7 @@ def develop_piece(
     surface: Surface,
     datum: str | ArrayLike | None,
     settings: FlattenSettings,
-    callback: Callable[[Progress], None] | None,
+    callback: Callable[[Progress], bool | None] | None,
     start: ArrayLike | None = None,
 ) -> DevelopedPiece:
     """Develop a piece from its datum and measure its network there: the first half of `flatten`.

@@ -72,6 +72,7 @@ class RelaxationTask:
         stage_name: name of the stage in its history.
         history: a row per convergence check: step, model energy [J], guard energy [J], residual.
         notes: what was chosen or is worth a warning, one sentence each.
+        stopped: whether the callback has stopped the relaxation.
     """
 
     surface: Surface
@@ -79,7 +80,7 @@ class RelaxationTask:
     grain_angle: float
     device: wp.Device
     options: RelaxOptions
-    callback: Callable[[Progress], None] | None
+    callback: Callable[[Progress], bool | None] | None
     datum: IntArray
     stage_name: str = "relax"
     model: Model = "springs"
@@ -87,6 +88,7 @@ class RelaxationTask:
 
     history: list[tuple[float, float, float, float]] = field(default_factory=list)
     notes: list[str] = field(default_factory=list)
+    stopped: bool = False
 
     def shrink_to_rest(self, development: Development) -> Development:
         """Shrink a development by the mean stretch with which the piece is to be worn; return it as it is without one."""
@@ -150,10 +152,10 @@ class RelaxationTask:
         return _MAX_UPDATES if tight or (springs and not alike) else int(mended or not alike)
 
     def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
-        """Call the callback with the state of this piece at the last convergence check."""
+        """Call the callback with the state of this piece at the last convergence check; it may stop the relaxation."""
         if self.callback is not None:
             check = state.status
-            self.callback(
+            answer = self.callback(
                 Progress(
                     stage,
                     state,
@@ -163,6 +165,7 @@ class RelaxationTask:
                     piece=piece,
                 )
             )
+            self.stopped = self.stopped or answer is True
 
     def make_stage(
         self, network: SpringNetwork, positions: FloatArray, outcome: Outcome, *, name: str | None = None
@@ -266,7 +269,7 @@ def keep_apart(
     """
     surface, network, free = end.network.surface, end.network, end.positions
     relaxed = task.make_stage(network, free, end.outcome)
-    overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm else 0.0
+    overlap = overlap_area(surface, free, cut_sides) if task.options.gap_mm and not task.stopped else 0.0
     if overlap == 0.0:
         return free, (relaxed,)
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
@@ -308,6 +311,14 @@ def _scheme(task: RelaxationTask, network: SpringNetwork) -> Scheme:
     return "gauss-newton" if gauss_newton_pays(network) else "steps"
 
 
+class _Stopped(Exception):
+    """A callback has stopped the relaxation of pieces."""
+
+    def __init__(self, state: Relaxation) -> None:
+        super().__init__()
+        self.state = state
+
+
 class _Batch:
     """The relaxation in which the pieces of several tasks lie side by side."""
 
@@ -338,18 +349,12 @@ class _Batch:
         """
         started = time.perf_counter()
         begin = self._state.check_start().energies
-        stage = self._tasks[0].stage_name
-        self._report(self._state, "develop" if stage == "relax" else stage)
-        if isotropic_start:
-            own, start = self._state.vertex_ranges, self._state.positions()
-            self._put(
-                [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
-            )
-            self._update_directions(scheme)
-        for _ in range(direction_updates):
-            if self._update_directions(scheme) <= _SETTLED_SHIFT:
-                break
-        outcome, state = replace(self._round(scheme), seconds=time.perf_counter() - started), self._state
+        steps, work = self._state.steps, self._state.work_units
+        try:
+            outcome = self._relax(scheme, direction_updates, isotropic_start)
+        except _Stopped as stopped:
+            outcome = self._outcome_of_stop(stopped.state, steps, work, started)
+        outcome, state = replace(outcome, seconds=time.perf_counter() - started), self._state
         layout, check = state.positions(), state.status
         for task in self._tasks:
             task.notes += [note for note in outcome.notes if note not in task.notes]
@@ -370,6 +375,38 @@ class _Batch:
             )
             for piece, (net, own) in enumerate(zip(state.network.pieces, state.vertex_ranges, strict=True))
         ]
+
+    def _relax(self, scheme: Scheme, direction_updates: int, isotropic_start: bool) -> Outcome:
+        stage = self._tasks[0].stage_name
+        self._report(self._state, "develop" if stage == "relax" else stage)
+        if isotropic_start:
+            own, start = self._state.vertex_ranges, self._state.positions()
+            self._put(
+                [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
+            )
+            self._update_directions(scheme)
+        for _ in range(direction_updates):
+            if self._update_directions(scheme) <= _SETTLED_SHIFT:
+                break
+        return self._round(scheme)
+
+    def _outcome_of_stop(self, state: Relaxation, steps: int, work: float, started: float) -> Outcome:
+        """Return the outcome of a relaxation that was stopped: what its last layout is, which is kept."""
+        whole = self._state
+        state.copy_into(whole)
+        if whole.network.fabric is not self._tasks[0].fabric:
+            # It was stopped as an isotropic sheet.
+            layout, own = whole.positions(), whole.vertex_ranges
+            self._put([task.build_network(layout[at]) for task, at in zip(self._tasks, own, strict=True)], layout)
+            whole, before = self._state, whole
+            whole.steps, whole.work_units = before.steps, before.work_units
+            whole.check_start()
+        whole.evaluate_at_rest()
+        whole.check_convergence(1.0)
+        for task in self._tasks:
+            task.stopped = True
+            task.notes.append("the callback stopped the relaxation before it was at rest")
+        return whole.make_outcome(steps, work, began_at=started)
 
     def _update_directions(self, scheme: Scheme) -> float:
         """Relax the pieces roughly and measure directions there; return the largest mean shift of a piece as a share of its size."""
@@ -421,6 +458,8 @@ class _Batch:
     def _report(self, state: Relaxation, stage: str) -> None:
         for piece, number in enumerate(state.piece_numbers):
             self._tasks[number].report_progress(stage, state, piece)
+        if any(task.stopped for task in self._tasks):
+            raise _Stopped(state)
 
 
 def _moved(before: FloatArray, after: FloatArray) -> float:

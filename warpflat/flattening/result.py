@@ -31,6 +31,7 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.export.picture import PicturePiece
+    from warpflat.export.picture_garment import Body
 
 __all__ = ["Flattening", "run_metrics", "write_files"]
 
@@ -74,6 +75,38 @@ class Flattening:
     options: RelaxOptions = field(default_factory=RelaxOptions)
     unsewn: Flattening | None = None
     remedies: tuple[Remedy, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Make the layout read-only for whoever holds the result."""
+        shown = self.positions.view()
+        shown.flags.writeable = False
+        object.__setattr__(self, "positions", shown)
+
+    def __repr__(self) -> str:
+        last = self.stages[-1]
+        return (
+            f"<Flattening {self.surface.name!r}: {len(self.positions):,} vertices, {len(self.faces):,} faces, {self.fabric.name},\n"
+            f" strain energy {last.strain_energy_j:.4g} J after {' > '.join(stage.name for stage in self.stages)},\n"
+            f" {'at rest' if self.converged else 'NOT at rest'}, {self.flipped_faces} flipped faces>"
+        )
+
+    def plot(self) -> Any:
+        """Return a Matplotlib figure of the piece, on the body and in the plane, coloured by strain energy density."""
+        from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+        from warpflat.export.picture import draw_figure
+
+        figure = draw_figure([self.picture_piece()])
+        FigureCanvasAgg(figure)
+        return figure
+
+    def _repr_png_(self) -> bytes:
+        """Return the picture that a notebook shows."""
+        from io import BytesIO
+
+        stream = BytesIO()
+        self.plot().savefig(stream, format="png")
+        return stream.getvalue()
 
     @property
     def faces(self) -> IntArray:
@@ -282,7 +315,9 @@ def run_metrics(
     }
 
 
-def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool) -> list[str]:
+def write_files(
+    results: Sequence[Flattening], folder: Path, *, picture: bool, frames: bool, body: Body | None = None
+) -> list[str]:
     """Write the files of several pieces, but not `metrics.json`, and return their names.
 
     Args:
@@ -290,6 +325,7 @@ def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, f
         folder: an existing one, in a block of :func:`warpflat.core.atomic_files.output_folder`.
         picture: whether to draw one.
         frames: whether to write a USD file with the development and the pattern.
+        body: on which the picture shows them first; none if not given.
 
     Raises:
         InputError: the folder cannot be written.
@@ -302,7 +338,7 @@ def write_files(results: Sequence[Flattening], folder: Path, *, picture: bool, f
         _write_frames(folder / files[-1], results)
     if picture:
         files.append("picture.png")
-        write_picture(folder / files[-1], [result.picture_piece() for result in results])
+        write_picture(folder / files[-1], [result.picture_piece() for result in results], body=body)
     return files
 
 

@@ -56,6 +56,10 @@ class Garment:
     sewn: Sewn | None = None
     ratios: tuple[float, ...] = ()
 
+    def __repr__(self) -> str:
+        energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
+        return f"<Garment {self.name!r}: {', '.join(self.pieces)}; {len(self.form.seams)} seams, strain energy {energy:.4g} J>"
+
     @property
     def seams(self) -> tuple[SeamLengths, ...]:
         """Every seam with the lengths of its two sides."""
@@ -176,7 +180,10 @@ class Garment:
         Raises:
             InputError: the folder cannot be written.
         """
-        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False)
+        from warpflat.export.picture_garment import Body
+
+        body = Body(vertices=self.mannequin.vertices, faces=np.asarray(self.mannequin.layout.faces, dtype=np.int32))
+        return write_files(list(self.pieces.values()), folder, picture=picture, frames=False, body=body)
 
 
 def flatten_form(
@@ -186,7 +193,7 @@ def flatten_form(
     fabric: Fabric | str = DEFAULT_FABRIC,
     grain_angle: float = 0.0,
     relax: RelaxOptions | None = None,
-    callback: Callable[[str, Progress], None] | None = None,
+    callback: Callable[[str, Progress], bool | None] | None = None,
     device: str | None = None,
     sewn: bool = True,
     wishes: Sequence[SeamWish] = (),
@@ -252,12 +259,12 @@ def flatten_form(
 
 
 def _callback_by_name(
-    names: Sequence[str], callback: Callable[[str, Progress], None]
-) -> Callable[[int, Progress], None]:
+    names: Sequence[str], callback: Callable[[str, Progress], bool | None]
+) -> Callable[[int, Progress], bool | None]:
     """Return a callback that takes a piece's number, and passes its name on."""
 
-    def call(number: int, progress: Progress) -> None:
-        callback(names[number], progress)
+    def call(number: int, progress: Progress) -> bool | None:
+        return callback(names[number], progress)
 
     return call
 

@@ -76,7 +76,7 @@ _SOFT = 12.0
 _STIFF = 5.0
 
 
-@dataclass(kw_only=True)
+@dataclass(kw_only=True, repr=False)
 class SpringNetwork:
     """The mass-spring model of one piece on a device.
 

@@ -27,7 +27,7 @@ def compare_fabrics(
     scene: Scene,
     fabrics: Sequence[str],
     *,
-    on_progress: Callable[[str, Progress], None] | None = None,
+    on_progress: Callable[[str, Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> Comparison:
     """Run a scene in each of several fabrics, with the same cuts, seams and constraints.
@@ -74,7 +74,7 @@ def compare_fabrics(
 
 
 def _run(
-    scene: Scene, sequence: CutSequence | None, report: Callable[[Progress], None], device: str | None
+    scene: Scene, sequence: CutSequence | None, report: Callable[[Progress], bool | None], device: str | None
 ) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
     """Run the scene without writing files; return its pieces and the entries of `metrics.json` on their sewing."""
     from warpflat.cutting.remedies import advise

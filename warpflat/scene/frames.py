@@ -3,100 +3,246 @@
 from __future__ import annotations
 
 import math
-from typing import TYPE_CHECKING
-
-from warpflat.scene.schema import OutputTable
-
-if TYPE_CHECKING:
-    from warpflat.flattening.result import Flattening
-
-from collections.abc import Callable
-from itertools import pairwise
-from typing import TYPE_CHECKING, Protocol
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import ExitStack
+from itertools import chain, pairwise
+from pathlib import Path
+from types import TracebackType
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.activity import report_activity
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.scene.frames_keys import FilmStage, Frame, Key, KeyFile
+from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan
-    from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
 
-__all__ = ["FrameRecorder", "FrameSchedule", "path_in_pattern"]
+__all__ = ["Film", "FrameRecorder", "FrameSchedule", "path_in_pattern"]
+
+# Frames of a film of 60: so many for a stage after the first one at least, and so many in which the line of a cut is shown.
+_LATER, _LINE = 15 / 60, 6 / 60
+# Into so many frames of a film of 60 the largest displacement of a stage is parted.
+_PARTS = 20 / 60
+# A film of more frames times vertices is thinned out: so many fill some 300 MB.
+_MOST_VERTICES = 6_000_000
+# A layout is kept if it lies at least this share of the stage's way from the one kept before.
+_KEPT = 0.05
+# Measures that are whole numbers.
+_COUNTS = ("step", "flipped_faces")
 
 
-class Schedule(Protocol):
-    """The choice of steps that become frames."""
+class Film:
+    """Records the layouts of several pieces while they relax, and writes `frames.usdc` at the end of its ``with`` block.
 
-    def is_due(self, step: int, max_steps: int) -> bool:
-        """Return whether this step becomes a frame."""
-        ...
+    All pieces have the same frames: a stage takes as many as the piece that needs the most, and a piece without that stage stands still.
+    """
+
+    def __init__(self, folder: Path, output: OutputTable, surfaces: Sequence[Surface]) -> None:
+        """
+        Args:
+            folder: in which `frames.usdc` is written, if the output has frames at all.
+            output: how many frames.
+            surfaces: the pieces, uncut.
+        """
+        self._stack = ExitStack()
+        self._folder, self._output = folder, output
+        self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
+        self.wanted = FrameSchedule(output).wanted
+        self._surfaces = {surface.name: surface for surface in surfaces}
+        self.recorders = {
+            name: FrameRecorder(None, surface, self._schedule) for name, surface in self._surfaces.items()
+        }
+
+    def _schedule(self) -> FrameSchedule:
+        return FrameSchedule(self._output, at_most=self._most)
+
+    def __enter__(self) -> Film:
+        """Open the files.
+
+        Raises:
+            InputError: the place cannot be written.
+        """
+        if self.wanted:
+            from warpflat.export.usd import FrameWriter
+
+            with ExitStack() as stack:
+                self._writer = stack.enter_context(FrameWriter(self._folder / "frames.usdc"))
+                self._keys = stack.enter_context(KeyFile(self._folder))
+                for name, surface in self._surfaces.items():
+                    self._writer.add_piece(name, surface)
+                    self.recorders[name] = FrameRecorder(self._keys, surface, self._schedule)
+                stack.push(self._write_at_end)
+                self._stack = stack.pop_all()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        """Write the frames if the block ended well, and close the files."""
+        self._stack.__exit__(kind, error, trace)
+
+    def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
+        if kind is None:
+            report_activity("writing the film")
+            self._write()
+
+    def _write(self) -> None:
+        pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
+        for number in range(max(len(stages) for stages in pieces.values())):
+            shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
+            count = max(wanted for _, _, wanted in shots.values())
+            frames = {name: self._frames(stage, keys, count) for name, (stage, keys, _) in shots.items()}
+            for frame in range(count):
+                for name, (stage, _, _) in shots.items():
+                    begins = frame == 0 and number < len(pieces[name])
+                    self._write_frame(name, stage, next(frames[name]), number=number, begins=begins)
+
+    def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
+        """Return a stage of a piece, the keys that are shown and the number of frames that it needs.
+
+        A piece without that stage stands still at its end.
+        """
+        if number >= len(stages):
+            return stages[-1], stages[-1].keys[-1:], 1
+        stage = stages[number]
+        if self._output.frame_every is not None:
+            return stage, stage.keys, len(stage.keys)
+        if stage.still:
+            return stage, stage.keys, min(max(round(_LINE * self._output.frames), 1), self._most)
+        share = 1.0 if number == 0 else _LATER
+        keys, count = self._keys.place_frames(
+            stage,
+            steps=_PARTS * self._output.frames,
+            at_least=max(math.ceil(share * self._output.frames), 2),
+            at_most=self._most,
+        )
+        return stage, keys, count
+
+    def _frames(self, stage: FilmStage, keys: Sequence[Key], count: int) -> Iterator[Frame]:
+        if self._output.frame_every is None:
+            return self._keys.frames(stage, keys, count)
+        # Steps are shown as they are; whoever is at rest earlier waits.
+        return chain.from_iterable(
+            self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1) for key in keys
+        )
+
+    def _write_frame(self, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool) -> None:
+        self._writer.write(
+            name,
+            positions=frame.positions,
+            face_energy_density=frame.face_energy_density,
+            **(stage.topology if begins else {}),  # type: ignore[arg-type]
+            measures={
+                "stage": stage.name,
+                "stage_number": number,
+                "interpolated": frame.interpolated,
+                **_counts_whole(frame.measures),
+            },
+        )
+
+
+def _counts_whole(measures: Mapping[str, float]) -> dict[str, float | int]:
+    """Return measures with counts as whole numbers."""
+    return {key: round(value) if key in _COUNTS else value for key, value in measures.items()}
 
 
 class FrameRecorder:
-    """Writes the frames of one piece; a callback of `flatten` and of `cut`."""
+    """Keeps the layouts of one piece; a callback of `flatten` and of `cut`."""
 
-    def __init__(self, writer: FrameWriter | None, surface: Surface, new_schedule: Callable[[], Schedule]) -> None:
+    def __init__(self, keys: KeyFile | None, surface: Surface, new_schedule: Callable[[], FrameSchedule]) -> None:
         """
         Args:
-            writer: an open one, or None for no frames.
+            keys: where layouts are kept; None to keep none.
             surface: the piece, uncut.
             new_schedule: makes the schedule of a stage.
         """
-        self._writer = writer
+        self.stages = list[FilmStage]()
+        self._keys = keys
         self._surface = surface
         self._new_schedule = new_schedule
         self._schedule = new_schedule()
         self._plans: list[CutPlan] = []
         self._faces = surface.faces
-        if writer is not None:
-            writer.add_piece(surface.name, surface)
+        self._ended = True
+        self._first = self._last = np.empty((0, 2))
+        self._end_density = np.empty(0)
 
     def __call__(self, progress: Progress) -> None:
-        """Write a frame if one is due."""
-        if self._writer is None or not self._schedule.is_due(progress.step, progress.max_steps):
+        """Keep the layout if the schedule asks for it, and if the piece has moved."""
+        if self._keys is None:
             return
-        cut_surface = progress.surface
-        was_cut = cut_surface.faces is not self._faces
-        self._faces = cut_surface.faces
-        self._writer.write(
-            self._surface.name,
-            positions=progress.positions(),
-            face_energy_density=progress.face_energy_density(),
-            faces=cut_surface.faces if was_cut else None,
-            lines=cut_surface.lines if was_cut else None,
-            cuts=self._cut_lines() if was_cut else None,
-            measures={"step": progress.step, "model_energy_j": progress.model_energy},
-        )
+        begins = self._ended or progress.surface.faces is not self._faces
+        if not begins and not self._schedule.is_due(progress.step, progress.max_steps):
+            return
+        positions = progress.positions()
+        if begins:
+            self._begin_stage("relax" if progress.stage == "develop" else progress.stage, progress.surface, positions)
+            self._schedule.is_due(progress.step, progress.max_steps)
+        elif not self._has_moved(positions):
+            return
+        measures = {"step": progress.step, "model_energy_j": progress.model_energy}
+        self._keep(positions, progress.face_energy_density(), measures)
 
     def record_result(self, result: Flattening) -> None:
-        """Write the frame of a finished result, with its measures."""
-        if self._writer is None:
+        """Keep the layout of a finished result, with its measures, as the end of a stage."""
+        if self._keys is None:
             return
-        self._writer.write(
-            self._surface.name,
-            positions=result.positions,
-            face_energy_density=result.face_energy_density,
-            measures={"step": result.stages[-1].steps, **result.layout_measures},
+        if self._ended:
+            # What led here was not seen: it is shown as the way from the end of the stage before.
+            surface, before = result.network.surface, self._last
+            self._begin_stage(result.stages[-1].name, surface, before if len(before) else result.positions)
+            if len(before):
+                self._keep(before, self._end_density, {"step": 0})
+        self._keep(
+            result.positions,
+            result.face_energy_density,
+            {"step": result.stages[-1].steps, **result.layout_measures},
         )
+        self._ended, self._end_density = True, result.face_energy_density
 
     def record_cut_line(self, result: Flattening, plan: CutPlan) -> None:
-        """Write the frame in which the line of the next cut is drawn on the piece, and begin the next stage."""
+        """Keep the layout in which the line of the next cut is drawn on the piece."""
         self._plans.append(plan)
-        self._schedule = self._new_schedule()
-        if self._writer is None:
+        if self._keys is None:
             return
-        self._writer.write(
-            self._surface.name,
-            positions=result.positions,
-            face_energy_density=result.face_energy_density,
-            cuts=self._cut_lines(),
-            measures={"step": 0, "model_energy_j": result.stages[-1].model_energy_j},
+        self._begin_stage(f"cut:{plan.name}", result.network.surface, result.positions, still=True)
+        measures = {"step": 0, "model_energy_j": result.stages[-1].model_energy_j}
+        self._keep(result.positions, result.face_energy_density, measures)
+        self._ended = True
+
+    def _begin_stage(self, name: str, surface: Surface, positions: FloatArray, *, still: bool = False) -> None:
+        self._schedule = self._new_schedule()
+        topology: dict[str, Any] = {}
+        if surface.faces is not self._faces:
+            self._faces = surface.faces
+            topology |= {"faces": surface.faces, "lines": surface.lines}
+        if self._plans:
+            topology["cuts"] = self._cut_lines()
+        self.stages.append(
+            FilmStage(
+                name=name, vertex_count=len(positions), face_count=len(surface.faces), topology=topology, still=still
+            )
         )
+        self._first, self._ended = positions, False
+
+    def _has_moved(self, positions: FloatArray) -> bool:
+        """Return whether the layout lies far enough from the one kept last, by the way of the stage until now."""
+        if self._schedule.is_even:
+            return True
+        moved, way = (np.abs(positions - before).max() for before in (self._last, self._first))
+        return bool(moved > _KEPT * way)
+
+    def _keep(self, positions: FloatArray, density: FloatArray, measures: Mapping[str, float]) -> None:
+        assert self._keys is not None
+        self.stages[-1].keys.append(self._keys.append(positions, density, measures))
+        self._last = positions
 
     def _cut_lines(self) -> dict[str, list[IntArray]]:
         return {
@@ -137,15 +283,20 @@ def path_in_pattern(faces: IntArray, pattern_faces: IntArray, path: IntArray) ->
 class FrameSchedule:
     """The schedule of a stage's frames: at a fixed interval of steps, or about a given number, closer together at first."""
 
-    def __init__(self, output: OutputTable) -> None:
+    def __init__(self, output: OutputTable, *, at_most: int | None = None) -> None:
         self._every = output.frame_every
-        self._number = output.frames
+        self._number = output.frames if at_most is None else min(output.frames, at_most)
         self._next = 0
 
     @property
     def wanted(self) -> bool:
         """True if any frame is written."""
         return self._number > 0
+
+    @property
+    def is_even(self) -> bool:
+        """True if steps are shown as they are, at a fixed interval."""
+        return self._every is not None
 
     def is_due(self, step: int, max_steps: int) -> bool:
         """Return whether this step, of at most `max_steps`, becomes a frame; the first one always does.

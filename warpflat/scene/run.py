@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
@@ -40,7 +39,7 @@ def run_scene(
     scene: Scene,
     out: str | Path,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
     cuts: CutSequence | None = None,
 ) -> SceneResult:
@@ -79,15 +78,14 @@ def _run_surface(
     scene: Scene,
     folder: Path,
     *,
-    on_progress: Callable[[Progress], None] | None,
+    on_progress: Callable[[Progress], bool | None] | None,
     device: str | None,
     cuts: CutSequence | None,
 ) -> SceneResult:
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
-    from warpflat.export.usd import FrameWriter
     from warpflat.scene.drape import write_drape
-    from warpflat.scene.frames import FrameRecorder
+    from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
     from warpflat.scene.seams import scene_surface_seams
 
@@ -100,14 +98,12 @@ def _run_surface(
     _check_edges(scene, sequence, drawing.rules)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
-    with ExitStack() as stack:
-        writer = stack.enter_context(FrameWriter(folder / "frames.usdc")) if wanted else None
-        recorder = FrameRecorder(writer, sequence.surface, lambda: FrameSchedule(settings.output))
+    with Film(folder, settings.output, [sequence.surface]) as film:
+        recorder = film.recorders[sequence.surface.name]
 
-        def each_step(progress: Progress) -> None:
+        def each_step(progress: Progress) -> bool | None:
             recorder(progress)
-            if on_progress is not None:
-                on_progress(progress)
+            return None if on_progress is None else on_progress(progress)
 
         result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
     pieces = [advise(piece) for piece in separate(result)]
@@ -137,6 +133,7 @@ def files_of_run(scene: Scene) -> list[str]:
         "picture.png": output.picture,
         "drape.png": output.picture and settings.drape is not None,
         f"{name}.draped.obj": settings.drape is not None and not garment,
+        "review.html": output.picture and output.review,
         "wear.png": worn and garment,
         f"{name}.wear.png": worn and not garment,
         **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},
@@ -152,7 +149,7 @@ def flatten_scene(
     sequence: CutSequence,
     *,
     recorder: FrameRecorder | None = None,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> tuple[Flattening, SewnSurface | None]:
     """Flatten, cut and sew the scene's surface; return the piece, and how it was sewn, if it was.
@@ -215,7 +212,7 @@ def _flatten(
     surface: Surface,
     relax: RelaxOptions,
     *,
-    callback: Callable[[Progress], None] | None = None,
+    callback: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> Flattening:
     from warpflat.flattening.flatten_piece import flatten

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -24,12 +23,12 @@ from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.drape import write_drape
-from warpflat.scene.frames import FrameRecorder, FrameSchedule
+from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.schema import CutTable
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult
+from warpflat.scene.write import SceneResult, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
 
@@ -107,7 +106,7 @@ class GarmentPlan:
     constraints: Sequence[Constraint]
     settings: Mapping[str, Any]
 
-    def flatten(self, *, callback: Callable[[str, Progress], None] | None = None) -> Garment:
+    def flatten(self, *, callback: Callable[[str, Progress], bool | None] | None = None) -> Garment:
         """Flatten and sew the garment.
 
         Raises:
@@ -174,7 +173,7 @@ def run_garment(
     scene: Scene,
     out: Path,
     *,
-    on_progress: Callable[[Progress], None] | None = None,
+    on_progress: Callable[[Progress], bool | None] | None = None,
     device: str | None = None,
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
@@ -199,29 +198,22 @@ def run_garment(
 
 
 def _flatten_with_frames(
-    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], None] | None = None
+    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], bool | None] | None = None
 ) -> Garment:
     """Flatten and sew the garment, and write `frames.usdc` if the scene wants frames."""
-    from warpflat.export.usd import FrameWriter
-
     output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
-    wanted = FrameSchedule(output).wanted
-    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=wanted)
-    with ExitStack() as stack:
-        writer = stack.enter_context(FrameWriter(out / "frames.usdc")) if wanted else None
-        recorders = {
-            name: FrameRecorder(writer, piece.surface, lambda: FrameSchedule(output))
-            for name, piece in plan.form.pieces.items()
-        }
+    require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=FrameSchedule(output).wanted)
+    with Film(out, output, surfaces) as film:
 
-        def each_step(name: str, progress: Progress) -> None:
-            recorders[name](progress)
-            if on_progress is not None:
-                on_progress(progress)
+        def each_step(name: str, progress: Progress) -> bool | None:
+            film.recorders[name](progress)
+            return None if on_progress is None else on_progress(progress)
 
         garment = plan.flatten(callback=each_step)
         for name, piece in garment.pieces.items():
-            recorders[name].record_result(piece)
+            if piece.unsewn is not None:
+                film.recorders[name].record_result(piece.unsewn)
+            film.recorders[name].record_result(piece)
     return garment
 
 
@@ -262,15 +254,12 @@ def _write_garment(
         options=plan.drawing,
         sample_size=own,
     )
-    metrics, manifest_notes = remove_stale(
-        out,
-        {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics},
-        name=scene.name,
-        files=(*files, *pattern.files),
-    )
+    measured = {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics}
+    files += [*pattern.files, *review_files(scene, measured, out, (*files, *pattern.files))]
+    metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *pattern.notes, *name_notes, *manifest_notes)
-    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+    return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
 
 
 def _metrics_of_sizes(graded: Mapping[str, Garment]) -> dict[str, Any]:

@@ -223,10 +223,12 @@ class OutputTable(Table):
     """Files written besides `metrics.json` and `NAME.obj`."""
 
     frames: Annotated[int, Field(ge=0, le=100_000)] = 60
-    """About how many frames, close together at first, when the pattern moves most; 0 for no `frames.usdc`."""
+    """About how many frames from the development to rest, with more for every cut; 0 for no `frames.usdc`."""
     frame_every: Annotated[int, Field(ge=1)] | None = None
-    """A frame every so many steps instead."""
+    """A frame every so many steps instead, as they are."""
     picture: bool = True
+    review: bool = True
+    """Whether a run with a picture writes `review.html`, too."""
 
 
 class PatternTable(Table):

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from warpflat.scene.load import Scene
     from warpflat.surface.border_seams import NamedSeam
 
-__all__ = ["SceneResult", "write_surface"]
+__all__ = ["SceneResult", "review_files", "write_surface"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,12 +78,26 @@ def write_surface(
         files.append("frames.usdc")
     pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
     entries = {piece.surface.name: piece.measures for piece in pieces}
-    metrics, manifest_notes = remove_stale(
-        folder,
-        {**run_metrics(entries, pieces[0].network.device, more), **pattern.metrics},
-        name=scene.name,
-        files=(*files, *pattern.files),
-    )
+    measured = {**run_metrics(entries, pieces[0].network.device, more), **pattern.metrics}
+    files += [*pattern.files, *review_files(scene, measured, folder, (*files, *pattern.files))]
+    metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files)
     name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
     notes = (*notes, *pattern.notes, *name_notes, *manifest_notes)
-    return SceneResult(metrics=metrics, files=(*files, *pattern.files), notes=notes)
+    return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
+
+
+def review_files(scene: Scene, metrics: Mapping[str, Any], folder: Path, files: Sequence[str]) -> list[str]:
+    """Write `review.html` if the scene wants it, and return its name in a list.
+
+    Args:
+        scene: the scene.
+        metrics: of the run.
+        folder: in which all else has been written.
+        files: that all else, by name.
+    """
+    output = scene.settings.output
+    if not (output.picture and output.review):
+        return []
+    from warpflat.review.page import write_review
+
+    return [write_review(folder, metrics, files, name=scene.name)]

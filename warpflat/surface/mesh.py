@@ -57,6 +57,10 @@ class Surface:
     sources: tuple[Path, ...] = ()
     of_faces: dict[str, Any] = field(default_factory=dict, repr=False)
 
+    def __repr__(self) -> str:
+        lines = f", lines {', '.join(self.lines)}" if len(self.lines) in range(1, 9) else f", {len(self.lines)} lines"
+        return f"<Surface {self.name!r}: {len(self.vertices):,} vertices, {len(self.faces):,} faces{lines}>"
+
     def __getstate__(self) -> dict[str, Any]:
         """Return the state to pickle, without results that can be computed again."""
         return {**vars(self), "of_faces": {}}

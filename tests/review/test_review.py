@@ -1,0 +1,149 @@
+"""The review page of a run: what stands on it, that it asks for nothing, and, in a browser, that its slider moves the mesh."""
+
+from __future__ import annotations
+
+import base64
+import json
+import re
+import shutil
+import subprocess
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpflat.cli.main import main
+from warpflat.review.film import open_film
+from warpflat.scene.load import make_scene
+from warpflat.scene.run import run_scene
+
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("run")
+    settings = {
+        "surface": {"shape": "dome", "resolution": 9},
+        "cuts": [{"name": "slit", "line": "centre", "part": [0.0, 0.5]}],
+        "output": {"frames": 24},
+        "pattern": {"formats": ["svg", "json"]},
+    }
+    result = run_scene(make_scene(settings, name="trial", folder=folder, where="trial"), folder)
+    assert "review.html" in result.files
+    assert "review.html" in json.loads((folder / "metrics.json").read_text())["files"]["trial"]
+    return folder
+
+
+def film_of(page: str) -> dict[str, Any]:
+    found = re.search(r'<script id="film" type="application/json">(.*?)</script>', page)
+    assert found
+    return dict(json.loads(found[1]))
+
+
+def test_the_page_tells_the_numbers_and_asks_for_nothing(run: Path) -> None:
+    page = (run / "review.html").read_text(encoding="utf-8")
+    piece = json.loads((run / "metrics.json").read_text())["pieces"]["trial"]
+    assert f"{100 * piece['length_error']:.3g} %" in page
+    assert "cut:slit" in page
+    assert "default-src 'none'" in page
+    assert not re.search(r"(src|href|url)\s*[=(]\s*[\"']?(?!data:)(https?:|//|file:)", page)
+    assert page.count("<img") == 2
+    assert len(page) < 3_000_000
+
+
+def test_the_packed_film_is_the_film(run: Path) -> None:
+    film = film_of((run / "review.html").read_text(encoding="utf-8"))
+    (source,) = open_film(run / "frames.usdc")
+    assert film["frames"] == source.times
+    assert film["stages"][0] == "relax"
+    data = zlib.decompress(base64.b64decode(film["data"]))
+    (piece,) = film["pieces"]
+    whole = piece["topologies"][0]
+    # The first frame lies behind the arrays of all topologies.
+    begin = sum(4 * 3 * t["triangles"] + 4 * 2 * t["edges"] + 2 * 3 * t["vertices"] for t in piece["topologies"])
+    planes = np.frombuffer(data[begin : begin + 4 * whole["vertices"]], dtype=np.uint8).reshape(2, -1).astype(np.uint16)
+    steps = (planes[0] + 256 * planes[1]).reshape(2, -1).T
+    x, y, size = piece["box"]
+    expected = source.positions(1, whole["vertices"])
+    np.testing.assert_allclose(np.array([x, y]) + steps / 65535 * size, expected, atol=size / 65535)
+
+
+def test_the_command_writes_the_page_again_and_moving_pictures(
+    run: Path, capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (run / "review.html").unlink()
+    metrics = json.loads((run / "metrics.json").read_text())
+    metrics["pieces"]["trial"]["notes"].append("</script><b>bold")
+    (run / "metrics.json").write_text(json.dumps(metrics))
+    assert main(["review", str(run), "--film", "--sheet"]) == 0
+    assert "review.html, film.webp, contact_sheet.png" in capsys.readouterr().out
+    with Image.open(run / "film.webp") as film:
+        assert getattr(film, "n_frames", 1) > 20
+    assert (run / "contact_sheet.png").stat().st_size > 0
+    page = (run / "review.html").read_text(encoding="utf-8")
+    assert film_of(page)["frames"][0] == 1
+    assert "&lt;/script&gt;&lt;b&gt;bold" in page
+    assert "<b>bold" not in page
+    assert main(["review", str(tmp_path)]) == 2
+    assert "give the folder of a run" in capsys.readouterr().err
+
+
+def test_a_damaged_run_is_one_line(run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    folder = tmp_path / "run"
+    shutil.copytree(run, folder)
+    (folder / "frames.usdc").write_bytes(b"noise")
+    assert main(["review", str(folder)]) == 2
+    (folder / "frames.usdc").unlink()
+    metrics = json.loads((folder / "metrics.json").read_text())
+    del metrics["pieces"]["trial"]["area_m2"]
+    (folder / "metrics.json").write_text(json.dumps(metrics))
+    assert main(["review", str(folder)]) == 2
+    lines = capsys.readouterr().err.strip().splitlines()
+    assert len(lines) == 2
+    assert "run the scene again" in lines[0]
+    assert "run the scene again" in lines[1]
+
+
+PROBE = """<script>
+const wait = setInterval(() => {
+  if (!document.body.dataset.ready) return;
+  clearInterval(wait);
+  const slider = document.getElementById("slider"), at = (value) => {
+    slider.value = value; slider.dispatchEvent(new Event("input")); return window.review.points("trial"); };
+  const first = at("0"), half = at("0.5"), second = at("1");
+  document.body.dataset.first = JSON.stringify(first);
+  document.body.dataset.blend = String(Math.max(...half.map((x, i) => Math.abs(x - 0.5 * (first[i] + second[i])))));
+  document.body.dataset.label = document.getElementById("label").textContent;
+}, 50);
+fetch("https://example.com/").catch(() => { document.body.dataset.fetch = "refused"; });
+</script>"""
+
+
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_in_a_browser_the_slider_moves_the_mesh_and_no_request_leaves(run: Path, tmp_path: Path) -> None:
+    page = tmp_path / "page.html"
+    page.write_text((run / "review.html").read_text(encoding="utf-8").replace("</body>", PROBE + "</body>"))
+    log = tmp_path / "net.json"
+    command = [
+        str(BROWSER), "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
+        "--disable-background-networking", "--disable-component-update", f"--user-data-dir={tmp_path / 'profile'}",
+        f"--log-net-log={log}", "--virtual-time-budget=8000", "--dump-dom", page.as_uri(),
+    ]  # fmt: skip
+    shown = subprocess.run(command, capture_output=True, text=True, timeout=120, check=True).stdout
+    body = re.search(r"<body[^>]*>", shown)
+    assert body
+    assert 'data-fetch="refused"' in body[0]
+    assert re.search(r'data-label="relax · frame 2 of \d+ · (interpolated|computed)"', body[0])
+    blend = re.search(r'data-blend="([^"]+)"', body[0])
+    first = re.search(r'data-first="\[([^\]]+)\]"', body[0])
+    assert blend
+    assert first
+    assert float(blend[1]) < 1e-6
+    (source,) = open_film(run / "frames.usdc")
+    points = np.array(first[1].split(","), dtype=float).reshape(-1, 3)[:, :2] - source.offset[:2]
+    np.testing.assert_allclose(points, source.positions(1, len(points)), atol=2e-5)
+    assert "example.com" not in log.read_text(errors="replace")

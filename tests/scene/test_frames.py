@@ -1,0 +1,112 @@
+"""The film of a run: how its frames are spread, what they say of themselves, and that pieces keep time."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from usd_validation import validate_usd
+
+from warpflat.scene.frames_keys import FilmStage, KeyFile, spread
+from warpflat.scene.load import make_scene
+from warpflat.scene.run import run_scene
+
+
+def shots_of(film: Path, piece: str) -> dict[int, list[np.ndarray]]:
+    """The layouts of each stage of a piece; a new topology begins another."""
+    from pxr import Usd
+
+    stage = Usd.Stage.Open(str(film))
+    prim, points = (
+        stage.GetPrimAtPath(f"/World/{piece}"),
+        stage.GetPrimAtPath(f"/World/{piece}/pattern").GetAttribute("points"),
+    )
+    found: dict[Any, list[np.ndarray]] = {}
+    for at in points.GetTimeSamples():
+        layout = np.array(points.Get(at), dtype=np.float64)
+        number = prim.GetAttribute("warpflat:stage_number").Get(at)
+        found.setdefault(number, []).append(layout)
+    return found
+
+
+def test_no_frame_moves_a_vertex_by_more_than_a_twentieth_of_its_stage(tmp_path: Path) -> None:
+    from pxr import Usd
+
+    settings = {
+        "surface": {"shape": "dome", "resolution": 17},
+        "cuts": [{"name": "slit", "line": "centre", "part": [0.0, 0.5]}],
+        "output": {"picture": False},
+        "pattern": {"formats": []},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    shots = shots_of(tmp_path / "frames.usdc", "trial")
+    assert len(shots[0]) == 60
+    assert len({len(layout) for layout in shots[1]}) == 1
+    assert len(shots[2]) >= 15
+    assert len(shots[2][0]) > len(shots[1][0]), "the crack is open to the topology"
+    for number in (0, 2):
+        way = max(np.linalg.norm(layout - shots[number][0], axis=1).max() for layout in shots[number])
+        moves = [np.linalg.norm(b - a, axis=1).max() for a, b in pairwise(shots[number])]
+        assert way > 1e-3
+        assert max(moves) < 0.0501 * way
+    stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
+    prim = stage.GetPrimAtPath("/World/trial")
+    types = {
+        name: prim.GetAttribute(f"warpflat:{name}").GetTypeName()
+        for name in ("stage", "step", "interpolated", "model_energy_j")
+    }
+    assert types == {"stage": "string", "step": "int", "interpolated": "bool", "model_energy_j": "double"}
+    names = prim.GetAttribute("warpflat:stage")
+    assert [names.Get(at) for at in (1, 60, 61, 70, stage.GetEndTimeCode())] == [
+        "relax",
+        "relax",
+        "cut:slit",
+        "cut:slit",
+        "sew",
+    ]
+    tags = [prim.GetAttribute("warpflat:interpolated").Get(at) for at in range(1, 61)]
+    assert (tags[0], tags[1], tags[-1]) == (False, True, False)
+    assert validate_usd(tmp_path / "frames.usdc") == []
+
+
+def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
+    from pxr import Usd
+
+    settings = {
+        "surface": {"shape": "dome", "resolution": 9},
+        "relax": {"solver": "plain", "max_steps": 40},
+        "output": {"frame_every": 5, "picture": False},
+        "pattern": {"formats": []},
+    }
+    run_scene(make_scene(settings, name="trial", folder=tmp_path, where="trial"), tmp_path)
+    stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
+    prim = stage.GetPrimAtPath("/World/trial")
+    steps = prim.GetAttribute("warpflat:step")
+    assert [steps.Get(at) for at in steps.GetTimeSamples()] == [0, 5, 10, 15, 20, 25, 30, 35, 40, 40]
+    tags = prim.GetAttribute("warpflat:interpolated")
+    assert not any(tags.Get(at) for at in tags.GetTimeSamples())
+
+
+def test_steps_are_spread_so_that_the_longest_is_short() -> None:
+    assert spread([1.0, 3.0], 8) == [2, 6]
+    assert spread([1.0, 0.0], 5) == [4, 1]
+    assert spread([], 3) == []
+
+
+@pytest.mark.parametrize(("at_most", "expected"), [(1000, 60), (5, 5)])
+def test_a_path_is_thinned_for_few_frames(tmp_path: Path, at_most: int, expected: int) -> None:
+    rng = np.random.default_rng(1)
+    path = np.cumsum(rng.random((30, 4, 2)), axis=0)
+    stage = FilmStage(name="relax", vertex_count=4, face_count=1, topology={})
+    with KeyFile(tmp_path) as file:
+        stage.keys = [file.append(layout, np.ones(1) * number, {}) for number, layout in enumerate(path)]
+        keys, count = file.place_frames(stage, steps=20, at_least=60, at_most=at_most)
+        frames = list(file.frames(stage, keys, count))
+    assert len(frames) == count == expected
+    np.testing.assert_allclose(frames[0].positions, path[0], rtol=1e-6)
+    np.testing.assert_allclose(frames[-1].positions, path[-1], rtol=1e-6)
+    assert sum(not frame.interpolated for frame in frames) == len(keys)
+    assert list(tmp_path.iterdir()) == []

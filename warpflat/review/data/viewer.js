@@ -1,0 +1,256 @@
+"use strict";
+// A small viewer of films: orbit, play, slider, colour per vertex. Plain WebGL2, no library, no request.
+(async () => {
+  const film = JSON.parse(document.getElementById("film").textContent);
+  const canvas = document.getElementById("view"), slider = document.getElementById("slider");
+  const label = document.getElementById("label"), play = document.getElementById("play");
+  const gl = canvas.getContext("webgl2", { antialias: true, alpha: false });
+  if (!gl || typeof DecompressionStream === "undefined") {
+    label.textContent = "This browser has no WebGL 2 or no DecompressionStream; frames.usdc holds the film.";
+    return;
+  }
+  const bytesOf = (text) => Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+  const stream = new Blob([bytesOf(film.data)]).stream().pipeThrough(new DecompressionStream("deflate"));
+  const data = new Uint8Array(await new Response(stream).arrayBuffer());
+  let at = 0;
+  const planes = (count, width) => {  // numbers of `width` bytes, lowest bytes first
+    const values = width === 4 ? new Uint32Array(count) : new Uint16Array(count);
+    for (let b = 0; b < width; b++) for (let i = 0; i < count; i++) values[i] += data[at++] << (8 * b);
+    return values;
+  };
+  const interleaved = (values, columns) => {
+    const count = values.length / columns, result = new values.constructor(values.length);
+    for (let c = 0; c < columns; c++) for (let i = 0; i < count; i++) result[i * columns + c] = values[c * count + i];
+    return result;
+  };
+
+  // --- unpack
+  for (const piece of film.pieces) {
+    for (const shape of piece.topologies) {
+      shape.index = interleaved(planes(3 * shape.triangles, 4), 3);
+      shape.edge = interleaved(planes(2 * shape.edges, 4), 2);
+      const steps = interleaved(planes(3 * shape.vertices, 2), 3);
+      shape.surface = Float32Array.from(steps, (s, i) => piece.space[i % 3] + (s / 65535) * piece.space[3]);
+      shape.normals = normalsOf(shape);
+    }
+    piece.layouts = [];
+    let before = null;
+    for (const number of film.frames) {
+      let shape = piece.topologies[0];
+      for (const each of piece.topologies) if (each.first <= number) shape = each;
+      const steps = planes(2 * shape.vertices, 2), colours = data.slice(at, at + shape.vertices);
+      at += shape.vertices;
+      if (before && before.shape === shape) {
+        for (let i = 0; i < steps.length; i++) steps[i] += before.steps[i];
+        for (let i = 0; i < colours.length; i++) colours[i] += before.colours[i];
+      }
+      before = { shape, steps, colours };
+      piece.layouts.push({ shape, colours, points: placed(piece, steps) });
+    }
+  }
+  function placed(piece, steps) {
+    const count = steps.length / 2, points = new Float32Array(3 * count), [x, y, size] = piece.box;
+    for (let i = 0; i < count; i++) {
+      points[3 * i] = piece.offset[0] + x + (steps[i] / 65535) * size;
+      points[3 * i + 1] = piece.offset[1] + y + (steps[count + i] / 65535) * size;
+      points[3 * i + 2] = piece.offset[2];
+    }
+    return points;
+  }
+  function normalsOf(shape) {
+    const n = new Float32Array(shape.surface.length), p = shape.surface, t = shape.index;
+    for (let i = 0; i < t.length; i += 3) {
+      const [a, b, c] = [3 * t[i], 3 * t[i + 1], 3 * t[i + 2]];
+      const u = [0, 1, 2].map((k) => p[b + k] - p[a + k]), v = [0, 1, 2].map((k) => p[c + k] - p[a + k]);
+      const w = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
+      for (const corner of [a, b, c]) for (let k = 0; k < 3; k++) n[corner + k] += w[k];
+    }
+    for (let i = 0; i < n.length; i += 3) {
+      const length = Math.hypot(n[i], n[i + 1], n[i + 2]) || 1;
+      for (let k = 0; k < 3; k++) n[i + k] /= length;
+    }
+    return n;
+  }
+
+  // --- draw
+  const program = gl.createProgram();
+  const shader = (kind, text) => {
+    const made = gl.createShader(kind);
+    gl.shaderSource(made, "#version 300 es\nprecision highp float;\n" + text);
+    gl.compileShader(made);
+    if (!gl.getShaderParameter(made, gl.COMPILE_STATUS)) throw new Error(gl.getShaderInfoLog(made));
+    gl.attachShader(program, made);
+  };
+  shader(gl.VERTEX_SHADER, `
+    layout(location=0) in vec3 position; layout(location=1) in vec3 normal; layout(location=2) in float share;
+    uniform mat4 view; uniform float pull; out vec3 n; out float s;
+    void main() { gl_Position = view * vec4(position, 1.0); gl_Position.z -= pull * gl_Position.w; n = normal; s = share; }`);
+  shader(gl.FRAGMENT_SHADER, `
+    in vec3 n; in float s; uniform sampler2D table; uniform vec4 ink; uniform vec3 eye; out vec4 colour;
+    void main() {
+      if (ink.a > 0.0) { colour = vec4(ink.rgb, 1.0); return; }
+      vec3 base = texture(table, vec2(s * 255.0 / 256.0 + 0.5 / 256.0, 0.5)).rgb;
+      float lit = dot(normalize(n), normalize(eye + vec3(-0.3, 0.5, 0.2)));
+      if (dot(n, eye) < 0.0) { base = mix(base, vec3(0.55), 0.6); lit = -lit; }
+      colour = vec4(base * (0.62 + 0.40 * max(lit, 0.0)), 1.0);
+    }`);
+  gl.linkProgram(program);
+  gl.useProgram(program);
+  const place = (name) => gl.getUniformLocation(program, name);
+  const [viewAt, pullAt, inkAt, eyeAt] = ["view", "pull", "ink", "eye"].map(place);
+  gl.bindTexture(gl.TEXTURE_2D, gl.createTexture());
+  gl.texImage2D(gl.TEXTURE_2D, 0, gl.RGB, 256, 1, 0, gl.RGB, gl.UNSIGNED_BYTE, bytesOf(film.colours));
+  for (const key of [gl.TEXTURE_MIN_FILTER, gl.TEXTURE_MAG_FILTER]) gl.texParameteri(gl.TEXTURE_2D, key, gl.LINEAR);
+  for (const key of [gl.TEXTURE_WRAP_S, gl.TEXTURE_WRAP_T]) gl.texParameteri(gl.TEXTURE_2D, key, gl.CLAMP_TO_EDGE);
+  gl.enable(gl.DEPTH_TEST);
+  gl.clearColor(0.975, 0.973, 0.965, 1);
+  const buffer = () => gl.createBuffer(), points = buffer(), normals = buffer(), shares = buffer();
+  for (const piece of film.pieces) for (const shape of piece.topologies) {
+    for (const [key, values] of [["indexBuffer", shape.index], ["edgeBuffer", shape.edge]]) {
+      shape[key] = buffer();
+      gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, shape[key]);
+      gl.bufferData(gl.ELEMENT_ARRAY_BUFFER, values, gl.STATIC_DRAW);
+    }
+  }
+  const attribute = (slot, target, values, size, type, normalised) => {
+    gl.bindBuffer(gl.ARRAY_BUFFER, target);
+    gl.bufferData(gl.ARRAY_BUFFER, values, gl.DYNAMIC_DRAW);
+    gl.enableVertexAttribArray(slot);
+    gl.vertexAttribPointer(slot, size, type, normalised, 0, 0);
+  };
+  function drawMesh(shape, position, normal, colours, eye) {
+    attribute(0, points, position, 3, gl.FLOAT, false);
+    if (normal) attribute(1, normals, normal, 3, gl.FLOAT, false);
+    else { gl.disableVertexAttribArray(1); gl.vertexAttrib3f(1, 0, 0, 1); }
+    attribute(2, shares, colours, 1, gl.UNSIGNED_BYTE, true);
+    gl.uniform3fv(eyeAt, eye);
+    gl.uniform1f(pullAt, 0);
+    gl.uniform4f(inkAt, 0, 0, 0, 0);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, shape.indexBuffer);
+    gl.drawElements(gl.TRIANGLES, shape.index.length, gl.UNSIGNED_INT, 0);
+    gl.uniform1f(pullAt, 2e-4);
+    gl.uniform4f(inkAt, 0.1, 0.11, 0.14, 1);
+    gl.bindBuffer(gl.ELEMENT_ARRAY_BUFFER, shape.edgeBuffer);
+    gl.drawElements(gl.LINES, shape.edge.length, gl.UNSIGNED_INT, 0);
+  }
+
+  // --- time: between two frames of one topology the layout is blended
+  const last = film.frames.length - 1;
+  let now = 0, playing = false;
+  function stateAt(piece, time) {
+    const k = Math.min(Math.floor(time), last), share = time - k, a = piece.layouts[k];
+    const b = piece.layouts[Math.min(k + 1, last)];
+    if (share <= 0 || b.shape !== a.shape) return a;
+    const blended = (x, y, kind) => kind.from(x, (value, i) => value + share * (y[i] - value));
+    return { shape: a.shape, points: blended(a.points, b.points, Float32Array), colours: blended(a.colours, b.colours, Uint8Array) };
+  }
+
+  // --- camera
+  const camera = { turn: 0, tilt: 0, away: 3, target: [0, 0, 0] };
+  function boxOf(which) {
+    const low = [1e9, 1e9, 1e9], high = [-1e9, -1e9, -1e9];
+    const grow = (p) => { for (let i = 0; i < p.length; i++) { low[i % 3] = Math.min(low[i % 3], p[i]); high[i % 3] = Math.max(high[i % 3], p[i]); } };
+    for (const piece of film.pieces) {
+      if (which !== "pattern") grow(piece.topologies[0].surface);
+      if (which !== "surface") for (const k of [0, last]) grow(piece.layouts[k].points);
+    }
+    return [low, high];
+  }
+  function look(which, turn, tilt) {
+    const [low, high] = boxOf(which), aspect = canvas.clientWidth / Math.max(canvas.clientHeight, 1);
+    const size = [0, 1, 2].map((k) => high[k] - low[k]);
+    const wide = Math.abs(Math.cos(turn)) * size[0] + Math.abs(Math.sin(turn)) * size[2];
+    const deep = Math.abs(Math.sin(turn)) * size[0] + Math.abs(Math.cos(turn)) * size[2];
+    camera.target = [0, 1, 2].map((k) => 0.5 * (low[k] + high[k]));
+    camera.away = Math.max(wide / aspect, size[1]) * 1.12 / (2 * Math.tan(0.25)) + 0.5 * deep;
+    Object.assign(camera, { turn, tilt });
+    draw();
+  }
+  function axes() {
+    const [ct, st, cp, sp] = [Math.cos(camera.turn), Math.sin(camera.turn), Math.cos(camera.tilt), Math.sin(camera.tilt)];
+    return { right: [ct, 0, -st], up: [-st * sp, cp, -ct * sp], back: [st * cp, sp, ct * cp] };
+  }
+  function matrix() {
+    const { right, up, back } = axes(), near = camera.away / 50, far = camera.away * 20;
+    const eye = camera.target.map((value, k) => value + camera.away * back[k]);
+    const dot = (a, b) => a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+    const f = 1 / Math.tan(0.25), g = f / (canvas.width / canvas.height);
+    const a = (far + near) / (near - far), b = (2 * far * near) / (near - far), m = new Float32Array(16);
+    for (let k = 0; k < 3; k++) { m[4 * k] = g * right[k]; m[4 * k + 1] = f * up[k]; m[4 * k + 2] = a * back[k]; m[4 * k + 3] = -back[k]; }
+    m[12] = -g * dot(right, eye); m[13] = -f * dot(up, eye); m[14] = -a * dot(back, eye) + b; m[15] = dot(back, eye);
+    return m;
+  }
+  function draw() {
+    const ratio = window.devicePixelRatio || 1;
+    canvas.width = Math.max(1, canvas.clientWidth * ratio);
+    canvas.height = Math.max(1, canvas.clientHeight * ratio);
+    gl.viewport(0, 0, canvas.width, canvas.height);
+    gl.clear(gl.COLOR_BUFFER_BIT | gl.DEPTH_BUFFER_BIT);
+    gl.uniformMatrix4fv(viewAt, false, matrix());
+    const { back } = axes();
+    for (const piece of film.pieces) {
+      const state = stateAt(piece, now);
+      drawMesh(state.shape, state.shape.surface, state.shape.normals, state.colours, back);
+      drawMesh(state.shape, state.points, null, state.colours, back);
+    }
+    const k = Math.min(Math.round(now), last);
+    label.textContent = `${film.stages[k]} · frame ${film.frames[k]} of ${film.of}` + (film.computed[k] ? " · computed" : " · interpolated");
+    slider.value = String(now);
+  }
+  function show(time) { now = Math.min(Math.max(time, 0), last); draw(); }
+
+  // --- hands
+  slider.max = String(last);
+  slider.step = "any";
+  slider.addEventListener("input", () => { halt(); show(Number(slider.value)); });
+  let clock = 0;
+  function halt() { playing = false; play.textContent = "Play"; }
+  function tick(time) {
+    if (!playing) return;
+    const step = ((time - clock) / 1000) * film.rate * Math.max(film.frames.length / film.of, 0.01);
+    clock = time;
+    if (now >= last) { halt(); return; }
+    show(now + step);
+    requestAnimationFrame(tick);
+  }
+  play.addEventListener("click", () => {
+    if (playing) { halt(); return; }
+    playing = true;
+    play.textContent = "Pause";
+    if (now >= last) now = 0;
+    clock = performance.now();
+    requestAnimationFrame(tick);
+  });
+  const views = { all: ["all", 0, 0], front: ["surface", 0, 0.08], side: ["surface", Math.PI / 2, 0.08], back: ["surface", Math.PI, 0.08], pattern: ["pattern", 0, 0] };
+  for (const button of document.querySelectorAll("[data-view]")) button.addEventListener("click", () => look(...views[button.dataset.view]));
+  canvas.addEventListener("pointerdown", (event) => canvas.setPointerCapture(event.pointerId));
+  canvas.addEventListener("contextmenu", (event) => event.preventDefault());
+  canvas.addEventListener("dblclick", () => look(...views.all));
+  canvas.addEventListener("pointermove", (event) => {
+    if (!event.buttons) return;
+    if (event.buttons === 1 && !event.shiftKey) {
+      camera.turn -= event.movementX * 0.008;
+      camera.tilt = Math.min(1.5, Math.max(-1.5, camera.tilt + event.movementY * 0.008));
+    } else {
+      const { right, up } = axes(), scale = (2 * camera.away * Math.tan(0.25)) / canvas.clientHeight;
+      camera.target = camera.target.map((value, k) => value - scale * (event.movementX * right[k] - event.movementY * up[k]));
+    }
+    draw();
+  });
+  canvas.addEventListener("wheel", (event) => {
+    event.preventDefault();
+    camera.away *= Math.exp(0.001 * event.deltaY);
+    draw();
+  }, { passive: false });
+  window.addEventListener("resize", draw);
+  window.addEventListener("keydown", (event) => {
+    if (event.target !== slider && event.key === "ArrowRight") { halt(); show(Math.floor(now) + 1); }
+    if (event.target !== slider && event.key === "ArrowLeft") { halt(); show(Math.ceil(now) - 1); }
+    if (event.key === " " && event.target.tagName !== "BUTTON") { event.preventDefault(); play.click(); }
+  });
+  now = last;
+  look(...views.all);
+  // For scripts and tests: what is shown.
+  window.review = { show, look: (name) => look(...views[name]), points: (name) => Array.from(stateAt(film.pieces.find((piece) => piece.name === name), now).points) };
+  document.body.dataset.ready = "yes";
+})();

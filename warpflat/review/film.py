@@ -1,0 +1,224 @@
+"""`frames.usdc` is packed for a page: quantised, as differences between frames, compressed."""
+
+from __future__ import annotations
+
+import base64
+import zlib
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.export.colours import energy_colours
+from warpflat.export.geometry import corner_average, face_areas, outline_edges
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["FilmPiece", "Shape", "open_film", "pack_film"]
+
+# Bytes of all frames before compression; beyond, every second frame is left out, or every third ...
+_ROOM = 4_000_000
+# Bytes of a vertex in a frame: two coordinates of 16 bits, and a colour.
+_VERTEX = 5
+_COLOURS = 256
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Shape:
+    """A piece in one topology.
+
+    Attributes:
+        faces: #F by 4, in the pattern's numbering.
+        surface: #P by 3, the place on the surface of each vertex of the pattern [m].
+        areas: #F, of the faces on the surface [m2].
+    """
+
+    faces: IntArray
+    surface: FloatArray
+    areas: FloatArray
+
+
+class FilmPiece:
+    """One piece of a `frames.usdc`."""
+
+    def __init__(self, stage: Any, prim: Any) -> None:
+        from pxr import UsdGeom
+
+        self._stage = stage  # prims live as long as it does
+        self._pattern = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/pattern"))
+        self._surface = UsdGeom.Mesh(stage.GetPrimAtPath(f"{prim.GetPath()}/surface"))
+        self.name = prim.GetDisplayName() or prim.GetName()
+        self.prim = prim
+        self.times = [int(time) for time in self._pattern.GetPointsAttr().GetTimeSamples()]
+        self.changes = [int(time) for time in self._pattern.GetFaceVertexIndicesAttr().GetTimeSamples()]
+        place = UsdGeom.Xformable(self._pattern).ComputeLocalToWorldTransform(0.0).ExtractTranslation()
+        self.offset = [float(value) for value in place]
+        colour = self._pattern.GetDisplayColorPrimvar().GetAttr()
+        self.scale = float(colour.GetCustomData().get("rangeMax", 1.0))
+        self._density = UsdGeom.PrimvarsAPI(self._pattern).GetPrimvar("strainEnergyDensity").GetAttr()
+
+    def shape(self, time: int) -> Shape:
+        """Return the topology at a frame."""
+        counts = np.asarray(self._pattern.GetFaceVertexCountsAttr().Get(time))
+        corners = np.array(self._pattern.GetFaceVertexIndicesAttr().Get(time), dtype=np.int32)
+        own = np.array(self._surface.GetFaceVertexIndicesAttr().Get(), dtype=np.int32)
+        space = np.array(self._surface.GetPointsAttr().Get(), dtype=np.float64)
+        faces = np.full((len(counts), 4), -1, dtype=np.int32)
+        faces[np.arange(4) < counts[:, None]] = corners
+        origin = np.zeros(int(corners.max()) + 1, dtype=np.int32)
+        origin[corners] = own
+        surface = space[origin]
+        return Shape(faces=faces, surface=surface, areas=face_areas(surface, faces))
+
+    def positions(self, time: int, count: int) -> FloatArray:
+        """Return the pattern at a frame, #P by 2 [m]."""
+        return np.array(self._pattern.GetPointsAttr().Get(time), dtype=np.float64)[:count, :2]
+
+    def density(self, time: int) -> FloatArray:
+        """Return the energies at a frame, #F [J/m2]."""
+        return np.array(self._density.Get(time), dtype=np.float64)
+
+    def measure(self, key: str, time: int) -> Any:
+        """Return a measure of a frame, None if there is none."""
+        attribute = self.prim.GetAttribute(f"warpflat:{key}")
+        return attribute.Get(time) if attribute else None
+
+
+def open_film(path: Path) -> list[FilmPiece]:
+    """Open the pieces of a `frames.usdc` that have frames.
+
+    Raises:
+        InputError: it is no USD file.
+    """
+    from pxr import Tf, Usd
+
+    try:
+        stage = Usd.Stage.Open(str(path))
+    except Tf.ErrorException as error:
+        raise InputError(f"{path}: is not a USD file that can be opened; run the scene again") from error
+    found = [FilmPiece(stage, prim) for prim in stage.GetDefaultPrim().GetChildren() if prim.GetChild("pattern")]
+    return [piece for piece in found if piece.times]
+
+
+def pack_film(pieces: Sequence[FilmPiece]) -> dict[str, Any] | None:
+    """Pack a film for the page's viewer; None if even two frames of it are too large.
+
+    The entry `data` is the base64 text of what `zlib` has compressed; `pieces` says what lies in it, in its order.
+    """
+    shapes = {piece.name: [piece.shape(change) for change in piece.changes] for piece in pieces}
+    vertices = sum(len(shape[-1].surface) for shape in shapes.values())
+    shown = _shown_frames(pieces, _ROOM // (_VERTEX * max(vertices, 1)))
+    if not shown:
+        return None
+    packer = zlib.compressobj(9)
+    parts, entries = list[bytes](), list[dict[str, Any]]()
+    for piece in pieces:
+        entry, blocks = _packed(piece, shapes[piece.name], shown)
+        entries.append(entry)
+        parts += [packer.compress(block) for block in blocks]
+    parts.append(packer.flush())
+    first = pieces[0]
+    table = np.round(255.0 * energy_colours(np.arange(_COLOURS) / (_COLOURS - 1), 1.0)).astype(np.uint8)
+    return {
+        "frames": shown,
+        "of": first.times[-1],
+        "rate": 24,
+        "stages": [first.measure("stage", time) or "" for time in shown],
+        "computed": [not first.measure("interpolated", time) for time in shown],
+        "scale": first.scale,
+        "colours": base64.b64encode(table.tobytes()).decode("ascii"),
+        "pieces": entries,
+        "data": base64.b64encode(b"".join(parts)).decode("ascii"),
+    }
+
+
+def _shown_frames(pieces: Sequence[FilmPiece], most: int) -> list[int]:
+    """Return the numbers of the frames that the page has: evenly taken, with those before and after each change of topology."""
+    times = pieces[0].times
+    if most < 2:
+        return []
+    stride = -(-len(times) // most)
+    kept = {*times[::stride], times[-1]}
+    for piece in pieces:
+        kept |= {time for change in piece.changes for time in (change - 1, change) if time >= times[0]}
+    return sorted(kept)
+
+
+def _packed(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> tuple[dict[str, Any], list[bytes]]:
+    """Return what the page must know of a piece, and its arrays."""
+    space, blocks, topologies = _Box(shapes[0].surface), list[bytes](), list[dict[str, int]]()
+    for change, shape in zip(piece.changes, shapes, strict=True):
+        triangles, _ = triangulate(shape.faces)
+        edges = outline_edges(shape.faces)
+        topologies.append(
+            {
+                "first": change,
+                "vertices": len(shape.surface),
+                "triangles": len(triangles),
+                "edges": len(edges),
+            }
+        )
+        blocks += [_planes(triangles.astype(np.uint32)), _planes(edges.astype(np.uint32))]
+        blocks.append(_planes(space.steps(shape.surface)))
+    layouts = [
+        (number, shape, piece.positions(time, len(shape.surface)), time)
+        for number, shape, time in _at(piece, shapes, shown)
+    ]
+    box = _Box(np.concatenate([positions for _, _, positions, _ in layouts]))
+    before: tuple[int, NDArray[np.uint16], NDArray[np.uint8]] | None = None
+    for number, shape, positions, time in layouts:
+        steps, colours = box.steps(positions), _colours(shape, piece.density(time), piece.scale)
+        same = before is not None and before[0] == number
+        blocks.append(_planes(steps - before[1] if same and before else steps))
+        blocks.append((colours - before[2] if same and before else colours).tobytes())
+        before = number, steps, colours
+    entry = {
+        "name": piece.name,
+        "offset": piece.offset,
+        "space": space.as_list(),
+        "box": box.as_list(),
+        "topologies": topologies,
+    }
+    return entry, blocks
+
+
+def _at(piece: FilmPiece, shapes: Sequence[Shape], shown: Sequence[int]) -> Iterator[tuple[int, Shape, int]]:
+    """Yield for each shown frame the number of its topology, that topology, and the frame."""
+    for time in shown:
+        number = sum(change <= time for change in piece.changes) - 1
+        yield number, shapes[number], min(time, piece.times[-1])
+
+
+def _colours(shape: Shape, density: FloatArray, scale: float) -> NDArray[np.uint8]:
+    """Return the row of the colour table of each vertex."""
+    used = shape.faces >= 0
+    face = np.nonzero(used)[0].astype(np.int32)
+    mean = corner_average(density, shape.areas, face, shape.faces[used], len(shape.surface))
+    return np.round(np.clip(mean / scale, 0.0, 1.0) * (_COLOURS - 1)).astype(np.uint8)
+
+
+class _Box:
+    """A box around points, in which places are told in 65,535 steps along its longest side."""
+
+    def __init__(self, points: FloatArray) -> None:
+        self._low = points.min(axis=0)
+        self._size = float((points.max(axis=0) - self._low).max()) or 1.0
+
+    def steps(self, points: FloatArray) -> NDArray[np.uint16]:
+        """Return places as steps from the box's corner."""
+        return np.round((points - self._low) / self._size * 65535.0).clip(0, 65535).astype(np.uint16)
+
+    def as_list(self) -> list[float]:
+        """Return the corner and the size [m]."""
+        return [*self._low.tolist(), self._size]
+
+
+def _planes(values: NDArray[Any]) -> bytes:
+    """Return numbers as planes: first the lowest byte of all, column by column; that compresses well."""
+    columns = np.ascontiguousarray(values.T)
+    order = columns.astype(columns.dtype.newbyteorder("<")).view(np.uint8).reshape(-1, columns.dtype.itemsize)
+    return np.ascontiguousarray(order.T).tobytes()

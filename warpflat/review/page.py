@@ -1,0 +1,171 @@
+"""`review.html`: one file with which a run is reviewed, offline: film, numbers, seams, darts and pictures."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from warpflat.core.activity import report_activity
+from warpflat.core.atomic_files import atomic_path, latest_file
+from warpflat.core.errors import InputError
+from warpflat.review.film import open_film, pack_film
+from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
+
+__all__ = ["read_run", "review_folder", "write_review"]
+
+# Nothing on the page may ask for anything from elsewhere, nor from the disk.
+_POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
+# Pictures come in this order, and others after them.
+_FIRST = ("picture.png", "drape.png", "wear.png")
+_QUALITY = 88
+
+
+def read_run(folder: Path) -> tuple[dict[str, Any], list[str], str]:
+    """Read what a run has left in a folder: its metrics, the names of its files, and its name.
+
+    Raises:
+        InputError: there is no `metrics.json` of warpflat.
+    """
+    path = folder / "metrics.json"
+    try:
+        metrics = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        reason = (error.strerror or str(error)).lower()
+        raise InputError(f"cannot read {path}: {reason}; give the folder of a run") from None
+    except (ValueError, RecursionError):
+        metrics = None
+    if not isinstance(metrics, dict) or not isinstance(metrics.get("pieces"), dict) or not metrics["pieces"]:
+        raise InputError(f"{path}: is not of a run of warpflat; give the folder that `warpflat run` has written")
+    files = metrics.get("files")
+    runs = files if isinstance(files, dict) else {}
+    name = next(reversed(runs), folder.resolve().name)
+    listed = [file for file in runs.get(name, {}) if Path(file).name == file and (folder / file).is_file()]
+    return metrics, listed, name
+
+
+def review_folder(folder: str | Path) -> Path:
+    """Write `review.html` into the folder of an earlier run; return its path.
+
+    Raises:
+        InputError: the folder holds no run, a file of it cannot be read, or the page cannot be written.
+    """
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.manifest import record_file
+
+    folder = Path(folder)
+    metrics, files, name = read_run(folder)
+    with output_folder(folder, ["review.html"]):
+        write_review(folder, metrics, files, name=name)
+        record_file(folder, name, "review.html")
+    return folder / "review.html"
+
+
+def write_review(folder: Path, metrics: Mapping[str, Any], files: Sequence[str], *, name: str) -> str:
+    """Write `review.html` and return its name.
+
+    Args:
+        folder: of the run.
+        metrics: as `metrics.json`.
+        files: what the run has written, by name.
+        name: of the run.
+
+    Raises:
+        InputError: a file cannot be read as what it is, or the page cannot be written.
+    """
+    report_activity("writing the review page")
+    path = folder / "review.html"
+    try:
+        page = _page(folder, metrics, files, name)
+    except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
+        raise InputError(f"{folder}: a file of the run is damaged ({error}); run the scene again") from error
+    with atomic_path(path) as temporary:
+        temporary.write_text(page, encoding="utf-8")
+    return path.name
+
+
+def _page(folder: Path, metrics: Mapping[str, Any], files: Sequence[str], name: str) -> str:
+    film, packed = "", None
+    if "frames.usdc" in files:
+        packed = pack_film(open_film(latest_file(folder / "frames.usdc")))
+        film = _film_section(packed) if packed else "<p>The film is too large for a page; see frames.usdc.</p>"
+    notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
+    sections = [
+        ("", summary_cards(metrics)),
+        ("From the development to rest", film),
+        ("Energy, stage by stage", energy_table(metrics)),
+        ("Pieces", piece_table(metrics)),
+        ("Cuts and darts", ledger_table(metrics)),
+        ("Seams", seam_table(metrics)),
+        ("Body", size_table(metrics)),
+        ("Pictures", _pictures(folder, files)),
+        ("Pattern", _drawings(folder, files)),
+        ("Notes", "<ul>" + "".join(f"<li>{escape(note)}</li>" for note in notes) + "</ul>" if notes else ""),
+        ("Files", "<ul>" + "".join(f"<li>{escape(file)}</li>" for file in sorted(files)) + "</ul>"),
+    ]
+    body = "".join(f"<h2>{title}</h2>{content}" if title else content for title, content in sections if content)
+    script = f"<script>{_data('viewer.js')}</script>" if packed else ""
+    return (
+        f'<!doctype html><html lang="en"><head><meta charset="utf-8"><title>{escape(name)} - review</title>'
+        f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{_data("page.css")}</style></head>'
+        f'<body><main><h1>{escape(name)}</h1><p class="sub">warpflat {escape(str(metrics["warpflat"]))}</p>'
+        f"{body}</main>{script}</body></html>\n"
+    )
+
+
+def _film_section(film: Mapping[str, Any]) -> str:
+    """Return the viewer with its film."""
+    # No text of a film may end the script it stands in.
+    data = json.dumps(film, separators=(",", ":")).replace("<", "\\u003c")
+    buttons = "".join(
+        f'<button data-view="{view}">{view.capitalize()}</button>'
+        for view in ("all", "front", "side", "back", "pattern")
+    )
+    colours = base64.b64decode(film["colours"])
+    stops = ",".join(f"rgb({colours[i]},{colours[i + 1]},{colours[i + 2]})" for i in range(0, len(colours), 3 * 15))
+    return (
+        f'<div class="stage"><canvas id="view"></canvas><div class="bar"><button id="play">Play</button>'
+        f'<input id="slider" type="range" min="0" value="0" aria-label="frame"><span id="label"></span>{buttons}</div>'
+        f'<div class="scale">0 <i style="background:linear-gradient(90deg,{stops})"></i> {film["scale"]:.3g} J/m² strain '
+        "energy density · drag to turn, shift-drag to move, wheel to zoom</div></div>"
+        f'<script id="film" type="application/json">{data}</script>'
+    )
+
+
+def _pictures(folder: Path, files: Sequence[str]) -> str:
+    found = [file for file in files if file.endswith(".png") and file != "contact_sheet.png"]
+    found.sort(key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
+    return "".join(f'<img alt="{escape(file)}" src="{_image(latest_file(folder / file))}">' for file in found)
+
+
+def _drawings(folder: Path, files: Sequence[str]) -> str:
+    found = sorted(file for file in files if file.endswith(".svg"))
+    parts = []
+    for file in found:
+        text = base64.b64encode(latest_file(folder / file).read_bytes()).decode("ascii")
+        parts.append(f'<img class="drawing" alt="{escape(file)}" src="data:image/svg+xml;base64,{text}">')
+    return "".join(parts)
+
+
+def _image(path: Path) -> str:
+    """Return a picture as text: as WebP where that is smaller."""
+    from PIL import Image
+
+    own = path.read_bytes()
+    best, kind, small = own, "png", io.BytesIO()
+    with Image.open(io.BytesIO(own)) as picture:
+        if max(picture.size) < 16_000:
+            picture.convert("RGB").save(small, "WEBP", quality=_QUALITY, method=2)
+            if len(small.getvalue()) < len(own):
+                best, kind = small.getvalue(), "webp"
+    return f"data:image/{kind};base64,{base64.b64encode(best).decode('ascii')}"
+
+
+def _data(file: str) -> str:
+    return resources.files("warpflat.review").joinpath("data", file).read_text(encoding="utf-8")
