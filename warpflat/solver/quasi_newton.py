@@ -9,6 +9,7 @@ Contact (`warpflat.solver.contact`) adds its barrier to the energy and its stiff
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,6 +18,7 @@ from typing import Generic, Protocol, TypeVar
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.sums import dot
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment, align_grain
@@ -143,19 +145,19 @@ class _Memory:
 
     def add(self, step: FloatArray, change: FloatArray) -> None:
         """Remember a step and the change of the gradient along it, if the energy is convex there."""
-        curvature = float(np.vdot(step, change))
-        if curvature > 1e-12 * np.linalg.norm(step) * np.linalg.norm(change):
+        curvature = dot(step, change)
+        if curvature > 1e-12 * math.sqrt(dot(step, step) * dot(change, change)):
             self._pairs = [*self._pairs, (step, change, 1.0 / curvature)][-_MEMORY:]
 
     def direction(self, gradient: FloatArray, solve: Solve) -> FloatArray:
         """Return the direction of descent."""
         q, shares = gradient.copy(), []
         for step, change, scale in reversed(self._pairs):
-            shares.append(scale * np.vdot(step, q))
+            shares.append(scale * dot(step, q))
             q -= shares[-1] * change
         z = solve(q)
         for (step, change, scale), share in zip(self._pairs, reversed(shares), strict=True):
-            z += step * (share - scale * np.vdot(change, z))
+            z += step * (share - scale * dot(change, z))
         return -z
 
 
@@ -206,7 +208,7 @@ class Descent(Generic[P]):
         """Take one step; return False, and stay, where none makes the energy fall."""
         while True:
             direction = self._memory.direction(self._gradient, self._problem.solver(self.point))
-            descent = float(np.vdot(self._gradient, direction))
+            descent = dot(self._gradient, direction)
             self.release = -0.5 * descent
             new = self._search(direction, descent)
             if new is not None:
@@ -220,6 +222,15 @@ class Descent(Generic[P]):
         self.point, self._gradient = new, gradient
         self.history.append(new.energy)
         return True
+
+    def renew(self, *, forget: bool = False) -> None:
+        """Evaluate the present point again, as the energy has changed, and forget past corrections if the metric has."""
+        if forget:
+            self._memory = _Memory()
+        self.point = self._problem.at(self.point.positions)
+        self._gradient = self._problem.gradient(self.point)
+        self.history[-1] = self.point.energy
+        self.is_stuck = False
 
     def _search(self, direction: FloatArray, descent: float) -> P | None:
         """Halve a step until the energy falls enough. Where steps are short, the next one seldom is much longer."""
