@@ -22,6 +22,7 @@ from warpflat.model.membrane import step_matrix
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.model.strain import strain_energy
+from warpflat.solver.augmented_lagrangian import is_factored, relax_under_equations
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.relax import relax
@@ -75,7 +76,7 @@ def give_fullness(
     widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
     state = Relaxation(network, options, start=piece.positions @ widening, alignments=[alignment])
-    outcome = relax(state)
+    outcome = relax_under_equations(state).outcome if is_factored(network, options) else relax(state)
     positions = state.positions()
     stage = Stage(
         name="fullness",
@@ -83,7 +84,7 @@ def give_fullness(
         guard_energy_j=outcome.energies.guard,
         strain_energy_j=strain_energy(network, positions),
         steps=outcome.steps,
-        work_units=float(outcome.steps),
+        work_units=outcome.work_units,
         seconds=outcome.seconds,
         converged=outcome.converged,
         residual=outcome.residual,

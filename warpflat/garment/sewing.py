@@ -2,8 +2,8 @@
 
 Each edge of a seam has its partner on the other side, the same edge of the body: l_1 - r l_2 = 0, with r the wished
 ratio (1, or with ease). Constraints on borders and lines (`warpflat.garment.constraints`) are equations of the same
-kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k, so that the steps stay cheap. After each
-round the offset o grows by the residual c (augmented Lagrangian), until all residuals are within their tolerances.
+kind. Each equation c = 0 is held by 1/2 k (c + o)^2 with a finite stiffness k. After each round the offset o grows by the
+residual c (`warpflat.solver.augmented_lagrangian`), until all residuals are within their tolerances.
 
 **Costs.** The cost of a seam or a constraint, in joules, is half the work of its forces on the way from where the
 pieces lay on their own: 1/2 sum k (c + o) c_unsewn. Were the energy quadratic and the equations linear, these would add
@@ -13,7 +13,7 @@ up to the energy that all constraints together have cost; `Sewn.cost` is that en
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -21,7 +21,7 @@ import numpy as np
 import warp as wp
 
 from warpflat.core.activity import report_activity
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, equations_of_constraint, find_piece
@@ -35,7 +35,7 @@ from warpflat.model.constraint_equations import (
     stretch_equations,
 )
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.convergence import Outcome
+from warpflat.solver.augmented_lagrangian import ConstrainedOutcome, is_factored, relax_under_equations, stagnates
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
@@ -44,8 +44,8 @@ from warpflat.surface.falloff import falloff_weights
 __all__ = ["ConstraintResult", "SeamPair", "Sewn", "sew"]
 
 
-# Stiffness of an equation over the median spring of the cloth.
-_RELATIVE_STIFFNESS = 4.0
+# Stiffness of an equation over the median spring of the cloth: with a factor of all stiffnesses, and for plain steps.
+_RELATIVE_STIFFNESS, _STIFFNESS_FOR_STEPS = 100.0, 4.0
 # Steps of a round at most: the residuals of a whole seam take a dozen rounds, whether the cloth has come to rest before
 # the offsets grow or only begun to. After every few rounds the next ones become a quarter longer: offsets that follow
 # cloth that still swings keep it swinging.
@@ -181,7 +181,8 @@ def sew(
     if len(equations):
         thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
         median = float(np.median(network.spring_arrays.listed_stiffness))
-        stiffness = np.where(equations.soft > 0, equations.soft * thread, _RELATIVE_STIFFNESS * median)
+        relative = _RELATIVE_STIFFNESS if is_factored(network, options) else _STIFFNESS_FOR_STEPS
+        stiffness = np.where(equations.soft > 0, equations.soft * thread, relative * median)
         network.sew(
             equations.ends,
             equations.ratio,
@@ -193,19 +194,19 @@ def sew(
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
     alignments = [piece for name, piece in joined.upright.items() if name not in folds and name not in oriented]
     state = Relaxation(network, options, start=start, alignments=alignments)
-    outcome, residuals, satisfied, contradictory = _relax_in_rounds(state, equations, options)
+    ended = _relax(state, equations)
     seconds = time.perf_counter() - start_time
-    converged = outcome.converged and satisfied
-    sewn = joined.split(state, converged=converged, seconds=seconds, residual=outcome.residual)
+    converged = ended.outcome.converged and ended.satisfied
+    sewn = joined.split(state, converged=converged, seconds=seconds, residual=ended.outcome.residual)
     return Sewn(
         pieces=sewn,
         converged=converged,
-        contradictory=contradictory,
+        contradictory=ended.contradictory,
         steps=state.steps,
         energy_before=sum(_potential(piece.network, piece.positions) for piece in pieces.values()),
         energy_after=sum(_potential(piece.network, piece.positions) for piece in sewn.values()),
         results=(
-            *_constraint_results(state, equations, kinds, residuals, unsewn),
+            *_constraint_results(state, equations, kinds, ended.residuals, unsewn),
             *_fold_results(state, joined, folds, unsewn),
         ),
         seconds=seconds,
@@ -248,40 +249,48 @@ def _constraint_equations(
     return join_equations(equations), kinds, oriented
 
 
-def _relax_in_rounds(
-    state: Relaxation, equations: ConstraintEquations, options: RelaxOptions
-) -> tuple[Outcome, FloatArray, bool, bool]:
-    """Relax, let the offsets grow, and repeat until all is at rest and the equations hold in two rounds running.
-
-    Two rounds, since within the tolerances the energy may still change.
-
-    Returns:
-        The outcome of the last round, the residuals (#P [m]), whether the equations hold, and whether they contradict
-        each other.
-    """
-    seams = state.network.seams
-    if seams is None:
-        return relax(state), np.zeros(0), True, False
-    violations: list[float] = []
+def _relax(state: Relaxation, equations: ConstraintEquations) -> ConstrainedOutcome:
+    """Relax until all is at rest and the equations hold."""
     report_activity("sewing")
+    corrected = equations.soft == 0
+
+    def on_round(residuals: FloatArray) -> None:
+        farthest = np.abs(residuals[corrected]).max(initial=0.0)
+        report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
+
+    if is_factored(state.network, state.options):
+        return relax_under_equations(state, corrected, equations.violation, on_round=on_round)
+    if not len(equations):
+        return ConstrainedOutcome(outcome=relax(state), residuals=np.zeros(0), satisfied=True, contradictory=False)
+    return _relax_by_steps(state, corrected, equations.violation, on_round)
+
+
+def _relax_by_steps(
+    state: Relaxation,
+    corrected: BoolArray,
+    violation: Callable[[FloatArray], float],
+    on_round: Callable[[FloatArray], None],
+) -> ConstrainedOutcome:
+    """Relax by the paper's steps alone, let the offsets grow, and repeat until all is at rest and the equations hold in two rounds running.
+
+    See `relax_under_equations` for the arguments. Two rounds, since within the tolerances the energy may still change.
+    """
+    seams, options, violations = state.network.seams, state.options, list[float]()
+    assert seams is not None
     while True:
         steps = _STEPS_PER_ROUND + len(violations) // _ROUNDS_UNTIL_LONGER * _STEPS_PER_ROUND // 4
         state.options = replace(options, max_steps=min(options.max_steps, state.steps + steps))
         outcome, residuals = relax(state), _residuals(state)
-        violations.append(equations.violation(residuals))
-        farthest = np.abs(np.where(equations.soft > 0, 0.0, residuals)).max(initial=0.0)
-        report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
+        violations.append(violation(residuals))
+        on_round(residuals)
         done = outcome.converged and len(violations) > 1 and max(violations[-2:]) <= 1.0
-        contradictory = not done and _stagnates(violations)
+        contradictory = not done and stagnates(violations, _PATIENCE)
         if done or contradictory or state.steps >= options.max_steps:
-            return outcome, residuals, violations[-1] <= 1.0, contradictory
-        seams.offset.assign(seams.offset.numpy() + np.where(equations.soft > 0, 0.0, residuals))
-
-
-def _stagnates(violations: Sequence[float]) -> bool:
-    """Return whether the equations no longer come nearer to holding, by their violation after each round."""
-    before, lately = violations[:-_PATIENCE], violations[-_PATIENCE:]
-    return bool(before) and min(lately) > max(0.9 * min(before), 1.0)
+            satisfied = violations[-1] <= 1.0
+            return ConstrainedOutcome(
+                outcome=outcome, residuals=residuals, satisfied=satisfied, contradictory=contradictory
+            )
+        seams.offset.assign(seams.offset.numpy() + np.where(corrected, residuals, 0.0))
 
 
 def _constraint_results(
