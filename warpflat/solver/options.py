@@ -28,7 +28,7 @@ class RelaxOptions:
             coarser levels their work counts in steps of the piece's own mesh, and a cycle that has begun is completed.
         check_every: steps between two convergence checks.
         kinetic_damping: set velocities to zero when the forces begin to brake the motion.
-        solver: "multilevel" (see `warpflat.solver.multigrid.solve`; sewn garments take plain steps all the same), or
+        solver: "multilevel" (see `warpflat.flattening.relax_pieces`), or
             "plain", the paper's steps alone.
         gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.solver.contact`), which acts where its border
             comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
