@@ -18,7 +18,7 @@ from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
 from warpflat.mannequin.nearest_size import SizeDifference, nearest_size
 from warpflat.mannequin.profiles import convex_girth
-from warpflat.mannequin.table_body import blueprint_from_measurements
+from warpflat.mannequin.table_body import blueprint_from_measurements, replace_chest
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
@@ -124,8 +124,9 @@ class Mannequin:
         wished = {"chest_width": "chest front", "back_width": "chest back"}
         lengths = dict(measurements.lengths)
         before: dict[str, tuple[float, float]] = {}
+        blueprint = blueprint_from_measurements(measurements)
         for _ in range(_ROUNDS):
-            vertices = build_vertices(layout, blueprint_from_measurements(replace(measurements, lengths=lengths)))
+            vertices = build_vertices(layout, replace_chest(blueprint, replace(measurements, lengths=lengths)))
             worst = 0.0
             for name, line in wished.items():
                 found = polyline_length(vertices[layout.lines[line]])

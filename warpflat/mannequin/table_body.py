@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -15,7 +17,7 @@ from warpflat.mannequin.measurements import Measurements, size_tables
 from warpflat.mannequin.profiles import Section, section_curve
 from warpflat.mannequin.table_legs import legs_from_measurements
 
-__all__ = ["PRINCESS", "blueprint_from_measurements"]
+__all__ = ["PRINCESS", "blueprint_from_measurements", "replace_chest"]
 
 #: Where the princess lines run: distance from the centre as a share of the bust points', by level, front and back.
 PRINCESS = {
@@ -48,6 +50,12 @@ def blueprint_from_measurements(measurements: Measurements) -> Blueprint:
         neck=measurements.lengths["neck"],
         collar=_collar(measurements),
     )
+
+
+def replace_chest(blueprint: Blueprint, measurements: Measurements) -> Blueprint:
+    """Return the blueprint with shoulders and arms to other widths across chest and back; trunk and legs are as they were."""
+    quarters = _quarters(measurements, blueprint.profile)
+    return replace(blueprint, quarters=quarters, arms=_arms(measurements, quarters))
 
 
 def _profiles(m: Measurements) -> Callable[[float], Profile]:
@@ -112,7 +120,8 @@ def _profiles(m: Measurements) -> Callable[[float], Profile]:
             princess={"front-left": ahead, "back-left": behind, "back-right": behind, "front-right": ahead},
         )  # fmt: skip
 
-    return profile
+    # The same heights are asked for again and again.
+    return functools.lru_cache(maxsize=1024)(profile)
 
 
 def _quarters(m: Measurements, profile: Callable[[float], Profile]) -> dict[str, QuarterCurves]:
