@@ -28,9 +28,11 @@ sys.exit(program())
 """
 
 
-def ended(code: str, folder: Path) -> tuple[int, str]:
-    """Exit code and standard error of a process that runs this code."""
-    done = subprocess.run([sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False)
+def ended(code: str, folder: Path, *, within: float | None = None) -> tuple[int, str]:
+    """Exit code and standard error of a process that runs this code, in so many seconds."""
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=folder, capture_output=True, text=True, check=False, timeout=within
+    )
     return done.returncode, done.stderr
 
 
@@ -68,7 +70,7 @@ def test_a_signal_in_a_destructor_is_not_lost(tmp_path: Path):
         "try:\n    with stop_on_signals():\n        Ends()\n        time.sleep(30)\n"
         "except Stopped as stopped: sys.exit(stopped.code)"
     )
-    assert ended(code, tmp_path) == (143, "")
+    assert ended(code, tmp_path, within=20) == (143, "")
 
 
 def test_a_signal_in_a_module_that_swallows_all_exceptions_is_not_lost(tmp_path: Path):
@@ -80,7 +82,7 @@ def test_a_signal_in_a_module_that_swallows_all_exceptions_is_not_lost(tmp_path:
         "try:\n    with stop_on_signals():\n        import swallowing\n        time.sleep(30)\n"
         "except Stopped as stopped: sys.exit(stopped.code)"
     )
-    assert ended(code, tmp_path) == (143, "")
+    assert ended(code, tmp_path, within=20) == (143, "")
 
 
 def test_an_ignored_signal_stays_ignored(tmp_path: Path):

@@ -153,7 +153,7 @@ def test_datums_of_their_own_and_a_chosen_one():
     line = surfaces[1].lines["centre"]
     given, chosen = flatten_all(surfaces[::-1], fabric=CLOTH, datum=[line, None], device=DEVICE)
     np.testing.assert_array_equal(given.datum, line)
-    assert chosen.notes[-1].startswith("datum chosen")
+    assert chosen.notes[0].startswith("datum chosen")
 
 
 def test_what_is_told_on_the_way():

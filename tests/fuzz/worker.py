@@ -22,6 +22,9 @@ from typing import Any
 MEMORY = 6 * 1024**3
 """Address space of the process [B]; a third of it is taken by the libraries."""
 
+GRACE = 2.0
+"""Seconds over its limit after which a case hangs; less than what `promise.Worker` waits for."""
+
 
 def peak_memory(*, reset: bool = False) -> int:
     """The most memory [B] that this process has had in use since the last reset; 0 where the system does not tell."""
@@ -44,7 +47,9 @@ def run_case(case: dict[str, Any]) -> dict[str, Any]:
         os.dup2(file, number)
         os.close(file)
     before = peak_memory(reset=True)
-    faulthandler.dump_traceback_later(case["seconds"], file=2)  # tells where a case hangs
+    # Tells where a case hangs. It reads the frames of a thread that runs on, which crashes Python now and then: not before
+    # the case is sure to have hung.
+    faulthandler.dump_traceback_later(case["seconds"] + GRACE, file=2)
     started = time.perf_counter()
     try:
         with warnings.catch_warnings():  # each case warns anew

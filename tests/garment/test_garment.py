@@ -230,7 +230,7 @@ DRESS = "form = 'dress'\n[mannequin]\nsize = 'EU 38'\n"
         ("[mannequin]\nsize = 'EU 38'\n[form.pieces]\nx = { bricks = ['wast-hip/front-*'] }\n", r"form: .*wast-hip"),
         ("form = 'bodice'\n[mannequin]\nscan = 'nobody.obj'\n", r"mannequin: .*nobody.obj: does not exist"),
         (
-            DRESS + "[[seams]]\nname = 'sid left'\nease = 0.02\n",
+            DRESS + "[[seams]]\nname = 'sid left'\nfullness = 0.02\n",
             r"seams: there is no seam 'sid left'; did you mean 'side left'",
         ),
         (
@@ -265,7 +265,10 @@ def test_a_wrong_body_or_form_is_one_line(tmp_path: Path, text: str, message: st
         ({"form": 3}, "form is of type int; it must be what Mannequin.form gives"),
         ({"mannequin": None}, "mannequin is of type NoneType; it must be a Mannequin"),
         ({"wishes": "side"}, "wishes is of type str; it must be a list"),
-        ({"constraints": ["x"]}, r"constraints\[0\] is of type str; it must be a Straight, FixedLength or Symmetric"),
+        (
+            {"constraints": ["x"]},
+            r"constraints\[0\] is of type str; it must be a Straight, FixedLength, Symmetric or DartMouth",
+        ),
         ({"callback": 3}, "callback is of type int"),
     ],
 )

@@ -244,10 +244,10 @@ def test_mistakes_are_found_before_anything_is_flattened(tmp_path: Path):
 
 def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     text = (Path(__file__).parents[2] / "README.md").read_text(encoding="utf-8")
-    piece, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
+    piece, steps, garment = re.findall(r"```python\n(.*?)```", text, flags=re.DOTALL)
     (of_piece,) = re.findall(r"`(warpflat\.surface_files\(.*?\))`", text)
     monkeypatch.chdir(tmp_path)
-    exec(f"{piece}\n{of_piece}", {})
+    exec(f"{piece}\n{of_piece}\n{steps}", {})
     exec(garment, {})
     for name, objects in (("bodice", {"bodice.obj"}), ("dress", {"front_centre.obj", "back_centre.obj"})):
         files = {path.name for path in (tmp_path / "out" / name).iterdir()}
@@ -257,8 +257,9 @@ def test_the_scripts_of_the_readme_run_and_write_what_they_say(tmp_path: Path, m
 
 def test_what_cannot_be_drawn_is_a_note(tmp_path: Path):
     flat = flatten(make_shape("dome", resolution=7))
-    flat.positions[0] = flat.positions[-1] + [0.1, 0.1]
-    written = surface_files([flat], tmp_path, name="cap")
+    torn = flat.positions.copy()
+    torn[0] = torn[-1] + [0.1, 0.1]
+    written = surface_files([replace(flat, positions=torn)], tmp_path, name="cap")
     assert written.files == ()
     assert len(written.notes) == 1
     assert "no pattern was drawn" in written.notes[0]
@@ -298,8 +299,11 @@ def test_what_lies_over_itself_in_the_plane_is_said_in_the_metrics_and_by_the_ex
 def test_a_ragged_border_gets_a_wider_tolerance_and_says_so(tmp_path: Path):
     flat = flatten(make_shape("dome", size=0.2, resolution=41))
     rim = np.unique(np.concatenate([flat.surface.lines[side] for side in ("left", "right", "top", "bottom")]))
-    flat.positions[rim] += np.random.default_rng(1).normal(0, 4e-4, (len(rim), 2))
-    written = surface_files([flat], tmp_path, name="cap", options=PatternOptions(formats=("json",)))
+    ragged = flat.positions.copy()
+    ragged[rim] += np.random.default_rng(1).normal(0, 4e-4, (len(rim), 2))
+    written = surface_files(
+        [replace(flat, positions=ragged)], tmp_path, name="cap", options=PatternOptions(formats=("json",))
+    )
     assert any("border is ragged" in note for note in written.notes)
     (piece,) = read_pattern_json(tmp_path / "pattern.json").pieces[""]
     assert sum(len(edge.curve.bezier) for edge in piece.edges) < 60

@@ -4,6 +4,7 @@ import json
 import os
 import re
 import runpy
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,7 @@ from warpflat.core.errors import InputError
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.library import find_fabric
 from warpflat.scene.frames import FrameSchedule
-from warpflat.scene.load import load_scene, scene_fabric
+from warpflat.scene.load import Scene, load_scene, scene_fabric
 from warpflat.scene.run import run_scene
 from warpflat.scene.schema import OutputTable
 from warpflat.scene.surface import scene_surface
@@ -272,6 +273,14 @@ def test_a_run_that_meets_its_step_limit_says_so(tmp_path: Path):
 # --- the shipped scenes
 
 
+def without_drawings(scene: Scene) -> Scene:
+    """A garment's scene whose only files are pieces and measures: they take two thirds of its time, and one scene has them all."""
+    settings = scene.settings
+    output = settings.output.model_copy(update={"frames": 0, "picture": False})
+    pattern = settings.pattern.model_copy(update={"formats": ["json"]})
+    return replace(scene, settings=settings.model_copy(update={"output": output, "pattern": pattern}))
+
+
 @pytest.mark.parametrize("path", sorted(SCENES.glob("*.toml")), ids=lambda path: path.stem)
 def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     text = path.read_text()
@@ -279,6 +288,8 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
     if "WARPFLAT_DATA" in text and not DATA:
         pytest.skip("WARPFLAT_DATA is not set: the folder with the real meshes")
     scene = load_scene(path)
+    if scene.settings.mannequin is not None and path.stem != "gathered_dress":
+        scene = without_drawings(scene)
     result = run_scene(scene, tmp_path)
     for name, piece in result.metrics["pieces"].items():
         assert piece["stages"][-1]["converged"], name
@@ -287,7 +298,7 @@ def test_every_shipped_scene_converges_unfolded(path: Path, tmp_path: Path):
         assert result.metrics["pieces"][path.stem]["length_error"] < 1e-6
     for name in result.files:
         assert (tmp_path / name).stat().st_size > 0
-    assert validate_usd(tmp_path / "frames.usdc") == []
+    assert "frames.usdc" not in result.files or validate_usd(tmp_path / "frames.usdc") == []
     assert json.loads((tmp_path / "metrics.json").read_text())["pieces"].keys() == result.metrics["pieces"].keys()
 
 

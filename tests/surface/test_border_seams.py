@@ -1,4 +1,4 @@
-"""Seams that are named on one surface: sides of other vertices, ease, what is refused."""
+"""Seams that are named on one surface: sides of other vertices, fullness, what is refused."""
 
 from __future__ import annotations
 
@@ -134,8 +134,8 @@ def scene(**tables: object):
     return make_scene({**CONE, **QUIET, **tables}, name="trial", folder=Path(), where="trial.toml")
 
 
-def test_a_scene_names_a_seam_with_ease(tmp_path: Path):
-    asked = [{"name": "underarm", "sides": ["left", "trial.right"], "ease": 0.02, "longer": "left"}]
+def test_a_scene_names_a_seam_with_fullness(tmp_path: Path):
+    asked = [{"name": "underarm", "sides": ["left", "trial.right"], "fullness": 0.02, "longer": "left"}]
     result = run_scene(scene(seams=asked), tmp_path)
     (seam,) = result.metrics["seams"]
     assert seam["sides"] == ["trial.left", "trial.right"]
@@ -156,7 +156,7 @@ def test_a_scene_names_a_seam_with_ease(tmp_path: Path):
         ([{"name": "s", "sides": ["left", "left"]}], r"seams\[0\]: both sides are 'left'"),
         ([{"name": "s", "sides": ["left"]}], r"seams\[0\].sides: "),
         (
-            [{"name": "s", "sides": ["left", "right"], "longer": "top", "ease": 0.1}],
+            [{"name": "s", "sides": ["left", "right"], "longer": "top", "fullness": 0.1}],
             "longer is 'top', not one of its sides",
         ),
         ([{"name": "s", "sides": ["left", "right"]}] * 2, r"seams\[1\]: seam 's' is named twice"),
@@ -164,7 +164,7 @@ def test_a_scene_names_a_seam_with_ease(tmp_path: Path):
             [{"name": "s", "sides": ["left", "bottom"]}],
             r"trial.toml: seams: seam 's': 'left' is .* mm long and 'bottom'",
         ),
-        ([{"name": "s", "ease": 0.1}], r"seams\[0\]: on a \[surface\] give the two lines"),
+        ([{"name": "s", "fullness": 0.1}], r"seams\[0\]: on a \[surface\] give the two lines"),
     ],
 )
 def test_a_wrong_seam_is_told_in_one_line(tmp_path: Path, seams: list[dict[str, object]], message: str):
@@ -194,10 +194,10 @@ def test_a_band_free_of_strain_is_not_at_rest_while_a_seam_pulls(band: Flattenin
     assert right / left == pytest.approx(1.001, abs=2e-5)
 
 
-def test_ease_on_a_cut_piece_is_refused(tmp_path: Path):
-    asked = [{"name": "underarm", "sides": ["left", "right"], "ease": 0.02}]
+def test_fullness_on_a_cut_piece_is_refused(tmp_path: Path):
+    asked = [{"name": "underarm", "sides": ["left", "right"], "fullness": 0.02}]
     cuts = [{"line": "centre", "part": [0.0, 0.4]}]
-    with pytest.raises(InputError, match="seam 'underarm': ease and gathers need a piece that is not cut"):
+    with pytest.raises(InputError, match="seam 'underarm': fullness and gathers need a piece that is not cut"):
         run_scene(scene(seams=asked, cuts=cuts), tmp_path)
 
 
@@ -207,7 +207,7 @@ def test_a_forms_seams_have_their_sides():
             {
                 "mannequin": {"size": "EU 38"},
                 "form": "dress",
-                "seams": [{"name": "side left", "ease": 0.1, "sides": ["front.side left", "back.side left"]}],
+                "seams": [{"name": "side left", "fullness": 0.1, "sides": ["front.side left", "back.side left"]}],
             },
             name="trial",
             folder=Path(),

@@ -81,7 +81,11 @@ def stop_on_signals() -> Iterator[None]:
 
         def again() -> None:
             waiting.clear()
-            signal.raise_signal(number)
+            if hasattr(signal, "pthread_kill"):
+                # A call in which the main thread waits ends early only by a signal to that thread.
+                signal.pthread_kill(threading.main_thread().ident or 0, number)
+            else:
+                signal.raise_signal(number)
 
         if not waiting:
             waiting.append(threading.Timer(_LATER, again))

@@ -17,7 +17,6 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.launch import launch_each
 from warpflat.core.polyline import arc_lengths
 from warpflat.flattening.harmonic_layout import harmonic_layout, refuse_tubes
-from warpflat.flattening.nearly_closed import nearly_closed_notes
 from warpflat.kernels.grid_lists import lay_profiles
 from warpflat.solver.multigrid.coarsen import Coarsening, coarsenings_of
 from warpflat.surface.cells import CellArrays, make_cells
@@ -97,7 +96,7 @@ def develop(surface: Surface, datum: IntArray) -> Development:
     Raises:
         InputError: the surface is a closed tube (two borders around it), which no layout in the plane can be.
     """
-    notes = nearly_closed_notes(surface)
+    notes: list[str] = []
     cells = make_cells(surface)
     flat = flat_layout(surface, datum)
     if flat is not None and len(_mirrored(cells, flat)) == 0:

@@ -20,6 +20,7 @@ from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
 from warpflat.flattening.develop import Development
+from warpflat.flattening.nearly_closed import nearly_closed_notes
 from warpflat.flattening.progress import Progress, Stage
 from warpflat.flattening.relax_pieces import RelaxationTask, RelaxedPiece, keep_apart, relax_pieces
 from warpflat.flattening.result import Flattening
@@ -152,7 +153,7 @@ class DevelopedPiece:
         datum_name: its name, or how it was chosen.
         development: its first layout, shrunk by the stretch with which it is to be worn.
         network: measured in the development.
-        notes: on the datum.
+        notes: on the datum, and on a piece that is nearly closed.
         seconds: time spent so far.
     """
 
@@ -202,7 +203,7 @@ def develop_piece(
         datum_name=line_name,
         development=development,
         network=network,
-        notes=tuple(notes),
+        notes=(*notes, *nearly_closed_notes(surface)),
         seconds=time.perf_counter() - begun,
     )
 

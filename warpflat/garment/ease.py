@@ -91,7 +91,7 @@ def _seam_name(
     if not name:
         raise InputError(f"there is no seam {wish.name!r}; {nearest(wish.name, by_name)}")
     if name in done:
-        raise InputError(f"seam {name!r} is named twice; give its ease or gather once")
+        raise InputError(f"seam {name!r} is named twice; give its fullness or gather once")
     if not 1.0 <= wish.factor <= 5.0:
         raise InputError(f"seam {name!r}: one side is {wish.factor:g} times as long as the other; must be 1 to 5")
     return name

@@ -209,7 +209,7 @@ def flatten_form(
         callback: called with the piece's name and its `Progress` after every step of its own.
         sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
             keeps its own minimum.
-        wishes: ease and gathers of seams.
+        wishes: fullness and gathers of seams.
         constraints: on edges and lines of pieces.
 
     Raises:

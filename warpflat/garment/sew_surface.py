@@ -116,7 +116,7 @@ def _with_fullness(result: Flattening, seams: Sequence[SurfaceSeam], options: Re
     if result.cuts:
         name = next(seam.named.name for seam in seams if seam.named.factor > 1.0)
         raise InputError(
-            f"seam {name!r}: ease and gathers need a piece that is not cut; leave out the cuts or the ease"
+            f"seam {name!r}: fullness and gathers need a piece that is not cut; leave out the cuts or the fullness"
         )
     plain = [
         ids

@@ -24,9 +24,9 @@ def shaped_form(layout: Layout, form: Form, shape: Literal["none", "darts", "pri
     Raises:
         InputError: an unknown brick.
     """
+    bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
     if shape == "none":
         return form
-    bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
     if shape == "darts":
         darts = standard_darts(layout, bricks)
         # Legs are straight where the cloth hangs straight, over the hollow under the bust.

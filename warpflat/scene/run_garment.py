@@ -55,7 +55,8 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
         form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
     with errors_named(f"{scene.where}: form"):
         form = shaped_form(mannequin.layout, form, settings.shape)
-    with errors_named(f"{scene.where}: cuts"):
+    # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
+    with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
         form = replace(form, darts=_with_cuts(form.darts, settings.cuts))
         return mannequin, mannequin.form(form, half=settings.half)
 
@@ -93,7 +94,7 @@ class GarmentPlan:
         scene: the scene.
         mannequin, form: the body, and the pieces on it.
         drawing: options of the pattern files.
-        wishes: ease and gathers of seams.
+        wishes: fullness and gathers of seams.
         constraints: on edges and lines.
         settings: further arguments of :func:`warpflat.garment.garment.flatten_form`.
     """

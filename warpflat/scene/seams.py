@@ -14,7 +14,7 @@ __all__ = ["scene_constraints", "scene_surface_seams", "scene_wishes"]
 
 
 def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
-    """Return the ease and gathers that a scene wants of a form's seams."""
+    """Return the fullness and gathers that a scene wants of a form's seams."""
     return [
         SeamWish(
             name=table.name,
