@@ -44,7 +44,8 @@ def pattern_girths(
     """Return the entry `girths` of `metrics.json` for every closed level of the trunk that the pieces go around.
 
     The pattern's girth is the length of the level's line in the pieces: a dart on the way adds nothing, nor does a seam. Where
-    two pieces meet along the level it is the mean of both. A half piece counts twice.
+    two pieces meet along the level it is the mean of both. A half piece counts twice. Where the line slopes on the form, as at
+    the bust under a lowered armhole, each of its edges counts by its level share, as the tapes around body and form are level.
 
     Args:
         mannequin: the body.
@@ -61,7 +62,9 @@ def pattern_girths(
         own = [_length(lengths, a, b) or _length(lengths, *layout.mirror[[a, b]]) for a, b in itertools.pairwise(ring)]
         if not all(own):
             continue
-        body, pattern = convex_girth(mannequin.vertices[row]), float(sum(own))
+        sides = np.diff(form.vertices[ring], axis=0)
+        level_share = np.linalg.norm(sides[:, [0, 2]], axis=1) / np.linalg.norm(sides, axis=1)
+        body, pattern = convex_girth(mannequin.vertices[row]), float(np.dot(own, level_share))
         found[level] = {
             "body_m": body,
             "form_m": convex_girth(form.vertices[row]),

@@ -175,13 +175,15 @@ def _move_rings(
     # Against height, not row number: the spacing of rows changes from one band to the next.
     y = body[layout.rings[:, 0], 1]
     out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
+    # The rings around both legs cut their corners: it is the legs that push a skirt out.
+    solid = np.unique(np.concatenate([ids.ravel(), *(grid.ravel() for grid in layout.legs.values())]))
     for pair in ruled:
         if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
-            _rule(out, layout.rings, {level: layout.level_row[level] for level in RING_LEVELS}, pair, body)
+            _rule(out, layout.rings, {level: layout.level_row[level] for level in RING_LEVELS}, pair, body[solid])
 
 
-def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], body: FloatArray) -> None:
-    """Hang the rows between two levels of trunk or leg straight, over whatever of the body stands out between them."""
+def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], solid: FloatArray) -> None:
+    """Hang the rows between two levels of trunk or leg straight, over points of the body that stand out between them."""
     for level in pair:
         if level not in row_of:
             raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, row_of)}")
@@ -192,8 +194,9 @@ def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tupl
     first, last = out[ids[0]], out[ids[-1]]
     share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
     straight = first + share[:, None, None] * (last - first)
-    between = body[ids[1:-1]].reshape(-1, 3)
-    if len(between):
+    if len(ids) > 2:
+        low, high = sorted((first[:, 1].mean(), last[:, 1].mean()))
+        between = solid[(solid[:, 1] > low) & (solid[:, 1] < high)]
         ends = np.concatenate([first, last])
         inner = straight[1:-1]
         middles = inner.mean(axis=1, keepdims=True) * [1.0, 0.0, 1.0] + inner * [0.0, 1.0, 0.0]
@@ -369,7 +372,13 @@ def _move_legs(
         out[fork] = body[fork] + move[fork]
         for pair in ruled:
             if set(pair) & set(LEG_LEVELS):
-                _rule(out, grid, {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}, pair, body)
+                _rule(
+                    out,
+                    grid,
+                    {level: layout.leg_row[level] for level in LEG_LEVELS[1:]},
+                    pair,
+                    body[grid[1:].reshape(-1)],
+                )
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:
