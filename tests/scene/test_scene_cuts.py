@@ -211,7 +211,8 @@ def test_one_film_tells_the_whole_story(tmp_path: Path):
 
 
 def test_a_cut_from_border_to_border_gives_two_pieces_with_files_of_their_own(tmp_path: Path):
-    result = run_scene(scene(cuts=[{"line": "centre"}], output={"frames": 0}), tmp_path)
+    some = {"max_steps": 500}
+    result = run_scene(scene(cuts=[{"line": "centre"}], relax=some, output={"frames": 0}), tmp_path)
     assert set(result.metrics["pieces"]) == {"trial.left", "trial.right"}
     assert {"trial.left.obj", "trial.right.obj", "picture.png"} <= set(result.files)
 
