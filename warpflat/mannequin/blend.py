@@ -372,9 +372,7 @@ def _move_legs(
                 _rule(out, grid, {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}, pair, body)
 
 
-def _leg_move(
-    row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float
-) -> FloatArray:
+def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:
     """Return the displacement of a leg's closed row; its inside runs midway between the leg and the midplane (`sign`: +1 left)."""
     if other is not None:
         other = other + row.mean(axis=0) - other.mean(axis=0)
