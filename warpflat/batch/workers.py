@@ -92,7 +92,7 @@ def run_on_cluster(
 
 def _connect(address: str) -> Client:
     try:
-        return Client(address, timeout=_PATIENCE, set_as_default=False)
+        return Client(address, timeout=_PATIENCE)
     except (OSError, TimeoutError, ValueError) as error:
         raise InputError(
             f"no Dask scheduler answers at {address} ({type(error).__name__}); start one with `dask scheduler`, and give its address "
