@@ -19,10 +19,12 @@ __all__ = ["BatchIndex"]
 # The files are written again at most so often while tasks come in [s].
 _EVERY = 2.0
 _FITS = {None: "", True: "yes", False: "no"}
+_NAMES = ("scene", "body", "fabric", "override")
 _COLOURS = {AT_REST: "good", NOT_AT_REST: "bad", ERROR: "bad", SET_ASIDE: "bad"}
 _STYLE = """
 main { max-width: none; } td, th { vertical-align: middle; } th { cursor: pointer; user-select: none; }
-th:hover { color: var(--ink); } th[aria-sort=ascending]::after { content: " ↑"; } th[aria-sort=descending]::after { content: " ↓"; }
+th.text { text-align: left; } th:hover { color: var(--ink); } th[aria-sort=ascending]::after { content: " ↑"; }
+th[aria-sort=descending]::after { content: " ↓"; }
 td img { height: 90px; width: auto; margin: 0; border-radius: 4px; } td.message { white-space: normal; min-width: 240px; max-width: 420px; }
 """
 
@@ -87,41 +89,60 @@ def _table(rows: Sequence[Row]) -> str:
 
 def _page(rows: Sequence[Row]) -> str:
     levels = _levels(rows)
-    head = ["", "scene", "body", "fabric", "override", "status", "strain energy [mJ]", "fits"]
-    head += [*(f"{level} [cm]" for level in levels), "time [s]", "message"]
-    counts = {status: sum(row.status == status for row in rows) for status in (AT_REST, *_COLOURS, TO_DO)}
+    columns = [
+        _column("", [row.task.key for row in rows], [_picture(row) for row in rows]),
+        *(_column(name, [str(getattr(row.task, name)) for row in rows]) for name in _NAMES),
+        _column("status", [row.status for row in rows], [_status(row) for row in rows]),
+        _numbers("strain energy [mJ]", [row.strain_energy_j for row in rows], 1e3, ".4g"),
+        _column("fits", [_FITS[row.fits] for row in rows]),
+        *(_numbers(f"{level} [cm]", [row.girths_m.get(level) for row in rows], 100.0, ".1f") for level in levels),
+        _numbers("time [s]", [row.seconds for row in rows], 1.0, ".1f"),
+        _column("message", [row.message for row in rows]),
+    ]
+    head, *lines = zip(*filter(None, columns), strict=True)
+    body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
+    counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
     told = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
     style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
     script = resources.files("warpflat.batch").joinpath("data", "sort.js").read_text(encoding="utf-8")
-    cells = "".join(f"<th>{escape(name)}</th>" for name in head)
-    body = "\n".join(_html_row(row, levels) for row in rows)
     return (
         '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>warpflat batch</title>'
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
         f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(told)}. '
         "Girths are of the pattern. A click on a heading sorts.</p>"
-        f'<div class="scroll"><table><thead><tr>{cells}</tr></thead><tbody>\n{body}\n</tbody></table></div></main>'
+        f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div></main>'
         f"<script>{script}</script></body></html>\n"
     )
 
 
-def _html_row(row: Row, levels: Sequence[str]) -> str:
-    task, key = row.task, row.task.key
-    target = f"{key}/review.html" if "review.html" in row.files else f"{key}/"
-    picture = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
-    first = f'<a href="{target}">{picture}</a>' if row.files else key
-    words = [_text(word) for word in (task.scene, task.body, task.fabric, task.override)]
-    status = f'<td class="text {_COLOURS.get(row.status, "")}" data-value="{row.status}">{row.status}</td>'
-    energy = _number(None if row.strain_energy_j is None else 1e3 * row.strain_energy_j, ".4g")
-    girths = [_number(None if level not in row.girths_m else 100 * row.girths_m[level], ".1f") for level in levels]
-    message = f'<td class="text message" data-value="{escape(row.message)}">{escape(row.message)}</td>'
-    cells = [*words, status, energy, _text(_FITS[row.fits]), *girths, _number(row.seconds, ".1f"), message]
-    return f'<tr><td data-value="{key}">{first}</td>{"".join(cells)}</tr>'
+def _column(name: str, values: Sequence[str], shown: Sequence[str] | None = None) -> list[str]:
+    """Return the heading and the cells of a column of text; nothing if no cell says anything."""
+    if not any(values):
+        return []
+    cells = zip(values, shown or [escape(value) for value in values], strict=True)
+    kind = f"text {name}".strip()
+    return [
+        f'<th class="text">{name}</th>',
+        *(f'<td class="{kind}" data-value="{escape(value)}">{words}</td>' for value, words in cells),
+    ]
 
 
-def _text(word: str) -> str:
-    return f'<td class="text" data-value="{escape(word)}">{escape(word)}</td>'
+def _numbers(name: str, values: Sequence[float | None], unit: float, form: str) -> list[str]:
+    """Return the heading and the cells of a column of numbers; nothing if there is none."""
+    if all(value is None for value in values):
+        return []
+    cells = ['data-value="">' if value is None else f'data-value="{value!r}">{unit * value:{form}}' for value in values]
+    return [f"<th>{escape(name)}</th>", *(f"<td {cell}</td>" for cell in cells)]
 
 
-def _number(value: float | None, form: str) -> str:
-    return '<td data-value=""></td>' if value is None else f'<td data-value="{value!r}">{value:{form}}</td>'
+def _picture(row: Row) -> str:
+    key = row.task.key
+    if not row.files:
+        return key
+    target = "review.html" if "review.html" in row.files else ""
+    shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
+    return f'<a href="{key}/{target}">{shown}</a>'
+
+
+def _status(row: Row) -> str:
+    return f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>'

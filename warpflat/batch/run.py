@@ -58,6 +58,10 @@ def run_batch(
                 index.add(row)
                 index.write_if_due()
                 on_progress(done, before)
+    except BaseException:
+        for task in todo:  # what workers have finished meanwhile
+            index.add(read_row(task, folder) or Row(task=task))
+        raise
     finally:
         index.write()
     return index.rows

@@ -59,7 +59,7 @@ def run_on_workers(tasks: Sequence[Task], out: Path, count: int) -> Iterator[Row
             threads_per_worker=1,
             processes=True,
             memory_limit=MEMORY_LIMIT // count,
-            dashboard_address=None,
+            dashboard_address="127.0.0.1:0",
             silence_logs=logging.CRITICAL,
             env=_ONE_THREAD,
         ) as cluster,

@@ -38,6 +38,8 @@ def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, qui
     """Run many scenes: bodies, fabrics and overrides of a batch file.
 
     A task whose result is there is not run again. Ctrl-C keeps what is done, and the same command goes on from there.
+    A task that fails ends none of the others; the exit code is 1 then.
+
     Several workers and a scheduler need Dask: pip install "warpflat[batch]".
 
     \b
