@@ -68,7 +68,9 @@ def timed(scene: Scene, folder: Path, repeats: int, **output: Any) -> float:
 def main() -> None:
     """Print a row per scene."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("scenes", nargs="*", type=Path, default=sorted(SCENES.glob("*.toml")))
+    parser.add_argument(
+        "scenes", nargs="*", type=Path, default=sorted(set(SCENES.glob("*.toml")) - set(SCENES.glob("batch_*.toml")))
+    )
     parser.add_argument("--repeats", type=int, default=2)
     given = parser.parse_args()
     print(

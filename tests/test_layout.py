@@ -36,7 +36,8 @@ ROOMS = {
     "draping": "core surface fabric model solver export flattening mannequin garment kernels",
     "review": "core surface export",
     "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
+    "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene batch",
     "kernels": "",
 }
 

@@ -13,6 +13,7 @@ from typing import Any, TextIO
 import click
 
 from warpflat._version import __version__
+from warpflat.cli.batch import batch
 from warpflat.cli.compare import compare
 from warpflat.cli.cuts import cuts
 from warpflat.cli.drape import drape
@@ -66,6 +67,7 @@ def cli(context: click.Context) -> None:
       warpflat mannequin --size "EU 38"                   a dress form, into out/mannequin
       warpflat drape scenes/basic_block.toml              sewn and worn again: where does it fit?
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
+      warpflat batch scenes/batch_sizes.toml              many bodies and fabrics
       warpflat review out/dome                            one page to review a run
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
@@ -74,7 +76,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, drape, mannequin, compare, fabrics, cuts, export, review):
+for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review):
     cli.add_command(_command)
 
 

@@ -5,6 +5,7 @@ Warp compiles a module when its first kernel is launched, one after the other, a
 
 from __future__ import annotations
 
+import pkgutil
 import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -18,7 +19,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory
 from warpflat.core.threads import thread_count
 
-__all__ = ["compile_common_modules", "kernel_cache_errors", "start_warp"]
+__all__ = ["compile_all_modules", "compile_common_modules", "kernel_cache_errors", "start_warp"]
 
 # Modules that nearly every run needs. Those that take longest come first, so that no thread is left with one at the end.
 _COMMON_MODULES = (
@@ -67,6 +68,28 @@ def compile_common_modules(module: wp.Module, device: wp.Device) -> None:
         for each in names:
             import_module(each)
         wp.force_load(device, [wp.get_module(each) for each in names], max_workers=threads)
+
+
+def compile_all_modules() -> None:
+    """Compile all kernels for the CPU that are not compiled yet, so that processes started later find them.
+
+    Raises:
+        InputError: the kernel cache cannot be written or has no room.
+    """
+    import warpflat.kernels
+
+    start_warp()
+    package = warpflat.kernels.__name__
+    modules = [
+        wp.get_module(import_module(f"{package}.{found.name}").__name__)
+        for found in pkgutil.iter_modules(warpflat.kernels.__path__)
+    ]
+    with kernel_cache_errors():
+        missing = [module for module in modules if module.kernels and not _is_compiled(module)]
+        if missing:
+            _require_room()
+            report_activity("compiling kernels, once on this machine")
+            wp.force_load("cpu", missing, max_workers=min(thread_count(), _MAX_THREADS))
 
 
 def start_warp() -> None:

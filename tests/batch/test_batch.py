@@ -1,0 +1,203 @@
+"""Batches: plan, keys, results, and workers that are killed."""
+
+from __future__ import annotations
+
+import csv
+import json
+import os
+import signal
+from pathlib import Path
+from typing import Any
+
+import pytest
+from click.testing import CliRunner
+
+from warpflat.batch.plan import Task, load_batch
+from warpflat.batch.run import run_batch
+from warpflat.batch.task import read_row, set_aside
+from warpflat.cli.batch import batch
+from warpflat.core.errors import InputError
+
+SCENES = Path(__file__).parents[2] / "scenes"
+PATCH = """
+datum = "centre"
+[surface]
+shape = "dome"
+resolution = 9
+[output]
+picture = false
+frames = 0
+[pattern]
+formats = []
+"""
+FABRICS = 'scenes = ["patch.toml"]\nfabrics = ["woven", "denim", "jersey"]\n'
+
+
+def write(folder: Path, text: str = FABRICS) -> Path:
+    (folder / "patch.toml").write_text(PATCH)
+    (folder / "b.toml").write_text(text)
+    return folder / "b.toml"
+
+
+def plan(folder: Path, text: str = FABRICS) -> list[Task]:
+    return load_batch(write(folder, text))
+
+
+def files(out: Path) -> dict[str, int]:
+    """The files of a batch but its index, with the time of their last change."""
+    return {str(path): path.stat().st_mtime_ns for path in out.rglob("*") if path.is_file() and path.parent != out}
+
+
+def without_times(data: Any) -> Any:
+    if isinstance(data, dict):
+        return {key: without_times(each) for key, each in data.items() if key not in ("seconds", "memory_mb")}
+    return [without_times(each) for each in data] if isinstance(data, list) else data
+
+
+def contents(folder: Path) -> dict[str, Any]:
+    return {
+        path.name: without_times(json.loads(path.read_text())) if path.suffix == ".json" else path.read_bytes()
+        for path in folder.iterdir()
+    }
+
+
+# --- the plan
+
+
+def test_a_batch_is_a_product():
+    tasks = load_batch(SCENES / "batch_sizes.toml")
+    assert len({task.key for task in tasks}) == 10
+    assert [(task.body, task.fabric) for task in tasks[:3]] == [
+        ("EU 36", "woven"),
+        ("EU 36", "denim"),
+        ("EU 38", "woven"),
+    ]
+    settings = tasks[2].make_scene().settings
+    assert settings.cuts == []
+    assert settings.shape == "darts"
+    assert settings.mannequin.size == "EU 38"
+
+
+def test_a_batch_is_a_list(tmp_path: Path):
+    tasks = plan(
+        tmp_path,
+        '[[tasks]]\nscene = "patch.toml"\nfabric = "denim"\n[[tasks]]\nform = "bodice"\nbody.measurements = {bust = 0.9, waist = 0.7, '
+        'hip = 0.95, stature = 1.7}\nbody.name = "Ada"\noverride.ease = "loose"\n',
+    )
+    assert [(task.scene, task.body, task.fabric, task.override) for task in tasks] == [
+        ("patch", "", "denim", ""),
+        ("bodice", "Ada", "isotropic", "ease=loose"),
+    ]
+
+
+def test_a_key_follows_content_not_paths(tmp_path: Path):
+    a, b = tmp_path / "a", tmp_path / "b"
+    for folder in (a, b):
+        folder.mkdir()
+        (folder / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n")
+        (folder / "patch.toml").write_text('[surface]\nfile = "mesh.obj"\n')
+        (folder / "b.toml").write_text('scenes = ["patch.toml"]\n')
+    (key,) = [task.key for task in load_batch(a / "b.toml")]
+    assert [task.key for task in load_batch(b / "b.toml")] == [key]
+    # A default that is written down is the same scene; another value is not.
+    (b / "patch.toml").write_text('grain_angle = 0.0\n[surface]\nfile = "mesh.obj"\n')
+    assert [task.key for task in load_batch(b / "b.toml")] == [key]
+    (b / "b.toml").write_text('scenes = ["patch.toml"]\noverrides = [{ grain_angle = 5.0 }]\n')
+    assert [task.key for task in load_batch(b / "b.toml")] != [key]
+    (a / "mesh.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 2 0\nf 1 2 3 4\n")
+    assert [task.key for task in load_batch(a / "b.toml")] != [key]
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("fabrics = ['denim']", 'scenes = ["FILE"], forms'),
+        ("scenes = ['patch.toml']\nfabric = ['denim']", "did you mean 'fabrics'?"),
+        ("scenes = ['patsch.toml']", "did you mean"),
+        ("forms = ['bodice']\n[[bodies]]\nscan = 'nobody.obj'", "nobody.obj: cannot be read: no such file"),
+        ("scenes = ['patch.toml']\noverrides = [{ datum = 3 }]", "datum: should be a valid string"),
+        ("scenes = ['patch.toml']\n[[bodies]]\nsize = 'EU 38'", "either a [surface] table or a [mannequin]"),
+        ("[[tasks]]\nfabric = 'denim'", "a task needs either scene"),
+    ],
+)
+def test_a_mistake_in_the_plan_is_one_line(tmp_path: Path, text: str, words: str):
+    with pytest.raises(InputError) as caught:
+        plan(tmp_path, text)
+    assert words in str(caught.value)
+    assert str(tmp_path / "b.toml") in str(caught.value)
+
+
+# --- results
+
+
+def test_what_is_done_is_not_done_again(tmp_path: Path):
+    tasks, out = plan(tmp_path), tmp_path / "out"
+    run_batch(tasks[:2], out)
+    before, seen = files(out), list[tuple[int, int]]()
+    rows = run_batch(tasks, out, on_progress=lambda *numbers: seen.append(numbers))
+    assert [row.status for row in rows] == ["at rest"] * 3
+    assert seen == [(2, 2), (3, 2)]
+    assert {name: files(out)[name] for name in before} == before
+    (out / tasks[0].key / "metrics.json").unlink()  # half a result is none
+    assert read_row(tasks[0], out) is None
+
+
+def test_an_interruption_keeps_what_is_done(tmp_path: Path):
+    def stop(done: int, before: int) -> None:
+        if done == 2:
+            raise KeyboardInterrupt
+
+    tasks, out = plan(tmp_path), tmp_path / "out"
+    with pytest.raises(KeyboardInterrupt):
+        run_batch(tasks, out, on_progress=stop)
+    with (out / "index.csv").open(newline="") as file:
+        assert [row["status"] for row in csv.DictReader(file)] == ["at rest", "at rest", "to do"]
+
+
+def test_an_error_is_a_result(tmp_path: Path):
+    path, out = write(tmp_path, FABRICS.replace("denim", "<b>tweed")), tmp_path / "out"
+    done = CliRunner().invoke(batch, [str(path), "--out", str(out)], standalone_mode=False)
+    assert done.return_value == 1
+    assert "2 at rest, 1 error" in done.output
+    tasks = load_batch(path)
+    error = out / f"{tasks[1].key}.error.json"
+    assert "unknown fabric" in json.loads(error.read_text())["message"]
+    assert not (out / tasks[1].key).exists()
+    written = error.stat().st_mtime_ns
+    assert [row.status for row in run_batch(tasks, out)] == ["at rest", "error", "at rest"]
+    assert error.stat().st_mtime_ns == written
+    page = (out / "index.html").read_text()
+    assert page.count("<tr>") == 4
+    assert "http" not in page
+    assert "<b>tweed" not in page
+
+
+def test_set_aside_leaves_nothing_behind(tmp_path: Path):
+    (task, *_) = plan(tmp_path)
+    (tmp_path / task.key).mkdir()
+    assert set_aside(task, tmp_path, "killed").status == "set aside"
+    assert not (tmp_path / task.key).exists()
+
+
+# --- workers
+
+
+def test_a_killed_worker_costs_nothing_but_time(tmp_path: Path):
+    pytest.importorskip("distributed", reason="the extra `batch` (Dask) is not installed")
+    import psutil
+
+    def kill_one(done: int, before: int) -> None:
+        if done == 1:
+            workers = [
+                child for child in psutil.Process().children(recursive=True) if "spawn_main" in str(child.cmdline())
+            ]
+            assert len(workers) == 2
+            os.kill(workers[0].pid, signal.SIGKILL)
+
+    text = FABRICS.replace('"jersey"', '"jersey", "interlock"')
+    tasks = plan(tmp_path, text)
+    rows = run_batch(tasks, tmp_path / "out", workers=2, on_progress=kill_one)
+    assert [row.status for row in rows] == ["at rest"] * 4
+    run_batch(tasks[:1], tmp_path / "serial")
+    assert contents(tmp_path / "out" / tasks[0].key) == contents(tmp_path / "serial" / tasks[0].key)

@@ -1,0 +1,148 @@
+"""`index.csv` and `index.html`: a row for each task of a batch."""
+
+from __future__ import annotations
+
+import csv
+import io
+import time
+from collections.abc import Sequence
+from html import escape
+from importlib import resources
+from pathlib import Path
+
+from warpflat.batch.plan import Task
+from warpflat.batch.task import AT_REST, ERROR, NOT_AT_REST, SET_ASIDE, TO_DO, Row
+from warpflat.core.atomic_files import atomic_path
+
+__all__ = ["BatchIndex"]
+
+# The files are written again at most so often while tasks come in [s].
+_EVERY = 2.0
+_FITS = {None: "", True: "yes", False: "no"}
+_NAMES = ("scene", "body", "fabric", "override")
+_COLOURS = {AT_REST: "good", NOT_AT_REST: "bad", ERROR: "bad", SET_ASIDE: "bad"}
+_STYLE = """
+main { max-width: none; } td, th { vertical-align: middle; } th { cursor: pointer; user-select: none; }
+th.text { text-align: left; } th:hover { color: var(--ink); } th[aria-sort=ascending]::after { content: " ↑"; }
+th[aria-sort=descending]::after { content: " ↓"; }
+td img { height: 90px; width: auto; margin: 0; border-radius: 4px; } td.message { white-space: normal; min-width: 240px; max-width: 420px; }
+"""
+
+
+class BatchIndex:
+    """The rows of a batch, in the order of its tasks, and the files that show them."""
+
+    def __init__(self, out: Path, tasks: Sequence[Task]) -> None:
+        """Begin with all tasks to do."""
+        self._out = out
+        self._rows = {task.key: Row(task=task) for task in tasks}
+        self._written = -float("inf")
+
+    @property
+    def rows(self) -> list[Row]:
+        """A row for each task."""
+        return list(self._rows.values())
+
+    def add(self, row: Row) -> None:
+        """Replace the row of a task."""
+        self._rows[row.task.key] = row
+
+    def write_if_due(self) -> None:
+        """Write the files if they have not been written for a while."""
+        if time.monotonic() - self._written >= _EVERY:
+            self.write()
+
+    def write(self) -> None:
+        """Write `index.csv` and `index.html`.
+
+        Raises:
+            InputError: they cannot be written.
+        """
+        rows = self.rows
+        for name, text in (("index.csv", _table(rows)), ("index.html", _page(rows))):
+            with atomic_path(self._out / name) as temporary:
+                temporary.write_text(text, encoding="utf-8", newline="")
+        self._written = time.monotonic()
+
+
+def _levels(rows: Sequence[Row]) -> list[str]:
+    """Return the levels of all girths, in their first order."""
+    return list(dict.fromkeys(level for row in rows for level in row.girths_m))
+
+
+def _table(rows: Sequence[Row]) -> str:
+    levels, text = _levels(rows), io.StringIO()
+    writer = csv.writer(text)
+    head = ["key", "status", "scene", "body", "fabric", "override", "strain_energy_j", "fits"]
+    writer.writerow([*head, *(f"{level}_m" for level in levels), "seconds", "memory_mb", "message"])
+    for row in rows:
+        task = row.task
+        writer.writerow(
+            [
+                *(task.key, row.status, task.scene, task.body, task.fabric, task.override),
+                *(row.strain_energy_j, _FITS[row.fits], *(row.girths_m.get(level) for level in levels)),
+                *(row.seconds, row.memory_mb, row.message),
+            ]
+        )
+    return text.getvalue()
+
+
+def _page(rows: Sequence[Row]) -> str:
+    levels = _levels(rows)
+    columns = [
+        _column("", [row.task.key for row in rows], [_picture(row) for row in rows]),
+        *(_column(name, [str(getattr(row.task, name)) for row in rows]) for name in _NAMES),
+        _column("status", [row.status for row in rows], [_status(row) for row in rows]),
+        _numbers("strain energy [mJ]", [row.strain_energy_j for row in rows], 1e3, ".4g"),
+        _column("fits", [_FITS[row.fits] for row in rows]),
+        *(_numbers(f"{level} [cm]", [row.girths_m.get(level) for row in rows], 100.0, ".1f") for level in levels),
+        _numbers("time [s]", [row.seconds for row in rows], 1.0, ".1f"),
+        _column("message", [row.message for row in rows]),
+    ]
+    head, *lines = zip(*filter(None, columns), strict=True)
+    body = "\n".join(f"<tr>{''.join(cells)}</tr>" for cells in lines)
+    counts = {status: sum(row.status == status for row in rows) for status in (*_COLOURS, TO_DO)}
+    told = ", ".join(f"{count} {status}" for status, count in counts.items() if count)
+    style = resources.files("warpflat.review").joinpath("data", "page.css").read_text(encoding="utf-8")
+    script = resources.files("warpflat.batch").joinpath("data", "sort.js").read_text(encoding="utf-8")
+    return (
+        '<!doctype html><html lang="en"><head><meta charset="utf-8"><title>warpflat batch</title>'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
+        f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(told)}. '
+        "Girths are of the pattern. A click on a heading sorts.</p>"
+        f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div></main>'
+        f"<script>{script}</script></body></html>\n"
+    )
+
+
+def _column(name: str, values: Sequence[str], shown: Sequence[str] | None = None) -> list[str]:
+    """Return the heading and the cells of a column of text; nothing if no cell says anything."""
+    if not any(values):
+        return []
+    cells = zip(values, shown or [escape(value) for value in values], strict=True)
+    kind = f"text {name}".strip()
+    return [
+        f'<th class="text">{name}</th>',
+        *(f'<td class="{kind}" data-value="{escape(value)}">{words}</td>' for value, words in cells),
+    ]
+
+
+def _numbers(name: str, values: Sequence[float | None], unit: float, form: str) -> list[str]:
+    """Return the heading and the cells of a column of numbers; nothing if there is none."""
+    if all(value is None for value in values):
+        return []
+    cells = ['data-value="">' if value is None else f'data-value="{value!r}">{unit * value:{form}}' for value in values]
+    return [f"<th>{escape(name)}</th>", *(f"<td {cell}</td>" for cell in cells)]
+
+
+def _picture(row: Row) -> str:
+    key = row.task.key
+    if not row.files:
+        return key
+    target = "review.html" if "review.html" in row.files else ""
+    shown = f'<img loading="lazy" alt="{key}" src="{key}/picture.png">' if "picture.png" in row.files else key
+    return f'<a href="{key}/{target}">{shown}</a>'
+
+
+def _status(row: Row) -> str:
+    return f'<span class="{_COLOURS.get(row.status, "")}">{row.status}</span>'

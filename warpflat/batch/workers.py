@@ -1,0 +1,166 @@
+"""The tasks of a batch on Dask workers: processes on this machine, or those of a scheduler."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import logging
+import os
+import platform
+import threading
+from collections.abc import Callable, Iterator, Sequence
+from pathlib import Path
+
+import dask
+from distributed import Client, Future, KilledWorker, LocalCluster, TimeoutError, wait
+from distributed.comm import CommClosedError
+from distributed.system import MEMORY_LIMIT
+
+from warpflat._version import __version__
+from warpflat.batch.plan import Task
+from warpflat.batch.task import Row, run_task, set_aside
+from warpflat.core.errors import InputError
+
+__all__ = ["run_on_cluster", "run_on_workers"]
+
+# A task is set aside when it has killed so many workers.
+_MOST_KILLS = 3
+# How long a scheduler is waited for [s].
+_PATIENCE = 60.0
+# How often the number of workers is asked for [s].
+_LOOK = 1.0
+# Each worker is one process with one thread: tasks beside each other use the cores better than threads of one task.
+_ONE_THREAD = dict.fromkeys(
+    ("WARPFLAT_THREADS", "PXR_WORK_THREAD_LIMIT", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS"), "1"
+)
+# What the client raises when the scheduler has gone.
+_LOST = CommClosedError, concurrent.futures.CancelledError, asyncio.CancelledError
+# A scheduler's workers may have several threads; matplotlib allows one task at a time.
+_one_task = threading.Lock()
+
+
+def run_on_workers(tasks: Sequence[Task], out: Path, count: int) -> Iterator[Row]:
+    """Run tasks on processes of this machine; yield a row for each that is done.
+
+    Each worker has one thread and its share of the memory; one that dies is started again.
+
+    Raises:
+        InputError: a result cannot be written.
+    """
+    from warpflat.core.compile import compile_all_modules
+
+    compile_all_modules()
+    # Dask counts the kills that it allows, and sets aside at one more.
+    settings = {"distributed.scheduler.allowed-failures": _MOST_KILLS - 1}
+    with (
+        dask.config.set(settings),
+        LocalCluster(
+            n_workers=count,
+            threads_per_worker=1,
+            processes=True,
+            memory_limit=MEMORY_LIMIT // count,
+            dashboard_address="127.0.0.1:0",
+            silence_logs=logging.CRITICAL,
+            env=_ONE_THREAD,
+        ) as cluster,
+        Client(cluster) as client,
+    ):
+        yield from _run_round(client, {task.key: task for task in tasks}, out)
+
+
+def run_on_cluster(
+    tasks: Sequence[Task], out: Path, address: str, *, on_note: Callable[[str], object]
+) -> Iterator[Row]:
+    """Run tasks on the workers of a Dask scheduler; yield a row for each that is done.
+
+    If the scheduler is lost, it is waited for, and what is not done is submitted again.
+
+    Raises:
+        InputError: the scheduler cannot be reached for a minute, or a worker does not see `out` or has another version.
+    """
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    todo = {task.key: task for task in tasks}
+    while todo:
+        try:
+            with _connect(address) as client:
+                if not client.nthreads():
+                    on_note(f"the scheduler {address} has no workers yet; waiting for them")
+                yield from _run_round(client, todo, out)
+        except _LOST:
+            on_note(f"the scheduler {address} is lost; waiting for it")
+
+
+def _connect(address: str) -> Client:
+    try:
+        return Client(address, timeout=_PATIENCE)
+    except (OSError, TimeoutError, ValueError) as error:
+        raise InputError(
+            f"no Dask scheduler answers at {address} ({type(error).__name__}); start one with `dask scheduler`, and give its address "
+            "as tcp://HOST:8786. What is done is kept: the same command goes on from there"
+        ) from None
+
+
+def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row]:
+    """Run tasks on the workers that a client has, and take each from `todo` when it is done.
+
+    No more tasks are submitted than there are workers: when a worker dies, Dask blames all tasks that it had been given.
+    """
+    waiting = list(todo.values())
+    going: dict[Future, Task] = {}
+    while waiting or going:
+        free = max(1, len(client.nthreads())) - len(going)
+        for task in waiting[: max(0, free)]:
+            waiting.remove(task)
+            going[client.submit(_work, task, out, __version__, key=("warpflat", task.key), pure=False)] = task
+        try:
+            done = wait(list(going), timeout=_LOOK, return_when="FIRST_COMPLETED").done
+        except TimeoutError:
+            continue
+        for future in done:
+            task = going.pop(future)
+            row = _row(future, task, out)
+            del todo[task.key]
+            yield row
+
+
+def _row(future: Future, task: Task, out: Path) -> Row:
+    """Return the row of a task that is done, or set aside.
+
+    Raises:
+        CancelledError: the scheduler was lost.
+        InputError: of the worker.
+    """
+    try:
+        row: Row = future.result()
+    except KilledWorker:
+        return set_aside(task, out, f"its worker was killed {_MOST_KILLS} times, perhaps for want of memory")
+    return row
+
+
+def _start_warp() -> None:
+    """Start Warp without its greeting; what it says on standard error is no error of the task."""
+    import warp
+
+    from warpflat.core.compile import start_warp
+    from warpflat.core.native_output import native_errors
+
+    warp.config.log_level = warp.LOG_ERROR
+    with native_errors():
+        start_warp()
+
+
+def _work(task: Task, out: Path, version: str) -> Row:
+    """Run a task on a worker.
+
+    Raises:
+        InputError: the worker does not see `out`, has another version, or cannot write the result.
+    """
+    for name, value in _ONE_THREAD.items():
+        os.environ.setdefault(name, value)
+    _start_warp()
+    if version != __version__:
+        raise InputError(f"a worker on {platform.node()} has warpflat {__version__}, not {version}: install the same")
+    if not out.is_dir():
+        raise InputError(f"a worker on {platform.node()} does not see {out}; --out must be a folder that all share")
+    with _one_task:
+        return run_task(task, out)

@@ -1,0 +1,127 @@
+"""`warpflat batch`: many scenes in one command, in this process or on Dask workers."""
+
+from __future__ import annotations
+
+import sys
+from importlib.util import find_spec
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand
+
+if TYPE_CHECKING:
+    from warpflat.batch.task import Row
+
+__all__ = ["batch"]
+
+_FILES = """\b
+What comes out, in DIR:
+  KEY/             the files of a run, and task.json: what the task was
+  KEY.error.json   instead of them: why the task failed; remove it to try the task again
+  index.html       a table of all tasks with pictures; a click on a heading sorts
+  index.csv        the same for programs"""
+_MOST_ERRORS = 10
+_BAR = "{desc}: {n_fmt}/{total_fmt} tasks |{bar:20}| [{elapsed}, {remaining} left]"
+
+
+@click.command(cls=ComputingCommand, epilog=f"{_FILES}\n\n{EXIT_CODES}")
+@click.argument("file", metavar="BATCH.toml", type=click.Path(path_type=Path))
+@click.option("--out", type=click.Path(path_type=Path), metavar="DIR", help="Folder.  [default: out/NAME]")
+@click.option(
+    "--workers", type=click.IntRange(1, 1000), default=1, metavar="N", help="Processes on this machine.  [default: 1]"
+)
+@click.option("--scheduler", metavar="ADDRESS", help="Of a Dask scheduler, as tcp://HOST:8786, instead of --workers.")
+@click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and errors of tasks.")
+def batch(file: Path, out: Path | None, workers: int, scheduler: str | None, quiet: bool) -> int:
+    """Run many scenes: bodies, fabrics and overrides of a batch file.
+
+    A task whose result is there is not run again. Ctrl-C keeps what is done, and the same command goes on from there.
+    A task that fails ends none of the others; the exit code is 1 then.
+
+    Several workers and a scheduler need Dask: pip install "warpflat[batch]".
+
+    \b
+    Examples:
+      warpflat batch scenes/batch_sizes.toml --workers 4
+      warpflat batch scenes/batch_sizes.toml --out /shared/sizes --scheduler tcp://head:8786
+    """
+    from warpflat.batch.plan import load_batch
+    from warpflat.batch.run import run_batch
+    from warpflat.cli.run import start_warp_silently
+    from warpflat.core.errors import InputError
+
+    tasks = load_batch(file)
+    if find_spec("distributed") is None:
+        if scheduler is not None:
+            raise InputError('--scheduler needs Dask: pip install "warpflat[batch]", or leave it out')
+        if workers > 1:
+            _note('--workers needs Dask (pip install "warpflat[batch]"); the tasks run one after the other')
+            workers = 1
+    start_warp_silently()
+    folder = out if out is not None else Path("out") / file.stem
+    with _Bar(file.stem, len(tasks), hidden=quiet or not sys.stderr.isatty()) as bar:
+        rows = run_batch(
+            tasks,
+            folder,
+            workers=workers,
+            scheduler=scheduler,
+            on_progress=bar.show,
+            on_note=lambda note: None if quiet else bar.note(note),
+        )
+    return _report(rows, folder, quiet=quiet)
+
+
+def _report(rows: list[Row], folder: Path, *, quiet: bool) -> int:
+    from warpflat.batch.task import NOT_AT_REST
+
+    failed = [row for row in rows if row.message]
+    for row in failed[:_MOST_ERRORS]:
+        click.echo(f"warpflat: {row.task.key}: {row.message}", err=True)
+    if len(failed) > _MOST_ERRORS:
+        click.echo(f"warpflat: {len(failed) - _MOST_ERRORS} more errors; see {folder / 'index.html'}", err=True)
+    counts: dict[str, int] = {}
+    for row in rows:
+        counts[row.status] = counts.get(row.status, 0) + 1
+    if not quiet:
+        told = ", ".join(f"{count} {status}" for status, count in counts.items())
+        click.echo(f"{len(rows)} tasks: {told}; see {folder / 'index.html'}")
+    return NOT_CONVERGED if failed or NOT_AT_REST in counts else DONE
+
+
+def _note(words: str) -> None:
+    click.echo(f"warpflat: note: {words}", err=True)
+
+
+class _Bar:
+    """A bar on stderr with the number of tasks done and the time left; nothing if stderr is no terminal."""
+
+    def __init__(self, name: str, total: int, *, hidden: bool) -> None:
+        """Prepare the bar of a batch with `total` tasks."""
+        self._name, self._total, self._hidden = name, total, hidden
+        self._bar: Any = None
+
+    def __enter__(self) -> _Bar:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._bar is not None:
+            self._bar.close()
+
+    def show(self, done: int, before: int) -> None:
+        """Show the number of tasks done; those done before say nothing of the pace."""
+        from tqdm import tqdm
+
+        if self._bar is None and not self._hidden:
+            self._bar = tqdm(
+                desc=self._name, total=self._total, initial=before, file=sys.stderr, smoothing=0.05, bar_format=_BAR
+            )
+        elif self._bar is not None:
+            self._bar.update(done - self._bar.n)
+
+    def note(self, words: str) -> None:
+        """Print a note above the bar."""
+        if self._bar is not None:
+            self._bar.clear()
+        _note(words)
