@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import functools
+import itertools
 import os
 from pathlib import Path
 
@@ -353,9 +354,10 @@ def test_a_scan_is_compared_with_the_nearest_size() -> None:
 
 
 @needs_bodies
-@pytest.mark.parametrize("sex", list(KNOWN))
-@pytest.mark.parametrize("form", ["basic_block", "a_line_skirt"])
-def test_skirts_hang_outside_the_body(sex: str, form: str) -> None:
+@pytest.mark.parametrize(
+    ("form", "sex"), [*itertools.product(["basic_block", "a_line_skirt"], KNOWN), ("trousers", "male_heavy")]
+)
+def test_skirts_and_trousers_hang_outside_the_body(form: str, sex: str) -> None:
     import trimesh
 
     body = _plain(sex)

@@ -202,8 +202,10 @@ def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tupl
         middles = inner.mean(axis=1, keepdims=True) * [1.0, 0.0, 1.0] + inner * [0.0, 1.0, 0.0]
         rays = inner - middles
         alone, over = (_hull_reach(points, middles, rays) for points in (ends, np.concatenate([ends, between])))
-        # Straight, except where the body pushes the hull out; the hull of the end rows alone is no straight line.
-        pushed = np.where(over > alone * (1.0 + 1e-9), np.maximum(over, 1.0), 1.0)
+        # Straight, except where the body pushes the hull out; the hull of the end rows alone is no straight line, so that
+        # the body may stand out of the one and not of the other.
+        bare = _hull_reach(between, middles, rays)
+        pushed = np.maximum(np.where(over > alone * (1.0 + 1e-9), over, bare), 1.0)
         straight[1:-1] = middles + pushed[..., None] * rays
     out[ids] = straight
 
