@@ -24,6 +24,7 @@ import psutil
 from warpflat.batch.plan import Task, load_batch
 from warpflat.batch.run import run_batch
 from warpflat.batch.task import Row
+from warpflat.cli.run import start_warp_silently
 
 _PLAN = """
 forms = ["bodice"]
@@ -42,6 +43,7 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=6)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    start_warp_silently()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         bodies = "".join(f'[[bodies]]\nsize = "{size}"\n' for size in _SIZES)
