@@ -24,6 +24,7 @@ import psutil
 from warpflat.batch.plan import Task, load_batch
 from warpflat.batch.run import run_batch
 from warpflat.batch.task import Row
+from warpflat.cli.run import start_warp_silently
 
 _PLAN = """
 forms = ["bodice"]
@@ -42,6 +43,7 @@ def main() -> None:
     parser.add_argument("--kills", type=int, default=6)
     parser.add_argument("--seed", type=int, default=0)
     given = parser.parse_args()
+    start_warp_silently()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         bodies = "".join(f'[[bodies]]\nsize = "{size}"\n' for size in _SIZES)
@@ -62,6 +64,9 @@ def main() -> None:
         print(f"2 workers, {kills} killed: {seconds:.1f} s, peak {max(row.memory_mb or 0 for row in rows):.0f} MB")
         print(f"at rest {done} of {len(tasks)}; written more than once {sum(n > 1 for n in written.values())}")
         print(f"files that differ from serial: {different or 'none'}")
+        for row in rows:
+            if row.message:
+                print(f"{row.task.key}: {row.status}: {row.message}")
 
 
 def _timed(
@@ -97,6 +102,8 @@ def _timed(
 
 
 def _content(path: Path) -> Any:
+    if not path.exists():
+        return None
     if path.suffix == ".json":
         return _without_times(json.loads(path.read_text()))
     if path.suffix == ".dxf":
