@@ -24,7 +24,7 @@ TO_DO, AT_REST, NOT_AT_REST, ERROR, SET_ASIDE = "to do", "at rest", "not at rest
 
 @dataclass(frozen=True, kw_only=True)
 class Row:
-    """What the index says of a task.
+    """The row of a task in the index.
 
     Attributes:
         task: the task.

@@ -109,35 +109,11 @@ def _price(joules: float | None) -> str:
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
     """Return a line for each fault of a piece, of every size: not converged, flipped faces, overlap; and for a missing pattern."""
-    lines = []
     given_up = metrics.get("sewing", {}).get("contradictory", False)
-    for name, piece in metrics["pieces"].items():
-        last = piece["stages"][-1]
-        if not _converged(piece):
-            asked = given_up and last["name"] == "sew"
-            way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
-            lines.append(
-                f"{name} did not converge within {_work_words(last)} ({_remainder_words(last)}); the pattern is not final: {way_out}"
-            )
-        if piece["flipped_faces"]:
-            lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
-        if piece.get("overlap_m2"):
-            area = 1e6 * piece["overlap_m2"]
-            lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
-    if not metrics.get("sewing", {}).get("converged", True):
-        amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
-        amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
-        lines += [
-            f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
-            for name, by in amiss
-            if by > _WARNED_MISS
-        ]
-    drape = metrics.get("drape", {"converged": True})
-    if not drape["converged"]:
-        left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
-        fallen = drape["distance_m"]["mean"] > _FALLEN
-        way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
-        lines.append(f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]")
+    lines = [
+        line for name, piece in metrics["pieces"].items() for line in _piece_warnings(name, piece, given_up=given_up)
+    ]
+    lines += [*_sewing_warnings(metrics), *_drape_warnings(metrics)]
     for size, other in metrics.get("sizes", {}).items():
         lines += [f"size {size}: {line}" for line in warnings_of(other)]
     lines += [
@@ -146,6 +122,44 @@ def warnings_of(metrics: Mapping[str, Any]) -> list[str]:
         if f"not_{done}" in metrics.get(what, {})
     ]
     return lines
+
+
+def _piece_warnings(name: str, piece: Mapping[str, Any], *, given_up: bool) -> list[str]:
+    lines, last = [], piece["stages"][-1]
+    if not _converged(piece):
+        asked = given_up and last["name"] == "sew"
+        way_out = "its seams and constraints ask for more than it can give" if asked else "raise max_steps"
+        lines.append(
+            f"{name} did not converge within {_work_words(last)} ({_remainder_words(last)}); the pattern is not final: {way_out}"
+        )
+    if piece["flipped_faces"]:
+        lines.append(f"{name} has {piece['flipped_faces']:,} flipped faces; the pattern cannot be cut as it is")
+    if piece.get("overlap_m2"):
+        area = 1e6 * piece["overlap_m2"]
+        lines.append(f"{name} lies over itself by {area:.3g} mm2; the pattern cannot be cut as it is")
+    return lines
+
+
+def _sewing_warnings(metrics: Mapping[str, Any]) -> list[str]:
+    if metrics.get("sewing", {}).get("converged", True):
+        return []
+    amiss = [(seam["name"], abs(seam["difference_mm"])) for seam in metrics["seams"]]
+    amiss += [(held["name"], held["amiss_mm"]) for held in metrics["constraints"]]
+    return [
+        f"{name} is amiss by {by:.2f} mm: more is asked than the pieces can keep together"
+        for name, by in amiss
+        if by > _WARNED_MISS
+    ]
+
+
+def _drape_warnings(metrics: Mapping[str, Any]) -> list[str]:
+    drape = metrics.get("drape", {"converged": True})
+    if drape["converged"]:
+        return []
+    left = f"{100 * drape['residual']:.2g} % of a vertex's weight"
+    fallen = drape["distance_m"]["mean"] > _FALLEN
+    way_out = "it has slipped off its body: hold = [...] keeps lines in place" if fallen else "raise max_steps"
+    return [f"the drape is not at rest after {drape['steps']:,} steps ({left} is left): {way_out} in [drape]"]
 
 
 def drape_lines(metrics: Mapping[str, Any]) -> list[str]:

@@ -11,7 +11,7 @@ __all__ = ["DrapeOptions"]
 
 @dataclass(frozen=True, kw_only=True)
 class DrapeOptions:
-    """How the cloth is draped.
+    """Options of a drape.
 
     Attributes:
         friction: Coulomb's coefficient of cloth on the body; a lined garment on skin has .2 to .4.

@@ -52,7 +52,7 @@ class Drape:
 
     @property
     def converged(self) -> bool:
-        """Whether the cloth is at rest."""
+        """True if the cloth is at rest."""
         return self.worn.converged
 
     @property

@@ -15,6 +15,7 @@ from warpflat.fabric.fabric import Fabric, grain_axes
 from warpflat.flattening.result import Flattening
 from warpflat.garment.darts import dart_pairs
 from warpflat.garment.garment import Garment
+from warpflat.mannequin.forms import FormResult
 from warpflat.surface.connectivity import join_labels
 from warpflat.surface.triangles import corner_triangles
 
@@ -115,14 +116,8 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
         InputError: the pieces are of different cloths, a face is mirrored, or the garment consists of half pieces.
     """
     if isinstance(garment, Garment):
-        folded = [name for name, piece in garment.form.pieces.items() if piece.fold]
-        if folded:
-            raise InputError(
-                f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
-            )
         pieces = dict(garment.pieces)
-        runs = [(seam.pieces, run.vertices) for seam in garment.form.seams for run in seam.runs]
-        seams = [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(garment.form)), *seams]
+        seams = [*_seams_of_form(garment.form), *seams]
     else:
         given = [garment] if isinstance(garment, Flattening) else list(garment)
         pieces = {piece.surface.name: piece for piece in given}
@@ -153,6 +148,17 @@ def sew_cloth(garment: Garment | Flattening | Sequence[Flattening], *, seams: Se
         piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(pieces)},
         lines=_lines(pieces, begins, welded),
     )
+
+
+def _seams_of_form(form: FormResult) -> list[Seam]:
+    """Return the seams of a form's pieces, the legs of their darts among them."""
+    folded = [name for name, piece in form.pieces.items() if piece.fold]
+    if folded:
+        raise InputError(
+            f"drape: piece {folded[0]} is half a piece on the fold; flatten the whole garment: half = false"
+        )
+    runs = [(seam.pieces, run.vertices) for seam in form.seams for run in seam.runs]
+    return [*runs, *((pair.pieces, pair.vertices) for pair in dart_pairs(form))]
 
 
 def _check_pieces(pieces: Mapping[str, Flattening]) -> None:

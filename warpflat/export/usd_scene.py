@@ -1,4 +1,4 @@
-"""What a viewer needs besides meshes: a material that shows vertex colours, cameras and light."""
+"""Material, cameras and light of a USD scene, for viewers."""
 
 from __future__ import annotations
 

@@ -80,7 +80,7 @@ class Development:
 
     @property
     def start(self) -> str:
-        """What the piece is relaxed from, as text."""
+        """The layout from which the piece is relaxed, as text."""
         if self.method == "given":
             return "the layout given"
         return f"{'as-rigid iterations from ' if self.as_rigid else ''}the {self.method} development"

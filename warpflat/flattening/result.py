@@ -128,7 +128,7 @@ class Flattening:
 
     @property
     def start(self) -> str:
-        """What the piece was relaxed from, as text."""
+        """The layout from which the piece was relaxed, as text."""
         return self.development.start
 
     @property

@@ -87,8 +87,26 @@ def adjusted_vertices(
     Raises:
         InputError: for a level that cannot be adjusted, or an order that turns two profiles over.
     """
-    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
     ease = ease or {}
+    _check_levels(profiles, ease)
+    out = vertices.copy()
+    if profiles or ruled or ease:
+        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
+        _move_rings(out, layout, vertices, changes, ruled)
+        _move_sheet(out, layout, vertices, changes.get("chest"))
+        _move_arms(out, layout, vertices, changes, ruled)
+        _move_legs(out, layout, vertices, changes, ruled)
+        _move_neck(out, layout, vertices)
+    return out
+
+
+def _check_levels(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> None:
+    """Check that levels can be adjusted, and are like levels of the same part.
+
+    Raises:
+        InputError: one cannot, or is not.
+    """
+    known = [*RING_LEVELS, "chest", *ARM_LEVELS[1:], *LEG_LEVELS]
     for level in ease:
         if level not in known or level == "crotch":
             raise InputError(f"form: level {level!r} has no ease: {nearest(level, known)}")
@@ -99,15 +117,6 @@ def adjusted_vertices(
         parts = [next((i for i, part in enumerate(_PARTS) if name in part), -1) for name in (level, change.like)]
         if change.like and (-1 in parts or parts[0] != parts[1]):
             raise InputError(f"form: profile {level} cannot be like {change.like}; take a level of the same part")
-    out = vertices.copy()
-    if profiles or ruled or ease:
-        changes = {level: (profiles.get(level, Adjustment()), ease.get(level, 0.0)) for level in {*profiles, *ease}}
-        _move_rings(out, layout, vertices, changes, ruled)
-        _move_sheet(out, layout, vertices, changes.get("chest"))
-        _move_arms(out, layout, vertices, changes, ruled)
-        _move_legs(out, layout, vertices, changes, ruled)
-        _move_neck(out, layout, vertices)
-    return out
 
 
 def _changed(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:

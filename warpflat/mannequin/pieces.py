@@ -142,6 +142,23 @@ def _piece(
         vertices=vertices[grid_vertices], faces=corners, lines=lines, name=name, input_vertices=vertices[grid_vertices],
         input_index=np.arange(len(grid_vertices), dtype=np.int32),
     )  # fmt: skip
+    line = _datum_line(name, datum, lines, edges, fold)
+    names = list(layout.bricks)
+    return FormPiece(
+        surface=surface, edges=edges, datum=line, fold=fold, grid_vertices=grid_vertices,
+        face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
+        darts={dart: _legs(dart) for dart in darts},
+    )  # fmt: skip
+
+
+def _datum_line(
+    name: str, datum: str, lines: Mapping[str, IntArray], edges: Mapping[str, IntArray], fold: str | None
+) -> str:
+    """Return the line of a piece that is its datum.
+
+    Raises:
+        InputError: the line that was asked for does not run through the piece, or runs across its fold.
+    """
     wished = datum or fold
     along = [line for line in lines if is_part_of(line, wished)] if wished else list(lines)[:1]
     if not along:
@@ -151,12 +168,7 @@ def _piece(
             f"form: piece {name}: its datum {datum!r} runs across the fold, {fold}, along which a half piece is laid: "
             f"datum = {fold!r}, or cut it whole: half = false"
         )
-    names = list(layout.bricks)
-    return FormPiece(
-        surface=surface, edges=edges, datum=max(along, key=lambda line: len(lines[line])), fold=fold, grid_vertices=grid_vertices,
-        face_brick=tuple(names[i] for i in layout.face_brick[rows]), parts=parts,
-        darts={dart: _legs(dart) for dart in darts},
-    )  # fmt: skip
+    return max(along, key=lambda line: len(lines[line]))
 
 
 def _edge_set(layout: Layout, lines: Sequence[str]) -> set[tuple[int, int]]:

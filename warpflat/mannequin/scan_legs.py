@@ -74,20 +74,9 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
         InputError: if the legs are one part too far down.
     """
     from scipy.ndimage import gaussian_filter1d
-    from scipy.spatial import ConvexHull
 
     heights = trunk.y[trunk.y <= trunk.crotch]
-    found: dict[str, list[FloatArray]] = {"left": [], "right": []}
-    for y in heights:
-        flats = [p.points[:, [0, 2]] for p in leg_sections(slicer, float(y), trunk.stature)]
-        if len(flats) == 1:
-            # The thighs touch: the midplane parts them.
-            flats = [flats[0][flats[0][:, 0] > 0.0], flats[0][flats[0][:, 0] < 0.0]]
-        flats.sort(key=lambda p: -float(p[:, 0].mean()) if len(p) else 0.0)
-        if len(flats) != 2 or min(len(p) for p in flats) < 8:
-            raise InputError(f"scan: no two legs at {y:.2f} m above the floor; its mesh is broken there")
-        for side, flat in zip(("left", "right"), flats, strict=True):
-            found[side].append(flat[ConvexHull(flat).vertices])
+    found = _leg_hulls(slicer, trunk.stature, heights)
     middles = {s: np.array([0.5 * (h[:, 0].min() + h[:, 0].max()) for h in hulls]) for s, hulls in found.items()}
     straight = heights >= 0.09 * trunk.stature
     apart = 0.5 * (middles["left"] - middles["right"])
@@ -104,6 +93,28 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
         y=heights, hulls={s: tuple(h) for s, h in found.items()}, inwards=inwards,
         crotch=float(near.min()) if len(near) else trunk.crotch, slope=slope,
     )  # fmt: skip
+
+
+def _leg_hulls(slicer: Slicer, stature: float, heights: FloatArray) -> dict[str, list[FloatArray]]:
+    """Return the convex hull of each leg's section at each height, by side.
+
+    Raises:
+        InputError: there are no two legs at a height.
+    """
+    from scipy.spatial import ConvexHull
+
+    found: dict[str, list[FloatArray]] = {"left": [], "right": []}
+    for y in heights:
+        flats = [p.points[:, [0, 2]] for p in leg_sections(slicer, float(y), stature)]
+        if len(flats) == 1:
+            # The thighs touch: the midplane parts them.
+            flats = [flats[0][flats[0][:, 0] > 0.0], flats[0][flats[0][:, 0] < 0.0]]
+        flats.sort(key=lambda p: -float(p[:, 0].mean()) if len(p) else 0.0)
+        if len(flats) != 2 or min(len(p) for p in flats) < 8:
+            raise InputError(f"scan: no two legs at {y:.2f} m above the floor; its mesh is broken there")
+        for side, flat in zip(("left", "right"), flats, strict=True):
+            found[side].append(flat[ConvexHull(flat).vertices])
+    return found
 
 
 def plumb_legs(trunk: TrunkSections, legs: LegSections) -> tuple[TrunkSections, list[str]]:

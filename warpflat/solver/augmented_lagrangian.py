@@ -45,7 +45,7 @@ _REGULARISATION = 1e-9
 
 @dataclass(frozen=True, kw_only=True)
 class ConstrainedOutcome:
-    """How a relaxation under equations has ended.
+    """The end of a relaxation under equations.
 
     Attributes:
         outcome: of the cloth.

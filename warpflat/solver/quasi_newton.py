@@ -140,7 +140,7 @@ class _Memory:
 
     @property
     def is_empty(self) -> bool:
-        """Whether nothing is remembered."""
+        """True if nothing is remembered."""
         return not self._pairs
 
     def add(self, step: FloatArray, change: FloatArray) -> None:
