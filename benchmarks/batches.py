@@ -38,7 +38,7 @@ def sizes_of(shape: str, vertices: int, triangles: bool) -> list[Surface]:
 
 
 def energy(piece: Flattening) -> float:
-    """What is left of it [J]."""
+    """Return the model energy of a piece at its end [J]."""
     last = piece.stages[-1]
     return last.model_energy_j
 

@@ -117,7 +117,7 @@ def _lift(shape: str) -> Callable[[FloatArray, FloatArray], FloatArray]:
 
 
 def real_meshes() -> list[Mesh]:
-    """Of the folder in the environment variable WARPFLAT_DATA; none if it is not set."""
+    """Return the meshes of the folder that WARPFLAT_DATA names, or none if it is not set."""
     folder = os.environ.get("WARPFLAT_DATA")
     if not folder:
         return []

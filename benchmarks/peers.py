@@ -187,7 +187,7 @@ def _until_settled(clock: Clock, step: Callable[[], FloatArray], own: Callable[[
 
 
 def arap(problem: Problem, start: FloatArray, clock: Clock) -> None:
-    """As rigid as possible (Liu et al. 2008), libigl."""
+    """Flatten as rigidly as possible (Liu et al. 2008) with libigl."""
     import igl
 
     data = igl.ARAPData()

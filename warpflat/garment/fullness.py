@@ -22,7 +22,7 @@ from warpflat.model.membrane import step_matrix
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import SpringArrays, springs_of, with_stiffness
 from warpflat.model.strain import strain_energy
-from warpflat.solver.augmented_lagrangian import is_factored, relax_under_equations
+from warpflat.solver.augmented_lagrangian import factor_pays, relax_under_equations
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.relax import relax
@@ -76,7 +76,7 @@ def give_fullness(
     widening = np.outer(warp, warp) * mean[0] + np.outer(weft, weft) * mean[1]
     alignment = GrainAlignment(lower=int(piece.datum[0]), upper=int(piece.datum[-1]))
     state = Relaxation(network, options, start=piece.positions @ widening, alignments=[alignment])
-    outcome = relax_under_equations(state).outcome if is_factored(network, options) else relax(state)
+    outcome = relax_under_equations(state).outcome if factor_pays(network, options) else relax(state)
     positions = state.positions()
     stage = Stage(
         name="fullness",

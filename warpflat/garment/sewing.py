@@ -35,7 +35,7 @@ from warpflat.model.constraint_equations import (
     stretch_equations,
 )
 from warpflat.model.network import SpringNetwork
-from warpflat.solver.augmented_lagrangian import ConstrainedOutcome, is_factored, relax_under_equations, stagnates
+from warpflat.solver.augmented_lagrangian import ConstrainedOutcome, factor_pays, relax_under_equations, stagnates
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
@@ -181,7 +181,7 @@ def sew(
     if len(equations):
         thread = max(network.fabric.stiffness_warp, network.fabric.stiffness_weft)
         median = float(np.median(network.spring_arrays.listed_stiffness))
-        relative = _RELATIVE_STIFFNESS if is_factored(network, options) else _STIFFNESS_FOR_STEPS
+        relative = _RELATIVE_STIFFNESS if factor_pays(network, options) else _STIFFNESS_FOR_STEPS
         stiffness = np.where(equations.soft > 0, equations.soft * thread, relative * median)
         network.sew(
             equations.ends,
@@ -258,7 +258,7 @@ def _relax(state: Relaxation, equations: ConstraintEquations) -> ConstrainedOutc
         farthest = np.abs(residuals[corrected]).max(initial=0.0)
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
 
-    if is_factored(state.network, state.options):
+    if factor_pays(state.network, state.options):
         return relax_under_equations(state, corrected, equations.violation, on_round=on_round)
     if not len(equations):
         return ConstrainedOutcome(outcome=relax(state), residuals=np.zeros(0), satisfied=True, contradictory=False)

@@ -72,7 +72,7 @@ class SewingNetwork:
                 guard_energy_j=energies.guard,
                 strain_energy_j=strain_energy(piece.network, own),
                 steps=state.steps,
-                work_units=state.work_units if state.work_units else float(state.steps),
+                work_units=state.work_units,
                 seconds=seconds,
                 converged=converged,
                 residual=residual,

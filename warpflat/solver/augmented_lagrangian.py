@@ -26,7 +26,7 @@ from warpflat.solver.options import RelaxOptions
 from warpflat.solver.quasi_newton import Descent, Point, Solve
 from warpflat.solver.relaxation import Relaxation
 
-__all__ = ["ConstrainedOutcome", "is_factored", "relax_under_equations", "stagnates"]
+__all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations", "stagnates"]
 
 # A round ends when by the metric the next step could release at most this times the squared residual tolerance, as a share of the energy,
 # or after so many steps.
@@ -60,7 +60,7 @@ class ConstrainedOutcome:
     contradictory: bool
 
 
-def is_factored(network: SpringNetwork, options: RelaxOptions) -> bool:
+def factor_pays(network: SpringNetwork, options: RelaxOptions) -> bool:
     """Return whether a network is relaxed by `relax_under_equations`: if it is not too large, and plain steps are not asked for."""
     return options.solver != "plain" and network.vertex_count <= _MOST_VERTICES
 
