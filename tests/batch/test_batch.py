@@ -176,8 +176,18 @@ def test_an_error_is_a_result(tmp_path: Path):
 def test_set_aside_leaves_nothing_behind(tmp_path: Path):
     (task, *_) = plan(tmp_path)
     (tmp_path / task.key).mkdir()
-    assert set_aside(task, tmp_path, "killed").status == "set aside"
+    assert set_aside(task, tmp_path).status == "set aside"
     assert not (tmp_path / task.key).exists()
+
+
+def test_a_task_that_killed_its_process_three_times_is_set_aside(tmp_path: Path):
+    task, other, *_ = plan(tmp_path)
+    (tmp_path / f"{task.key}.started").write_text("here 1\nhere 2\nhere 3\n")
+    (tmp_path / f"{other.key}.started").write_text("here 1\nhere 2\n")
+    rows = run_batch([task, other], tmp_path)
+    assert [row.status for row in rows] == ["set aside", "at rest"]
+    assert "killed 3 times" in rows[0].message
+    assert not list(tmp_path.glob("*.started"))
 
 
 # --- workers

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from warpflat.batch.index import BatchIndex
 from warpflat.batch.plan import Task
-from warpflat.batch.task import Row, read_row, run_task
+from warpflat.batch.task import Row, forget_starts, read_row, run_task
 from warpflat.core.atomic_files import prepare_folder
 
 __all__ = ["run_batch"]
@@ -61,6 +61,7 @@ def run_batch(
     except BaseException:
         for task in todo:  # what workers have finished meanwhile
             index.add(read_row(task, folder) or Row(task=task))
+            forget_starts(task, folder)
         raise
     finally:
         index.write()

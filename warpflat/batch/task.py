@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import os
+import platform
 import time
 import traceback
 from collections.abc import Mapping
@@ -17,9 +18,24 @@ from warpflat.core.errors import InputError
 from warpflat.core.json_file import write_json
 from warpflat.core.text import one_line
 
-__all__ = ["ERROR", "NOT_AT_REST", "SET_ASIDE", "TO_DO", "Row", "error_file", "read_row", "run_task", "set_aside"]
+__all__ = [
+    "ERROR",
+    "NOT_AT_REST",
+    "SET_ASIDE",
+    "TO_DO",
+    "Row",
+    "error_file",
+    "forget_starts",
+    "has_killed",
+    "read_row",
+    "run_task",
+    "set_aside",
+]
 
 TO_DO, AT_REST, NOT_AT_REST, ERROR, SET_ASIDE = "to do", "at rest", "not at rest", "error", "set aside"
+
+# A task is set aside when it has killed its process so many times.
+_MOST_KILLS = 3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -53,15 +69,26 @@ def run_task(task: Task, out: Path) -> Row:
     """Run a task unless its result is there; whatever error its scene meets is a result too.
 
     The files of the run lie in `out`/KEY, with `task.json`: what the task was and how long it took. They appear together or not at all.
+    Each start is a line in `out`/KEY.started, which is removed at the end: lines that stay tell how often the task has killed its process.
 
     Raises:
         InputError: the result cannot be written.
     """
-    from warpflat.scene.run import run_scene
-
     done = read_row(task, out)
     if done is not None:
         return done
+    if has_killed(task, out):
+        return set_aside(task, out)
+    _note_start(task, out)
+    try:
+        return _run(task, out)
+    finally:
+        forget_starts(task, out)
+
+
+def _run(task: Task, out: Path) -> Row:
+    from warpflat.scene.run import run_scene
+
     begin, folder = time.perf_counter(), out / task.key
     try:
         with output_folder(folder, ["task.json"]):
@@ -75,8 +102,33 @@ def run_task(task: Task, out: Path) -> Row:
     return read_row(task, out) or Row(task=task)
 
 
-def set_aside(task: Task, out: Path, reason: str) -> Row:
-    """Record that a task is not tried again; return its row.
+def has_killed(task: Task, out: Path) -> bool:
+    """Return whether a task has killed its process as often as is allowed."""
+    try:
+        return len(_started(task, out).read_text(encoding="utf-8").splitlines()) >= _MOST_KILLS
+    except OSError:
+        return False
+
+
+def forget_starts(task: Task, out: Path) -> None:
+    """Begin the count of a task's kills anew: it has ended, or was stopped on purpose."""
+    _started(task, out).unlink(missing_ok=True)
+
+
+def _started(task: Task, out: Path) -> Path:
+    return out / f"{task.key}.started"
+
+
+def _note_start(task: Task, out: Path) -> None:
+    try:
+        with _started(task, out).open("a", encoding="utf-8") as file:
+            file.write(f"{platform.node()} {os.getpid()}\n")
+    except OSError as error:
+        raise InputError(f"{_started(task, out)} cannot be written ({error.strerror})") from None
+
+
+def set_aside(task: Task, out: Path) -> Row:
+    """Record that a task is not tried again, since it has killed its process too often; return its row.
 
     Raises:
         InputError: that cannot be written.
@@ -87,7 +139,9 @@ def set_aside(task: Task, out: Path, reason: str) -> Row:
         if not any(folder.iterdir()):
             folder.rmdir()
     if read_row(task, out) is None:
+        reason = f"its process was killed {_MOST_KILLS} times, perhaps for want of memory"
         _write_error(task, out, SET_ASIDE, reason)
+    forget_starts(task, out)
     return read_row(task, out) or Row(task=task)
 
 

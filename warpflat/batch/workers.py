@@ -8,23 +8,23 @@ import logging
 import os
 import platform
 import threading
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
 
-import dask
 from distributed import Client, Future, KilledWorker, LocalCluster, TimeoutError, wait
 from distributed.comm import CommClosedError
 from distributed.system import MEMORY_LIMIT
 
 from warpflat._version import __version__
 from warpflat.batch.plan import Task
-from warpflat.batch.task import Row, run_task, set_aside
+from warpflat.batch.task import Row, has_killed, run_task, set_aside
 from warpflat.core.errors import InputError
 
 __all__ = ["run_on_cluster", "run_on_workers"]
 
-# A task is set aside when it has killed so many workers.
-_MOST_KILLS = 3
+# A task that is blamed for so many dead workers is set aside, even if it never got as far as its start.
+_MOST_BLAMES = 20
 # How long a scheduler is waited for [s].
 _PATIENCE = 60.0
 # How often the number of workers is asked for [s].
@@ -50,10 +50,7 @@ def run_on_workers(tasks: Sequence[Task], out: Path, count: int) -> Iterator[Row
     from warpflat.core.compile import compile_all_modules
 
     compile_all_modules()
-    # Dask counts the kills that it allows, and sets aside at one more.
-    settings = {"distributed.scheduler.allowed-failures": _MOST_KILLS - 1}
     with (
-        dask.config.set(settings),
         LocalCluster(
             n_workers=count,
             threads_per_worker=1,
@@ -103,8 +100,10 @@ def _connect(address: str) -> Client:
 def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row]:
     """Run tasks on the workers that a client has, and take each from `todo` when it is done.
 
-    No more tasks are submitted than there are workers: when a worker dies, Dask blames all tasks that it had been given.
+    No more tasks are submitted than there are workers: when a worker dies, Dask blames all tasks that it had been given. A task that Dask
+    gives up is tried again, unless the count of its own starts says that it has killed its workers itself.
     """
+    blames = Counter[str]()
     waiting = list(todo.values())
     going: dict[Future, Task] = {}
     while waiting or going:
@@ -117,24 +116,17 @@ def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row
         except TimeoutError:
             continue
         for future in done:
-            task = going.pop(future)
-            row = _row(future, task, out)
-            del todo[task.key]
+            task = going[future]
+            try:
+                row: Row = future.result()
+            except KilledWorker:
+                blames[task.key] += 1
+                if not has_killed(task, out) and blames[task.key] < _MOST_BLAMES:
+                    future.retry()
+                    continue
+                row = set_aside(task, out)
+            del going[future], todo[task.key]
             yield row
-
-
-def _row(future: Future, task: Task, out: Path) -> Row:
-    """Return the row of a task that is done, or set aside.
-
-    Raises:
-        CancelledError: the scheduler was lost.
-        InputError: of the worker.
-    """
-    try:
-        row: Row = future.result()
-    except KilledWorker:
-        return set_aside(task, out, f"its worker was killed {_MOST_KILLS} times, perhaps for want of memory")
-    return row
 
 
 def _start_warp() -> None:
