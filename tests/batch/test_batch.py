@@ -12,9 +12,10 @@ from typing import Any
 import pytest
 from click.testing import CliRunner
 
+from warpflat.batch.body_statistics import BodyPattern, bodies_table, compare_with_sizes, fit_trend
 from warpflat.batch.plan import Task, load_batch
 from warpflat.batch.run import run_batch
-from warpflat.batch.task import read_row, set_aside
+from warpflat.batch.task import Row, read_row, set_aside
 from warpflat.cli.batch import batch
 from warpflat.core.errors import InputError
 
@@ -188,6 +189,59 @@ def test_a_task_that_killed_its_process_three_times_is_set_aside(tmp_path: Path)
     assert [row.status for row in rows] == ["set aside", "at rest"]
     assert "killed 3 times" in rows[0].message
     assert not list(tmp_path.glob("*.started"))
+
+
+# --- bodies
+
+
+def body_pattern(name: str, girths: tuple[float, float, float], *, is_size: bool) -> BodyPattern:
+    task = Task(key=name, name="b", scene="b.toml", body=name, fabric="woven", override="", data={}, where="")
+    bust, waist, hip = girths
+    return BodyPattern(
+        row=Row(task=task, status="at rest"),
+        is_size=is_size,
+        girths={"bust": bust, "waist": waist, "hip": hip},
+        measures={"area": 0.5 * bust, "side_seam": 0.2},
+        pattern_girths={"bust": bust + 0.06, "waist": waist + 0.04},
+        strain_limit=0.05,
+    )
+
+
+def test_bodies_are_compared_with_their_nearest_size():
+    sizes = [
+        body_pattern(f"EU {n}", (0.01 * n + 0.5, 0.01 * n + 0.34, 0.01 * n + 0.58), is_size=True) for n in (36, 40)
+    ]
+    near = body_pattern("Ada", (0.905, 0.74, 0.98), is_size=False)
+    narrow = body_pattern("Eve", (0.90, 0.90, 0.98), is_size=False)
+    *_, near, narrow = compare_with_sizes([*sizes, near, narrow])
+    assert (near.size, narrow.size) == ("EU 40", "EU 40")
+    assert near.graded_ease["bust"] == pytest.approx(0.055)
+    assert not near.pays
+    # The size's waist is 0.78 m around a waist of 0.90 m.
+    assert narrow.graded_strain == pytest.approx(0.90 / 0.78 - 1.0)
+    assert narrow.pays
+    assert list(csv.DictReader(bodies_table([near, narrow]).splitlines()))[1]["made_to_measure_pays"] == "yes"
+
+
+def test_a_trend_is_the_line_through_the_measures():
+    trend = fit_trend([0.8, 0.9, 1.0], [1.0, 1.2, 1.4])
+    assert trend is not None
+    assert (trend.slope, trend.offset, trend.determination) == pytest.approx((2.0, -0.6, 1.0))
+    assert fit_trend([0.8, 0.8, 0.9], [1.0, 1.1, 1.2]) is None
+
+
+def test_a_batch_over_bodies_draws_them(tmp_path: Path):
+    (tmp_path / "b.toml").write_text(
+        'forms = ["bodice"]\noverrides = [{ mannequin = { resolution_mm = 40 }, output = { picture = false, frames = 0 }, '
+        'pattern = { formats = [] } }]\n[[bodies]]\nsize = "EU 38"\n[[bodies]]\nname = "Ada"\n'
+        "measurements = { bust = 0.97, waist = 0.70, hip = 0.97, stature = 1.70 }\n"
+    )
+    run_batch(load_batch(tmp_path / "b.toml"), tmp_path / "out")
+    (size, ada) = csv.DictReader((tmp_path / "out" / "bodies.csv").open())
+    assert (size["nearest_size"], ada["nearest_size"]) == ("", "EU 38")
+    assert ada["made_to_measure_pays"] == "yes"
+    assert (tmp_path / "out" / "bodies.png").stat().st_size > 10_000
+    assert "bodies.png" in (tmp_path / "out" / "index.html").read_text()
 
 
 # --- workers

@@ -29,6 +29,12 @@ td img { height: 90px; width: auto; margin: 0; border-radius: 4px; } td.message 
 """
 
 
+_BODIES = """
+<h2>Bodies</h2><p class="sub">Measures of the patterns over the girths of the bodies, and the ease at each level where a body wears the
+nearest size of this batch. <a href="bodies.csv">bodies.csv</a> has the figures.</p>
+<img src="bodies.png" alt="Measures of the patterns over bust, waist and hip">"""
+
+
 class BatchIndex:
     """The rows of a batch, in the order of its tasks, and the files that show them."""
 
@@ -52,14 +58,14 @@ class BatchIndex:
         if time.monotonic() - self._written >= _EVERY:
             self.write()
 
-    def write(self) -> None:
-        """Write `index.csv` and `index.html`.
+    def write(self, *, bodies: bool = False) -> None:
+        """Write `index.csv` and `index.html`; the page shows `bodies.png` if that is there.
 
         Raises:
             InputError: they cannot be written.
         """
         rows = self.rows
-        for name, text in (("index.csv", _table(rows)), ("index.html", _page(rows))):
+        for name, text in (("index.csv", _table(rows)), ("index.html", _page(rows, bodies=bodies))):
             with atomic_path(self._out / name) as temporary:
                 temporary.write_text(text, encoding="utf-8", newline="")
         self._written = time.monotonic()
@@ -87,7 +93,7 @@ def _table(rows: Sequence[Row]) -> str:
     return text.getvalue()
 
 
-def _page(rows: Sequence[Row]) -> str:
+def _page(rows: Sequence[Row], *, bodies: bool) -> str:
     levels = _levels(rows)
     columns = [
         _column("", [row.task.key for row in rows], [_picture(row) for row in rows]),
@@ -110,7 +116,8 @@ def _page(rows: Sequence[Row]) -> str:
         f'<meta name="viewport" content="width=device-width, initial-scale=1"><style>{style}{_STYLE}</style></head>'
         f'<body><main><h1>Batch</h1><p class="sub">{len(rows)} tasks: {escape(told)}. '
         "Girths are of the pattern. A click on a heading sorts.</p>"
-        f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div></main>'
+        f'<div class="scroll"><table><thead><tr>{"".join(head)}</tr></thead><tbody>\n{body}\n</tbody></table></div>'
+        f"{_BODIES if bodies else ''}</main>"
         f"<script>{script}</script></body></html>\n"
     )
 

@@ -6,10 +6,11 @@ from collections.abc import Callable, Generator, Sequence
 from contextlib import closing
 from pathlib import Path
 
+from warpflat.batch.body_statistics import bodies_table, read_body_patterns
 from warpflat.batch.index import BatchIndex
 from warpflat.batch.plan import Task
 from warpflat.batch.task import Row, forget_starts, read_row, run_task
-from warpflat.core.atomic_files import prepare_folder
+from warpflat.core.atomic_files import atomic_path, prepare_folder
 
 __all__ = ["run_batch"]
 
@@ -25,7 +26,8 @@ def run_batch(
 ) -> list[Row]:
     """Run the tasks of a batch whose results are not in `out` yet; return a row for each, in their order.
 
-    Files: `KEY/` as of a run or `KEY.error.json` per task, `index.csv` and `index.html`. An interruption keeps what is done.
+    Files: `KEY/` as of a run or `KEY.error.json` per task, `index.csv` and `index.html`; of several bodies `bodies.csv` and
+    `bodies.png`. An interruption keeps what is done.
 
     Args:
         tasks: of :func:`warpflat.batch.plan.load_batch`.
@@ -65,7 +67,21 @@ def run_batch(
         raise
     finally:
         index.write()
+    _write_bodies(index, folder)
     return index.rows
+
+
+def _write_bodies(index: BatchIndex, out: Path) -> None:
+    """Write `bodies.csv` and `bodies.png` if the batch has several bodies."""
+    patterns = read_body_patterns(index.rows, out)
+    if len({tuple(pattern.girths.values()) for pattern in patterns}) < 2:
+        return
+    from warpflat.batch.body_picture import write_body_picture
+
+    with atomic_path(out / "bodies.csv") as temporary:
+        temporary.write_text(bodies_table(patterns), encoding="utf-8", newline="")
+    write_body_picture(out / "bodies.png", patterns)
+    index.write(bodies=True)
 
 
 def _results(

@@ -21,7 +21,9 @@ What comes out, in DIR:
   KEY/             the files of a run, and task.json: what the task was
   KEY.error.json   instead of them: why the task failed; remove it to try the task again
   index.html       a table of all tasks with pictures; a click on a heading sorts
-  index.csv        the same for programs"""
+  index.csv        the same for programs
+  bodies.csv, bodies.png
+                   of several bodies: measures of the patterns over girths, and which bodies no size fits"""
 _MOST_ERRORS = 10
 _BAR = "{desc}: {n_fmt}/{total_fmt} tasks |{bar:20}| [{elapsed}, {remaining} left]"
 
