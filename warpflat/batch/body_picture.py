@@ -74,6 +74,9 @@ def _draw_measure(ax: Axes, patterns: Sequence[BodyPattern], name: str, level: s
 
 def _draw_ease(ax: Axes, graded: Sequence[BodyPattern], level: str) -> None:
     members = [pattern for pattern in graded if level in pattern.graded_ease and level in pattern.ease]
+    if not members:
+        ax.set_visible(False)
+        return
     x = np.array([100 * pattern.girths[level] for pattern in members])
     ax.scatter(
         x, [100 * p.ease[level] for p in members], s=18, facecolors="none", edgecolors=_GREY, label="made to measure"
