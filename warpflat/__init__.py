@@ -37,6 +37,7 @@ if TYPE_CHECKING:
     from warpflat.flattening.fit_report import Remedy
     from warpflat.flattening.flatten_all import flatten_all
     from warpflat.flattening.flatten_piece import flatten
+    from warpflat.flattening.gradient import Gradient, gradient
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
     from warpflat.flattening.step_by_step import RelaxationStep, relaxation
@@ -100,6 +101,7 @@ _HOME = {
     "Flattening": "flattening.result",
     "Form": "mannequin.forms",
     "Garment": "garment.garment",
+    "Gradient": "flattening.gradient",
     "InputError": "core.errors",
     "Mannequin": "mannequin.mannequin",
     "PatternOptions": "garment.pattern_files",
@@ -127,6 +129,7 @@ _HOME = {
     "form_from_mapping": "mannequin.forms",
     "form_names": "mannequin.forms",
     "garment_files": "garment.pattern_files",
+    "gradient": "flattening.gradient",
     "line_between": "surface.paths.lines",
     "line_from_curve": "surface.paths.lines",
     "line_on_plane": "surface.paths.lines",
@@ -166,6 +169,7 @@ __all__ = [
     "Flattening",
     "Form",
     "Garment",
+    "Gradient",
     "InputError",
     "Mannequin",
     "PatternOptions",
@@ -194,6 +198,7 @@ __all__ = [
     "form_from_mapping",
     "form_names",
     "garment_files",
+    "gradient",
     "line_between",
     "line_from_curve",
     "line_on_plane",
