@@ -73,7 +73,7 @@ def others(fabrics: tuple[str, ...]) -> Iterator[tuple[str, Surface, str]]:
         yield "saddle, split", make_surface(saddle.vertices, triangulate(saddle.faces)[0], name="saddle"), fabric
         for kind, shape, size in (
             ("irregular", "dome", 3_500),
-            ("irregular", "bodice", 6_000),
+            ("irregular", "bodice", 2_500),
             ("crack", "bodice", 3_000),
         ):
             whole = KINDS[kind](shape, size).surface

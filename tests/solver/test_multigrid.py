@@ -20,7 +20,6 @@ from warpflat.flattening.result import Flattening
 from warpflat.model import network
 from warpflat.model.network import SpringNetwork
 from warpflat.model.springs import springs_of
-from warpflat.solver import quasi_newton
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import GrainAlignment
 from warpflat.solver.multigrid.cascade import start_from_cascade
@@ -41,7 +40,7 @@ PLAIN, LEVELS = RelaxOptions(solver="plain"), RelaxOptions(solver="multilevel")
 @pytest.fixture(autouse=True)
 def cycles_on_small_grids(monkeypatch: pytest.MonkeyPatch) -> None:
     """Grids are cycled here however small they are; `flatten` relaxes small ones by L-BFGS."""
-    monkeypatch.setattr(quasi_newton, "_MOST_OF_QUADS", 0)
+    monkeypatch.setattr(laplacian, "_MOST_OF_QUADS", 0)
 
 
 def cloth(shear: float) -> Fabric:

@@ -27,12 +27,10 @@ from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
 from warpflat.solver.remainder import Remainder, RemainderEstimate
 from warpflat.surface.connectivity import border_of
-from warpflat.surface.laplacian import can_be_factored, laplacian_of
+from warpflat.surface.laplacian import factor_pays, laplacian_of
 
 __all__ = ["Descent", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
 
-# The most vertices of a mesh of quads. On larger ones multigrid cycles are as fast, and faster on grids.
-_MOST_OF_QUADS = 4_000
 # Corrections that L-BFGS remembers.
 _MEMORY = 8
 # A piece is at rest when so many iterations together have released less than the energy tolerance allows, each,
@@ -51,10 +49,8 @@ Solve = Callable[[FloatArray], FloatArray]
 
 
 def quasi_newton_pays(network: SpringNetwork) -> bool:
-    """Return whether L-BFGS may be the fastest: for one piece of few vertices, of even fewer if it is of quads, nothing sewn."""
-    surface = network.surface
-    few = can_be_factored(surface) and (network.vertex_count <= _MOST_OF_QUADS or not bool(surface.is_quad.all()))
-    return few and network.seams is None
+    """Return whether L-BFGS may be the fastest: for one piece of few vertices, nothing sewn."""
+    return network.seams is None and factor_pays(network.surface)
 
 
 @dataclass(frozen=True, kw_only=True)
