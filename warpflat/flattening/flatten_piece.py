@@ -32,7 +32,7 @@ from warpflat.model.wear import Wear, unused_stretch
 from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
-from warpflat.surface.laplacian import can_be_factored
+from warpflat.surface.laplacian import factor_pays
 from warpflat.surface.mesh import Surface, is_large
 
 __all__ = ["flatten", "return_memory_of"]
@@ -191,7 +191,7 @@ def develop_piece(
         wear=settings.wear,
     )
     return_memory_of(surface)
-    has_levels = settings.options.solver == "multilevel" and not can_be_factored(surface)
+    has_levels = settings.options.solver == "multilevel" and not factor_pays(surface)
     with hierarchy_in_background(surface) if has_levels else nullcontext():
         development = choose_start(surface, line) if start is None else given_start(surface, line, start)
         development = task.shrink_to_rest(development)

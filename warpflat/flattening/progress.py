@@ -10,6 +10,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import worn_strain
 from warpflat.solver.convergence import Energies
 from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.remainder import Remainder
 from warpflat.surface.mesh import Surface
 
 __all__ = ["CONTACT", "Progress", "Stage"]
@@ -32,6 +33,7 @@ class Stage:
         seconds: wall time.
         converged: False if it ended at its step limit.
         residual: largest force on a vertex over the mean spring force; None if there was no relaxation.
+        left: the estimate of what was still to be relaxed; None where there is none.
     """
 
     name: str
@@ -43,10 +45,11 @@ class Stage:
     seconds: float
     converged: bool
     residual: float | None
+    left: Remainder | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `stages` in `metrics.json`."""
-        return dict(self.__dict__)
+        return self.__dict__ | {"left": None if self.left is None else dict(self.left.__dict__)}
 
 
 class Progress:

@@ -181,6 +181,7 @@ class RelaxationTask:
             seconds=outcome.seconds,
             converged=outcome.converged,
             residual=outcome.residual,
+            left=outcome.left,
         )
 
 

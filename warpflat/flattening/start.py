@@ -15,12 +15,13 @@ from warpflat.flattening.develop import (
     develop,
     flat_layout,
     geodesic_layout,
+    profile_layout,
     turn_upright,
     winds_twice,
 )
 from warpflat.surface.cells import make_cells
 from warpflat.surface.injective import is_injective
-from warpflat.surface.laplacian import can_be_factored, laplacian_of
+from warpflat.surface.laplacian import factor_pays, laplacian_of
 from warpflat.surface.mesh import Surface
 
 __all__ = ["choose_start", "given_start"]
@@ -36,12 +37,16 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     """Return the start of a piece: its development, or what as-rigid iterations make of it where a factor is cheap.
 
     Draped meshes are developed by geodesic distances, which crush some faces, and are far from rest. A few as-rigid iterations unfold
-    these and are much nearer, for a factor that the relaxation needs as well. Grids of quads are near enough as they are developed.
+    these and are much nearer, for a factor that the relaxation needs as well. Grids whose profiles are laid out are near enough.
 
     Raises:
         InputError: the surface is a closed tube.
     """
-    if not can_be_factored(surface) or surface.is_quad.all() or flat_layout(surface, datum) is not None:
+    if (
+        not factor_pays(surface)
+        or flat_layout(surface, datum) is not None
+        or profile_layout(surface, datum) is not None
+    ):
         return develop(surface, datum)
     first = _geodesic(surface, datum)
     rigid = None if first is None else _as_rigid(surface, first)

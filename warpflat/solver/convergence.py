@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.solver.remainder import Remainder
 
 __all__ = ["ConvergenceStatus", "Energies", "Iterate", "Outcome", "Vectors"]
 
@@ -101,6 +102,7 @@ class Outcome:
         energies: at the end [J].
         seconds: wall clock.
         notes: why plain steps went on where cycles were meant to, one sentence each.
+        left: the estimate of what was still to be relaxed, where there is one.
     """
 
     converged: bool
@@ -112,3 +114,4 @@ class Outcome:
     energies: Energies
     seconds: float
     notes: tuple[str, ...] = ()
+    left: Remainder | None = None

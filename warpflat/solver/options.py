@@ -20,6 +20,9 @@ class RelaxOptions:
 
     Attributes:
         time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
+        energy_left, outline_left_mm: L-BFGS ends when by estimate (`warpflat.solver.remainder`) at most this share of the energy is
+            still to be released, and no point of the outline will move by more than so many millimetres. With 0, or where one of the
+            tolerances below is stricter than its default, it ends by the tolerances alone.
         energy_tolerance: eq. (11): relative change of the energy per step.
         residual_tolerance: largest force on a vertex over the mean force of the springs. After Gauss-Newton steps
             (`warpflat.solver.gauss_newton`) a piece also counts as at rest when its forces could release next to no
@@ -35,6 +38,8 @@ class RelaxOptions:
     """
 
     time_step: float = 0.01
+    energy_left: float = 1e-3
+    outline_left_mm: float = 0.2
     energy_tolerance: float = 1e-6
     residual_tolerance: float = 5e-3
     max_steps: int = 20_000
@@ -47,6 +52,8 @@ class RelaxOptions:
         """Raise InputError, with its name, for a value out of its bounds."""
         for key, low, high in (
             ("time_step", 1e-9, 1e9),
+            ("energy_left", 0.0, 1.0),
+            ("outline_left_mm", 0.0, 1e3),
             ("energy_tolerance", 0.0, 1.0),
             ("residual_tolerance", 1e-12, 1e3),
             ("max_steps", 1, 10**9),

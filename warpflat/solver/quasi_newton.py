@@ -25,7 +25,9 @@ from warpflat.solver.grain_alignment import GrainAlignment, align_grain
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.laplacian import can_be_factored, laplacian_of
+from warpflat.solver.remainder import Remainder, RemainderEstimate
+from warpflat.surface.connectivity import border_of
+from warpflat.surface.laplacian import factor_pays, laplacian_of
 
 __all__ = ["Descent", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
 
@@ -47,9 +49,8 @@ Solve = Callable[[FloatArray], FloatArray]
 
 
 def quasi_newton_pays(network: SpringNetwork) -> bool:
-    """Return whether L-BFGS may be the fastest: for one piece of few vertices, nothing sewn, that is no grid of quads."""
-    surface = network.surface
-    return network.seams is None and can_be_factored(surface) and not bool(surface.is_quad.all())
+    """Return whether L-BFGS may be the fastest: for one piece of few vertices, nothing sewn."""
+    return network.seams is None and factor_pays(network.surface)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -292,6 +293,7 @@ def relax_quasi_newton(
     if not np.isfinite(point.energy):
         return state.make_outcome(steps_before, work_before, began_at=began_at)
     descent, options = Descent(problem, point), state.options
+    estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
 
     done = False
     while not done:
@@ -300,24 +302,33 @@ def relax_quasi_newton(
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
             each_step(state, state.status.total, state.status.worst_residual)
-        near = descent.is_at_rest(options)
+        left = estimate.add(descent.point.energy, descent.point.positions)
+        near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps
         done |= least_gain is not None and descent.gain <= least_gain * descent.point.energy
         if done or near or descent.iterations % options.check_every == 0:
-            _check(state, descent, near)
+            _check(state, descent, near, left)
             done |= bool(state.status.at_rest.all())
             if watch is not None:
                 watch(state, state.status.total, state.status.worst_residual)
-    return state.make_outcome(steps_before, work_before, began_at=began_at)
+    outcome = state.make_outcome(steps_before, work_before, began_at=began_at)
+    return replace(outcome, left=left if np.isfinite(left.outline_mm) else None)
 
 
-def _check(state: Relaxation, descent: Descent[Point], near: bool) -> None:
-    """Check convergence at the present layout: near rest, by residual or by what could still be released, or free of strain."""
+def _check(state: Relaxation, descent: Descent[Point], near: bool, left: Remainder) -> None:
+    """Check convergence at the present layout: little left, or the tolerances are met, or free of strain.
+
+    Args:
+        state: holds the status afterwards.
+        descent: where it is.
+        near: whether it may be at rest.
+        left: what is left by estimate.
+    """
     state.position.assign(descent.point.positions)
     state.evaluate_at_rest()
     status, options = state.check_convergence(1.0), state.options
     residual = status.residual * _without_reaction(state)
-    small = residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
+    small = left.is_small(options) or residual <= options.residual_tolerance or descent.is_at_rest(options, _SMALLER)
     free = descent.point.energy <= state.negligible_energy
     state.status = replace(status, residual=residual, at_rest=(near & small) | free, change=np.array([descent.change]))
 

@@ -16,10 +16,12 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface, once_per_surface
 
-__all__ = ["Laplacian", "can_be_factored", "laplacian_of"]
+__all__ = ["Laplacian", "factor_pays", "laplacian_of"]
 
 # The most vertices of a surface that is factored: a factor's entries grow faster than the mesh.
 _MOST_VERTICES = 20_000
+# The same for meshes of quads alone: on larger ones multigrid cycles are as fast, and on grids faster.
+_MOST_OF_QUADS = 4_000
 
 # A cell counts as at least so high, over its length.
 _LEAST_HEIGHT = 1e-4
@@ -77,9 +79,9 @@ class Laplacian:
         return positions + self.solve(right - self.matrix @ positions)
 
 
-def can_be_factored(surface: Surface) -> bool:
-    """Return whether a surface has so few vertices that a factor of its Laplacian is cheap."""
-    return len(surface.vertices) <= _MOST_VERTICES
+def factor_pays(surface: Surface) -> bool:
+    """Return whether a surface has so few vertices that it is worth while to factor its Laplacian."""
+    return len(surface.vertices) <= (_MOST_OF_QUADS if surface.is_quad.all() else _MOST_VERTICES)
 
 
 @once_per_surface

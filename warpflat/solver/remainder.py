@@ -1,0 +1,77 @@
+"""An estimate of what a relaxation has still to do: the energy that it would release, and how far the outline would move."""
+
+from __future__ import annotations
+
+from collections import deque
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.solver.options import RelaxOptions
+
+__all__ = ["Remainder", "RemainderEstimate"]
+
+# So many iterations are looked back upon. What follows them releases at most so many times their energy, and moves the outline at most so
+# many times as far: measured on draped meshes, split grids and forms (`benchmarks/stopping.py` measures it on others).
+_INTERVAL = 6
+_ENERGY_FACTOR, _OUTLINE_FACTOR = 10.0, 4.0
+# No estimate is smaller: a share of the energy, and a distance [m].
+_LEAST_SHARE, _LEAST_DISTANCE = 1e-4, 5e-5
+
+
+@dataclass(frozen=True, kw_only=True)
+class Remainder:
+    """What is left to relax, as estimated.
+
+    Attributes:
+        energy_share: the energy still to be released, over the present one.
+        outline_mm: the farthest way that a point of the border still goes [mm].
+    """
+
+    energy_share: float = np.inf
+    outline_mm: float = np.inf
+
+    def is_small(self, options: RelaxOptions) -> bool:
+        """Return whether both are within the options; never where a tolerance is stricter than by default, which is then met."""
+        default = RelaxOptions()
+        strict = (
+            options.energy_tolerance < default.energy_tolerance
+            or options.residual_tolerance < default.residual_tolerance
+        )
+        small = self.energy_share <= options.energy_left and self.outline_mm <= options.outline_left_mm
+        return small and not strict
+
+
+class RemainderEstimate:
+    """The last layouts of a descent, and the estimate that follows from them."""
+
+    def __init__(self, border: IntArray) -> None:
+        """Start without a layout.
+
+        Args:
+            border: the vertices of the outline.
+        """
+        self._border = border
+        self._last: deque[tuple[float, FloatArray]] = deque(maxlen=_INTERVAL + 1)
+
+    def add(self, energy: float, positions: FloatArray) -> Remainder:
+        """Add the layout of the next iteration and return what is left after it; infinite after few iterations.
+
+        Args:
+            energy: of the layout [J].
+            positions: #V by 2 [m], turned upright.
+        """
+        outline = positions[self._border]
+        self._last.append((energy, outline))
+        if len(self._last) <= _INTERVAL:
+            return Remainder()
+        before, there = self._last[0]
+        moved = outline - there
+        moved -= moved.mean(axis=0)
+        distance = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
+        share = (before - energy) / max(energy, 1e-300)
+        return Remainder(
+            energy_share=max(_ENERGY_FACTOR * share, _LEAST_SHARE),
+            outline_mm=1e3 * max(_OUTLINE_FACTOR * distance, _LEAST_DISTANCE),
+        )
