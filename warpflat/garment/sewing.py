@@ -192,7 +192,12 @@ def sew(
             lever=equations.lever,
         )
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
-    alignments = [piece for name, piece in joined.upright.items() if name not in folds and name not in oriented]
+    alignments = [
+        part
+        for name, parts in joined.alignments.items()
+        if name not in folds and name not in oriented
+        for part in parts
+    ]
     state = Relaxation(network, options, start=start, alignments=alignments)
     ended = _relax(state, equations)
     seconds = time.perf_counter() - start_time

@@ -106,10 +106,11 @@ def _metric(state: Relaxation) -> Solve:
     diagonal = matrix.diagonal()
     matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    # The chords of the data stay exactly upright: their rows are Lagrange multipliers.
+    # The chords keep their directions exactly: their rows are Lagrange multipliers.
     chords = np.zeros((len(state.alignments), len(free)))
     for row, each in zip(chords, state.alignments, strict=True):
-        row[[2 * each.upper, 2 * each.lower]] = 1.0, -1.0
+        across = np.array([each.direction[1], -each.direction[0]])
+        row.reshape(-1, 2)[[each.upper, each.lower]] = across, -across
     columns = factor.solve(np.ascontiguousarray(chords.T))
     inner = chords @ columns
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import GrainAlignment, align_grain, remove_rotation
+from warpflat.solver.grain_alignment import align_grain, remove_rotation
 from warpflat.solver.quasi_newton import Descent, Metric, Point, Solve
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
@@ -167,11 +167,11 @@ class _Point(Point):
 class _Problem:
     """The energy that is minimised: cloth and barrier."""
 
-    def __init__(self, state: Relaxation, grain: GrainAlignment, gap: float) -> None:
-        self.state, self._grain = state, grain
+    def __init__(self, state: Relaxation, gap: float) -> None:
+        self.state = state
         stiffness = float(np.median(state.network.spring_arrays.stiffness))
         self._barrier = Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
-        self._metric = Metric(state.network, [grain])
+        self._metric = Metric(state.network, state.alignments)
 
     def at(self, positions: FloatArray) -> _Point:
         """Evaluate a layout."""
@@ -202,7 +202,7 @@ class _Problem:
         weight = np.bincount(springs.ends.ravel(), np.repeat(springs.stiffness, 2), minlength=len(force)).astype(
             np.float64
         )
-        remove_rotation([self._grain], point.positions, force, weight)
+        remove_rotation(self.state.alignments, point.positions, force, weight)
         return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
 
 
@@ -216,10 +216,9 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     Returns:
         How it ended; the energies are those of the cloth alone. None if the start is not injective, in which case nothing is done.
     """
-    began, (grain,) = time.perf_counter(), state.alignments
-    start = state.positions()
-    align_grain([grain], start)
-    problem = _Problem(state, grain, gap)
+    began, start = time.perf_counter(), state.positions()
+    align_grain(state.alignments, start)
+    problem = _Problem(state, gap)
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return None
@@ -229,7 +228,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
         at_rest = descent.is_at_rest(state.options)
     residual = problem.residual(descent.point)
     end = descent.point.positions.copy()
-    align_grain([grain], end)
+    align_grain(state.alignments, end)
     state.position.assign(end)
     state.steps += descent.iterations
     state.work_units += descent.work_units
