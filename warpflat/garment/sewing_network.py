@@ -7,8 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import range_offsets
+from warpflat.flattening.applied_cut import cut_sides
 from warpflat.flattening.progress import Stage
 from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
@@ -16,6 +17,7 @@ from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
 from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.relaxation import Relaxation
+from warpflat.surface.injective import overlap_area
 
 __all__ = ["SewingNetwork"]
 
@@ -55,14 +57,25 @@ class SewingNetwork:
         network.parts = ()
         return network
 
-    def split(self, state: Relaxation, *, converged: bool, seconds: float, residual: float) -> dict[str, Flattening]:
-        """Return each piece with its part of the layout, and a stage "sew" in its history."""
+    def overlaps(self, layout: FloatArray) -> dict[str, float]:
+        """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""
+        areas = {
+            name: overlap_area(piece.network.surface, layout[own], cut_sides(piece.cuts))
+            for name, piece in self.pieces.items()
+            for own in [slice(self.first[name], self.first[name] + len(piece.positions))]
+        }
+        return {name: area for name, area in areas.items() if area}
+
+    def split(
+        self, state: Relaxation, *, converged: bool, seconds: float, residual: float, stage_name: str = "sew"
+    ) -> dict[str, Flattening]:
+        """Return each piece with its part of the layout, and a stage in its history."""
         layout, sewn = state.positions(), {}
         for name, piece in self.pieces.items():
             own = layout[self.first[name] : self.first[name] + len(piece.positions)]
             energies = Relaxation(piece.network, state.options, start=own).energies()
             stage = Stage(
-                name="sew",
+                name=stage_name,
                 model_energy_j=energies.potential,
                 guard_energy_j=energies.guard,
                 strain_energy_j=strain_energy(piece.network, own),
