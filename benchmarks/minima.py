@@ -25,7 +25,7 @@ from peers import Problem, lscm
 from real import default_files
 
 import warpflat
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.develop import develop
 from warpflat.flattening.harmonic_layout import harmonic_layout
@@ -33,7 +33,7 @@ from warpflat.flattening.result import Flattening
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.surface.cells import make_cells
 from warpflat.surface.connectivity import components, non_manifold_vertices
-from warpflat.surface.io.read import read_surface
+from warpflat.surface.io.read import read_scan, read_surface
 from warpflat.surface.laplacian import laplacian_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
@@ -45,9 +45,8 @@ _BODIES = ("body_child", "body_female", "body_male", "body_male_heavy")
 _FORMS = (("basic_block", "EU 36"), ("basic_block", "EU 44"), ("princess_dress", "EU 38"))
 
 
-def _part(surface: Surface, keep: np.ndarray, name: str) -> Surface:
+def part_of(vertices: FloatArray, faces: IntArray, name: str) -> Surface:
     """Return the largest connected part of some faces, without bow ties."""
-    faces = surface.faces[keep]
     while True:
         part = components(faces)
         faces = faces[part == np.bincount(part).argmax()]
@@ -56,19 +55,19 @@ def _part(surface: Surface, keep: np.ndarray, name: str) -> Surface:
             break
         faces = faces[~np.isin(faces, tied).any(axis=1)]
     used, faces_used = np.unique(faces), faces >= 0
-    number = np.full(len(surface.vertices) + 1, -1)
+    number = np.full(len(vertices) + 1, -1)
     number[used[used >= 0]] = np.arange((used >= 0).sum())
-    return make_surface(surface.vertices[used[used >= 0]], np.where(faces_used, number[faces], -1), name=name)
+    return make_surface(vertices[used[used >= 0]], np.where(faces_used, number[faces], -1), name=name)
 
 
-def _patch(body: Surface, height: float, radius: float, name: str) -> Surface:
+def _patch(file: Path, height: float, radius: float) -> Surface:
     """Return the faces of a body around its front at a share of its height."""
-    low, high = body.vertices.min(axis=0), body.vertices.max(axis=0)
+    points, faces = read_scan(file)
+    low, high = points.min(axis=0), points.max(axis=0)
     at = np.array([0.5 * (low[0] + high[0]), low[1] + height * (high[1] - low[1]), high[2]])
-    seed = int(np.linalg.norm((body.vertices - at) * [1.0, 1.0, 0.3], axis=1).argmin())
-    middle = np.linalg.norm(body.vertices - body.vertices[seed], axis=1)
-    far = np.where(body.faces >= 0, middle[body.faces], 0.0).max(axis=1)
-    return _part(body, far < radius, name)
+    seed = int(np.linalg.norm((points - at) * [1.0, 1.0, 0.3], axis=1).argmin())
+    near = np.linalg.norm(points - points[seed], axis=1) < radius
+    return part_of(points, faces[near[faces].all(axis=1)], "patch")
 
 
 def _torn(surface: Surface, seed: int, name: str) -> Surface:
@@ -78,7 +77,7 @@ def _torn(surface: Surface, seed: int, name: str) -> Surface:
     middle = surface.vertices[surface.faces[:, :3]].mean(axis=1)
     size = np.linalg.norm(np.ptp(surface.vertices, axis=0))
     near = np.linalg.norm(middle[:, None] - places, axis=2) < size * random.uniform(0.01, 0.05, 8)
-    return _part(surface, ~near.any(axis=1), name)
+    return part_of(surface.vertices, surface.faces[~near.any(axis=1)], name)
 
 
 def meshes() -> Iterator[tuple[str, Callable[[], Surface]]]:
@@ -98,7 +97,7 @@ def meshes() -> Iterator[tuple[str, Callable[[], Surface]]]:
         if file.is_file():
             yield (
                 f"{body}, patch",
-                lambda f=file, h=height, r=radius: _patch(read_surface(f, units="m"), h, r, "patch"),
+                lambda f=file, h=height, r=radius: _patch(f, h, r),
             )
     for form, size in _FORMS:
         pieces = Mannequin.from_size(size, resolution_mm=15.0).form(form).pieces

@@ -22,7 +22,6 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.develop import Development
 from warpflat.flattening.harmonic_layout import harmonic_layout
 from warpflat.flattening.progress import CONTACT, Progress, Stage
-from warpflat.flattening.start import as_rigid_layout
 from warpflat.model.join import join_networks
 from warpflat.model.membrane import Model
 from warpflat.model.network import SpringNetwork
@@ -262,8 +261,7 @@ def keep_apart(
     Args:
         task: of the piece.
         end: the piece relaxed without contact.
-        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m]. It also starts
-            from a disk, after as-rigid iterations: which stretches come to lie beside each other is a matter of the start.
+        start: #V by 2, the layout from which it was relaxed, and from which contact starts if it is injective [m].
         cut_sides: the vertices on the sides of its cuts; a cut whose sides lie over each other is left as it is.
 
     Returns:
@@ -276,25 +274,19 @@ def keep_apart(
         return free, (relaxed,)
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
     alignments = grain_alignments(surface, task.datum, free)
-    starts = [open_cracks(surface, start)]
+    starts = [lambda: open_cracks(surface, start)]
     if not components_of(surface).any():
-        disk = harmonic_layout(surface)
-        rigid = as_rigid_layout(surface, disk)
-        starts.append(disk if rigid is None else rigid)
-    found = []
+        starts.append(lambda: harmonic_layout(surface))
     for first in starts:
-        state = Relaxation(network, task.options, start=first, alignments=alignments)
+        state = Relaxation(network, task.options, start=first(), alignments=alignments)
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
-            found.append((outcome, state))
-    if not found:
-        task.notes.append(f"{words}, and contact could not part it: cut it apart there")
-        return free, (relaxed,)
-    outcome, state = min(found, key=lambda end: end[0].energies.potential)
-    before, after = relaxed.model_energy_j, outcome.energies.potential
-    share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
-    task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
-    return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+            before, after = relaxed.model_energy_j, outcome.energies.potential
+            share = f" ({100 * (after - before) / before:+.2g} %)" if after < 2.0 * before else ""
+            task.notes.append(f"{words}; contact has parted it, at a price of {1e3 * (after - before):.3g} mJ{share}")
+            return state.positions(), (relaxed, task.make_stage(network, state.positions(), outcome, name=CONTACT))
+    task.notes.append(f"{words}, and contact could not part it: cut it apart there")
+    return free, (relaxed,)
 
 
 def _plain_step_notes(task: RelaxationTask, network: SpringNetwork) -> list[str]:

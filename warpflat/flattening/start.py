@@ -23,7 +23,7 @@ from warpflat.surface.injective import is_injective
 from warpflat.surface.laplacian import can_be_factored, laplacian_of
 from warpflat.surface.mesh import Surface
 
-__all__ = ["as_rigid_layout", "choose_start", "given_start"]
+__all__ = ["choose_start", "given_start"]
 
 # A cell of less than this share of its area counts as mirrored.
 _LEAST_AREA = 0.01
@@ -44,11 +44,11 @@ def choose_start(surface: Surface, datum: IntArray) -> Development:
     if not can_be_factored(surface) or surface.is_quad.all() or flat_layout(surface, datum) is not None:
         return develop(surface, datum)
     first = _geodesic(surface, datum)
-    rigid = None if first is None else as_rigid_layout(surface, first)
+    rigid = None if first is None else _as_rigid(surface, first)
     if rigid is not None:
         return Development(positions=turn_upright(rigid, datum), method="geodesic", as_rigid=True, mended=True)
     development = develop(surface, datum)
-    rigid = as_rigid_layout(surface, development.positions)
+    rigid = _as_rigid(surface, development.positions)
     if rigid is None:
         return development
     return replace(development, positions=turn_upright(rigid, datum), as_rigid=True, mended=True)
@@ -64,7 +64,7 @@ def _geodesic(surface: Surface, datum: IntArray) -> FloatArray | None:
     return None if positions is None else positions[index]
 
 
-def as_rigid_layout(surface: Surface, positions: FloatArray) -> FloatArray | None:
+def _as_rigid(surface: Surface, positions: FloatArray) -> FloatArray | None:
     """Return what as-rigid iterations make of a layout: none of its cells mirrored; None where that fails.
 
     Once a layout is injective, they end before one that is not.
