@@ -93,6 +93,23 @@ def test_pieces_of_one_network_are_held_each():
         np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-13)
 
 
+def test_parts_of_one_piece_are_held_each():
+    """As where a cut has parted it: the vertices of a part have no range of their own."""
+    one, other = state_of([9, 17], [0, 1], "cpu"), state_of([9, 17], [0, 1])
+    own = np.arange(81, dtype=np.int32)
+    parts = [
+        GrainAlignment(lower=4, upper=76, vertices=own[own % 3 > 0], direction=(0.6, 0.8)),
+        GrainAlignment(lower=0, upper=78, vertices=own[own % 3 == 0]),
+    ]
+    host, device_sums = HostPieceSums(one.network, one._buffers), DevicePieceSums(other.network, other._buffers)
+    np.testing.assert_allclose(device_sums.largest_forces(parts), host.largest_forces(parts), rtol=1e-10)
+    host.hold_grain(parts)
+    device_sums.hold_grain(parts)
+    for name in ("position", "velocity", "load"):
+        expected, got = (getattr(state, name).numpy() for state in (one, other))
+        np.testing.assert_allclose(got, expected, rtol=1e-10, atol=1e-13)
+
+
 def test_a_mirrored_cell_is_seen():
     state = state_of([9, 11], [])
     layout = state.positions()

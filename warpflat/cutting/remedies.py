@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
+from warpflat.cutting.contact_remedy import contact_note
 from warpflat.model.fit import Misfit, WornFit, assess_fit
 
 if TYPE_CHECKING:
@@ -44,8 +45,11 @@ def advise(result: Flattening) -> Flattening:
     """Look for cuts that would help where a piece does not fit, and return the piece with them in `remedies`.
 
     Where a way of wearing was asked for, up to eight cuts are made and relaxed on trial, and the best three are kept. Otherwise
-    the three nearest are named and none is tried.
+    the three nearest are named and none is tried. A note names the cut that would spare the piece a contact that costs much.
     """
+    note = contact_note(result)
+    if note is not None:
+        result = replace(result, notes=(*result.notes, note))
     found = remedies(result, result.fit, trial=result.wear is not None)
     return result.with_remedies(found) if found else result
 

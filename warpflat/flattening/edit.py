@@ -24,7 +24,6 @@ from warpflat.flattening.result import Flattening
 from warpflat.solver.multigrid.coarsen import inherit_levels
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.cells import inherit_cells
-from warpflat.surface.connectivity import components_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.paths.edge_paths import path_length
 from warpflat.surface.repair.polygons import find_crossed_quads
@@ -229,18 +228,18 @@ def _continuation_task(
     """Make the task that relaxes a piece further from a result."""
     require_unsewn(result)
     expect_callback(callback)
-    datum = result.datum
-    if surface is not result.surface:
-        # A cut may part the datum: then the first part of it stays upright.
-        part = components_of(surface)
-        if part.any():
-            part_of = np.full(len(surface.vertices), -1)
-            used = surface.faces >= 0
-            part_of[surface.faces[used]] = np.broadcast_to(part[:, None], surface.faces.shape)[used]
-            datum = datum[part_of[datum] == part_of[datum[0]]]
     device, model = result.network.device, result.network.model
     return RelaxationTask(
-        surface, fabric, result.grain_angle, device, options, callback, datum, stage, model=model, wear=result.wear
+        surface,
+        fabric,
+        result.grain_angle,
+        device,
+        options,
+        callback,
+        result.datum,
+        stage,
+        model=model,
+        wear=result.wear,
     )
 
 

@@ -30,7 +30,7 @@ from warpflat.model.wear import Wear, intended_stretch
 from warpflat.solver.contact import open_cracks, relax_with_contact
 from warpflat.solver.convergence import Energies, Outcome
 from warpflat.solver.gauss_newton import gauss_newton_pays, relax_gauss_newton
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of, is_coarsest
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
@@ -274,13 +274,12 @@ def keep_apart(
     if overlap == 0.0:
         return free, (relaxed,)
     words = f"flat, the piece lies over itself by {1e6 * overlap:.3g} mm2"
-    lower, upper = int(task.datum[0]), int(task.datum[-1])
-    grain = GrainAlignment(lower=lower, upper=upper, vertices=slice(0, network.vertex_count))
+    alignments = grain_alignments(surface, task.datum, free)
     starts = [lambda: open_cracks(surface, start)]
     if not components_of(surface).any():
         starts.append(lambda: harmonic_layout(surface))
     for first in starts:
-        state = Relaxation(network, task.options, start=first(), alignments=[grain])
+        state = Relaxation(network, task.options, start=first(), alignments=alignments)
         outcome = relax_with_contact(state, 1e-3 * task.options.gap_mm)
         if outcome is not None and outcome.converged:
             before, after = relaxed.model_energy_j, outcome.energies.potential
@@ -333,10 +332,9 @@ class _Batch:
 
     def _put(self, networks: Sequence[SpringNetwork], start: FloatArray) -> None:
         alignments = [
-            GrainAlignment(
-                lower=first + int(task.datum[0]), upper=first + int(task.datum[-1]), vertices=slice(first, end)
-            )
+            alignment
             for task, (first, end) in zip(self._tasks, pairwise(self._first), strict=True)
+            for alignment in grain_alignments(task.surface, task.datum, start[first:end], first=first)
         ]
         self._state = Relaxation(join_networks(networks), self._options, start=start, alignments=alignments)
 

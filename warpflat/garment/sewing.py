@@ -23,6 +23,7 @@ import warp as wp
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, equations_of_constraint, find_piece
 from warpflat.garment.sewing_network import SewingNetwork
@@ -40,6 +41,7 @@ from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.falloff import falloff_weights
+from warpflat.surface.injective import is_injective
 
 __all__ = ["ConstraintResult", "SeamPair", "Sewn", "sew"]
 
@@ -192,12 +194,31 @@ def sew(
             lever=equations.lever,
         )
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
-    alignments = [piece for name, piece in joined.upright.items() if name not in folds and name not in oriented]
+    alignments = [
+        part
+        for name, parts in joined.alignments.items()
+        if name not in folds and name not in oriented
+        for part in parts
+    ]
     state = Relaxation(network, options, start=start, alignments=alignments)
     ended = _relax(state, equations)
     seconds = time.perf_counter() - start_time
     converged = ended.outcome.converged and ended.satisfied
     sewn = joined.split(state, converged=converged, seconds=seconds, residual=ended.outcome.residual)
+    overlaps = joined.overlaps(state.positions()) if options.gap_mm else {}
+    if overlaps:
+        parted = _part(state, start, equations)
+        if parted is not None:
+            state, ended = parted
+            apart = SewingNetwork(sewn).split(
+                state,
+                converged=True,
+                seconds=ended.outcome.seconds,
+                residual=ended.outcome.residual,
+                stage_name=CONTACT,
+            )
+            sewn, converged, seconds = apart, True, time.perf_counter() - start_time
+        sewn = {name: _with_overlap_note(piece, overlaps.get(name, 0.0)) for name, piece in sewn.items()}
     return Sewn(
         pieces=sewn,
         converged=converged,
@@ -249,8 +270,44 @@ def _constraint_equations(
     return join_equations(equations), kinds, oriented
 
 
-def _relax(state: Relaxation, equations: ConstraintEquations) -> ConstrainedOutcome:
-    """Relax until all is at rest and the equations hold."""
+def _part(
+    together: Relaxation, start: FloatArray, equations: ConstraintEquations
+) -> tuple[Relaxation, ConstrainedOutcome] | None:
+    """Relax sewn pieces again, with contact, since some have come to rest lying over themselves; None where that fails.
+
+    Args:
+        together: the pieces at rest without contact.
+        start: #V by 2, the layout before, which must be injective [m].
+        equations: of the seams and constraints.
+    """
+    network, options = together.network, together.options
+    if not (factor_pays(network, options) and is_injective(network.surface, start)):
+        return None
+    seams = network.seams
+    offset = None if seams is None else seams.offset.numpy().copy()
+    state = Relaxation(network, options, start=start, alignments=together.alignments)
+    ended = _relax(state, equations, gap=1e-3 * options.gap_mm)
+    if ended.outcome.converged and ended.satisfied and is_injective(network.surface, state.positions()):
+        return state, ended
+    if seams is not None:
+        seams.offset.assign(offset)
+    return None
+
+
+def _with_overlap_note(piece: Flattening, overlap: float) -> Flattening:
+    """Return a sewn piece with a note on the area by which it lay over itself [m2], if it did."""
+    if not overlap:
+        return piece
+    words = f"sewn, the piece lies over itself by {1e6 * overlap:.3g} mm2"
+    if piece.stages[-1].name == CONTACT:
+        words += f"; contact has parted it, at a price of {1e3 * piece.contact_energy:.3g} mJ"
+    else:
+        words += ", and contact could not part it: cut it apart there"
+    return replace(piece, notes=(*piece.notes, words))
+
+
+def _relax(state: Relaxation, equations: ConstraintEquations, gap: float = 0.0) -> ConstrainedOutcome:
+    """Relax until all is at rest and the equations hold; with contact, if a gap is given [m]."""
     report_activity("sewing")
     corrected = equations.soft == 0
 
@@ -259,7 +316,7 @@ def _relax(state: Relaxation, equations: ConstraintEquations) -> ConstrainedOutc
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
 
     if factor_pays(state.network, state.options):
-        return relax_under_equations(state, corrected, equations.violation, on_round=on_round)
+        return relax_under_equations(state, corrected, equations.violation, on_round=on_round, gap=gap)
     if not len(equations):
         return ConstrainedOutcome(outcome=relax(state), residuals=np.zeros(0), satisfied=True, contradictory=False)
     return _relax_by_steps(state, corrected, equations.violation, on_round)

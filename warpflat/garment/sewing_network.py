@@ -7,16 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.sums import range_offsets
+from warpflat.flattening.applied_cut import cut_sides
 from warpflat.flattening.progress import Stage
 from warpflat.flattening.result import Flattening
 from warpflat.model.join import join_networks, join_surfaces
 from warpflat.model.network import SpringNetwork
 from warpflat.model.strain import strain_energy
-from warpflat.solver.grain_alignment import GrainAlignment
+from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.relaxation import Relaxation
-from warpflat.surface.connectivity import components
+from warpflat.surface.injective import overlap_area
 
 __all__ = ["SewingNetwork"]
 
@@ -28,7 +29,7 @@ class SewingNetwork:
         pieces: by name.
         first: by piece, the number of its first vertex.
         surface: all pieces as one mesh.
-        upright: by piece, the two vertices that lie one above the other.
+        alignments: by piece, the chords that keep their direction: one, or one for each part of a piece that has been cut apart.
     """
 
     def __init__(self, pieces: Mapping[str, Flattening]) -> None:
@@ -37,12 +38,8 @@ class SewingNetwork:
         first = range_offsets([len(piece.positions) for piece in pieces.values()])
         self.first: dict[str, int] = dict(zip(pieces, first.tolist(), strict=False))
         self.surface = join_surfaces([piece.network.surface for piece in pieces.values()])
-        self.upright = {
-            name: GrainAlignment(
-                lower=int(piece.datum[0]) + self.first[name],
-                upper=_upper_end(piece) + self.first[name],
-                vertices=slice(self.first[name], self.first[name] + len(piece.positions)),
-            )
+        self.alignments = {
+            name: grain_alignments(piece.network.surface, piece.datum, piece.positions, first=self.first[name])
             for name, piece in pieces.items()
         }
 
@@ -60,14 +57,25 @@ class SewingNetwork:
         network.parts = ()
         return network
 
-    def split(self, state: Relaxation, *, converged: bool, seconds: float, residual: float) -> dict[str, Flattening]:
-        """Return each piece with its part of the layout, and a stage "sew" in its history."""
+    def overlaps(self, layout: FloatArray) -> dict[str, float]:
+        """Return by name the area that each piece that lies over itself in a layout (#V by 2 [m]) covers more than once [m2]."""
+        areas = {
+            name: overlap_area(piece.network.surface, layout[own], cut_sides(piece.cuts))
+            for name, piece in self.pieces.items()
+            for own in [slice(self.first[name], self.first[name] + len(piece.positions))]
+        }
+        return {name: area for name, area in areas.items() if area}
+
+    def split(
+        self, state: Relaxation, *, converged: bool, seconds: float, residual: float, stage_name: str = "sew"
+    ) -> dict[str, Flattening]:
+        """Return each piece with its part of the layout, and a stage in its history."""
         layout, sewn = state.positions(), {}
         for name, piece in self.pieces.items():
             own = layout[self.first[name] : self.first[name] + len(piece.positions)]
             energies = Relaxation(piece.network, state.options, start=own).energies()
             stage = Stage(
-                name="sew",
+                name=stage_name,
                 model_energy_j=energies.potential,
                 guard_energy_j=energies.guard,
                 strain_energy_j=strain_energy(piece.network, own),
@@ -79,14 +87,3 @@ class SewingNetwork:
             )
             sewn[name] = replace(piece, positions=own, stages=(*piece.stages, stage), unsewn=piece.unsewn or piece)
         return sewn
-
-
-def _upper_end(piece: Flattening) -> int:
-    """Return the last vertex of the datum that is connected to its first one: a cut may part it."""
-    if not piece.cuts:
-        return int(piece.datum[-1])
-    part = components(piece.faces)
-    part_of = np.full(len(piece.positions), -1)
-    used = piece.faces >= 0
-    part_of[piece.faces[used]] = np.broadcast_to(part[:, None], piece.faces.shape)[used]
-    return int(piece.datum[part_of[piece.datum] == part_of[piece.datum[0]]][-1])

@@ -3,7 +3,8 @@
 Each equation c(x) = 0 of the network is held by 1/2 k (c + o)^2 with a finite stiffness k. L-BFGS (`warpflat.solver.quasi_newton`)
 minimises the energy of cloth and equations. Its metric is one sparse factor of their Gauss-Newton stiffness J^T J, so that stiff
 equations cost no more steps than soft ones. After each round the offset o grows by the residual c, until all equations hold (Nocedal and
-Wright, Numerical Optimization, chapter 17).
+Wright, Numerical Optimization, chapter 17). Contact (`warpflat.solver.contact`) may be a part of the energy; its stiffness is
+added to the metric by Woodbury's formula.
 """
 
 from __future__ import annotations
@@ -19,11 +20,12 @@ from scipy.sparse.linalg import splu
 from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.model.network import SpringNetwork
+from warpflat.solver.contact import NO_CONTACTS, Barrier, ContactPoint
 from warpflat.solver.convergence import Outcome
 from warpflat.solver.gauss_newton import GaussNewtonSteps
 from warpflat.solver.grain_alignment import align_grain
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.quasi_newton import Descent, Point, Solve
+from warpflat.solver.quasi_newton import Descent, Solve
 from warpflat.solver.relaxation import Relaxation
 
 __all__ = ["ConstrainedOutcome", "factor_pays", "relax_under_equations", "stagnates"]
@@ -68,31 +70,59 @@ def factor_pays(network: SpringNetwork, options: RelaxOptions) -> bool:
 class _SewnCloth:
     """The energy of a network and its equations, and the factor of its stiffness in the layout at the start."""
 
-    def __init__(self, state: Relaxation) -> None:
+    def __init__(self, state: Relaxation, gap: float) -> None:
         self._state = state
-        self._solve = _metric(state)
+        self._barrier = Barrier.of(state.network, gap) if gap else None
+        self.factor_again()
 
     def factor_again(self) -> None:
         """Factor the stiffness in the present layout of the state."""
         self._solve = _metric(self._state)
+        # The inverse's columns at coordinates of vertices that have touched.
+        self._column: dict[int, FloatArray] = {}
 
-    def at(self, positions: FloatArray) -> Point:
+    def at(self, positions: FloatArray) -> ContactPoint:
         """Evaluate a layout."""
         state = self._state
-        state.position.assign(positions)
-        energy = float(state.potentials().sum())
+        touch = NO_CONTACTS if self._barrier is None else self._barrier(positions)
+        energy = touch.energy
+        if np.isfinite(energy):
+            state.position.assign(positions)
+            energy += float(state.potentials().sum())
         if np.isfinite(energy):
             energy += state.network.seam_energy(state.position)
-        return Point(positions=positions, energy=energy)
+        return ContactPoint(positions=positions, energy=energy, touch=touch)
 
-    def gradient(self, point: Point) -> FloatArray:
+    def gradient(self, point: ContactPoint) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
         self._state.position.assign(point.positions)
-        return -self._state.forces()
+        gradient = -self._state.forces()
+        point.touch.add_gradient(gradient)
+        return gradient
 
-    def solver(self, point: Point) -> Solve:
-        """Return the solution by the metric, which is the same everywhere."""
-        return self._solve
+    def solver(self, point: ContactPoint) -> Solve:
+        """Return the solution by the metric: the factor plus the stiffness of the contacts."""
+        base, touch = self._solve, point.touch
+        if len(touch.vertices) == 0:
+            return base
+        coordinates, at = np.unique(2 * touch.vertices[:, :, None] + np.arange(2), return_inverse=True)
+        rows = np.zeros((len(touch.vertices), len(coordinates)))
+        number = np.repeat(np.arange(len(rows)), 6)
+        np.add.at(rows, (number, at.ravel()), touch.rows.ravel())
+        for coordinate in coordinates.tolist():
+            if coordinate not in self._column:
+                unit = np.zeros(point.positions.size)
+                unit[coordinate] = 1.0
+                self._column[coordinate] = base(unit.reshape(-1, 2)).ravel()
+        columns = np.stack([self._column[coordinate] for coordinate in coordinates.tolist()])
+        inner = np.eye(len(rows)) + rows @ columns[:, coordinates] @ rows.T
+
+        def solve(force: FloatArray) -> FloatArray:
+            step = base(force).ravel()
+            pull = np.linalg.solve(inner, rows @ step[coordinates])
+            return np.asarray(step - (rows.T @ pull) @ columns).reshape(-1, 2)
+
+        return solve
 
 
 def _metric(state: Relaxation) -> Solve:
@@ -106,10 +136,11 @@ def _metric(state: Relaxation) -> Solve:
     diagonal = matrix.diagonal()
     matrix.setdiag(diagonal + _REGULARISATION * diagonal.mean() + (free == 0.0) * diagonal.max())
     factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    # The chords of the data stay exactly upright: their rows are Lagrange multipliers.
+    # The chords keep their directions exactly: their rows are Lagrange multipliers.
     chords = np.zeros((len(state.alignments), len(free)))
     for row, each in zip(chords, state.alignments, strict=True):
-        row[[2 * each.upper, 2 * each.lower]] = 1.0, -1.0
+        across = np.array([each.direction[1], -each.direction[0]])
+        row.reshape(-1, 2)[[each.upper, each.lower]] = across, -across
     columns = factor.solve(np.ascontiguousarray(chords.T))
     inner = chords @ columns
 
@@ -126,6 +157,7 @@ def relax_under_equations(
     violation: Callable[[FloatArray], float] = lambda residuals: 0.0,
     *,
     on_round: Callable[[FloatArray], None] | None = None,
+    gap: float = 0.0,
 ) -> ConstrainedOutcome:
     """Minimise the energy of pieces under the equations of their network, if it has some.
 
@@ -134,6 +166,8 @@ def relax_under_equations(
         corrected: #P, whether an equation must hold; the others are springs. All must, if not given.
         violation: of residuals (#P [m]), the largest over its tolerance: up to 1 all equations hold.
         on_round: called after each round with the residuals.
+        gap: with contact between stretches of a piece's border, the distance below which it acts [m]; then no piece may lie over
+            itself at the start, and none does at the end. 0 for none.
     """
     began_at, steps_before, work_before = time.perf_counter(), state.steps, state.work_units
     network, options, violations = state.network, state.options, list[float]()
@@ -141,7 +175,7 @@ def relax_under_equations(
     align_grain(state.alignments, start)
     state.position.assign(start)
     state.check_start()
-    problem = _SewnCloth(state)
+    problem = _SewnCloth(state, gap)
     descent = Descent(problem, problem.at(state.positions()))
     factored_at = 0
     while True:
@@ -174,7 +208,7 @@ def relax_under_equations(
         descent.renew(forget=is_stale)
 
 
-def _run_round(descent: Descent[Point], state: Relaxation) -> None:
+def _run_round(descent: Descent[ContactPoint], state: Relaxation) -> None:
     for _ in range(min(_STEPS_PER_ROUND, state.options.max_steps - state.steps)):
         if not descent.step():
             break
@@ -183,7 +217,7 @@ def _run_round(descent: Descent[Point], state: Relaxation) -> None:
             break
 
 
-def _is_at_rest(descent: Descent[Point], options: RelaxOptions) -> bool:
+def _is_at_rest(descent: Descent[ContactPoint], options: RelaxOptions) -> bool:
     return descent.release <= _NEGLIGIBLE_RELEASE * options.residual_tolerance**2 * descent.point.energy
 
 

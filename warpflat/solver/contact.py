@@ -12,19 +12,20 @@ Hence every layout on the way is injective, and the last one is certified.
 from __future__ import annotations
 
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from warpflat.core.arrays import FloatArray, IndexArray, IntArray
+from warpflat.model.network import SpringNetwork
 from warpflat.solver.convergence import Outcome
-from warpflat.solver.grain_alignment import GrainAlignment, align_grain, remove_rotation
+from warpflat.solver.grain_alignment import align_grain, remove_rotation
 from warpflat.solver.quasi_newton import Descent, Metric, Point, Solve
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["Barrier", "Contacts", "open_cracks", "relax_with_contact"]
+__all__ = ["NO_CONTACTS", "Barrier", "ContactPoint", "Contacts", "open_cracks", "relax_with_contact"]
 
 # Two places of the border have the whole gap between them if the way between them along the border is at least this [m],
 _FULL_GAP_WAY = 0.025
@@ -79,18 +80,33 @@ class Contacts:
     slope: FloatArray
     bend: FloatArray
 
+    def add_gradient(self, gradient: FloatArray) -> None:
+        """Add the gradient of the barrier to #V by 2 [N], in place."""
+        np.add.at(gradient, self.vertices.ravel(), (self.slope[:, None, None] * self.lever).reshape(-1, 2))
 
-_CROSSED = Contacts(
-    energy=np.inf,
+    @property
+    def rows(self) -> FloatArray:
+        """The rows J of the barrier's stiffness J^T J where it is convex, #C by 3 by 2 [(N/m)^1/2]."""
+        return np.asarray(np.sqrt(np.maximum(self.bend, 0.0))[:, None, None] * self.lever)
+
+
+NO_CONTACTS = Contacts(
+    energy=0.0,
     vertices=np.empty((0, 3), dtype=np.int32),
     lever=np.empty((0, 3, 2)),
     slope=np.empty(0),
     bend=np.empty(0),
 )
+_CROSSED = replace(NO_CONTACTS, energy=np.inf)
 
 
 class Barrier:
     """The barrier between border vertices and border edges that are near in the plane and far along the border."""
+
+    @classmethod
+    def of(cls, network: SpringNetwork, gap: float) -> Barrier:
+        """Return the barrier for the border of a network, as stiff as its springs."""
+        return cls(network.surface, gap, _BARRIER_STIFFNESS * float(np.median(network.spring_arrays.stiffness)))
 
     def __init__(self, surface: Surface, gap: float, stiffness: float) -> None:
         self._gap, self._stiffness = gap, stiffness
@@ -158,7 +174,7 @@ def _closest(v: FloatArray, a: FloatArray, b: FloatArray) -> tuple[FloatArray, F
 
 
 @dataclass(frozen=True, kw_only=True)
-class _Point(Point):
+class ContactPoint(Point):
     """A layout (#V by 2 [m]), the energy there with contacts [J], and the contacts."""
 
     touch: Contacts
@@ -167,34 +183,32 @@ class _Point(Point):
 class _Problem:
     """The energy that is minimised: cloth and barrier."""
 
-    def __init__(self, state: Relaxation, grain: GrainAlignment, gap: float) -> None:
-        self.state, self._grain = state, grain
-        stiffness = float(np.median(state.network.spring_arrays.stiffness))
-        self._barrier = Barrier(state.network.surface, gap, _BARRIER_STIFFNESS * stiffness)
-        self._metric = Metric(state.network, [grain])
+    def __init__(self, state: Relaxation, gap: float) -> None:
+        self.state = state
+        self._barrier = Barrier.of(state.network, gap)
+        self._metric = Metric(state.network, state.alignments)
 
-    def at(self, positions: FloatArray) -> _Point:
+    def at(self, positions: FloatArray) -> ContactPoint:
         """Evaluate a layout."""
         touch = self._barrier(positions)
         energy = touch.energy
         if np.isfinite(energy):
             self.state.position.assign(positions)
             energy += float(self.state.potentials().sum())
-        return _Point(positions=positions, energy=energy, touch=touch)
+        return ContactPoint(positions=positions, energy=energy, touch=touch)
 
-    def gradient(self, point: _Point) -> FloatArray:
+    def gradient(self, point: ContactPoint) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
         self.state.position.assign(point.positions)
-        gradient, touch = -self.state.forces(), point.touch
-        np.add.at(gradient, touch.vertices.ravel(), (touch.slope[:, None, None] * touch.lever).reshape(-1, 2))
+        gradient = -self.state.forces()
+        point.touch.add_gradient(gradient)
         return gradient
 
-    def solver(self, point: _Point) -> Solve:
+    def solver(self, point: ContactPoint) -> Solve:
         """Return the solution by the metric at a point."""
-        bend = np.sqrt(np.maximum(point.touch.bend, 0.0))
-        return self._metric.solver(point.touch.vertices, bend[:, None, None] * point.touch.lever)
+        return self._metric.solver(point.touch.vertices, point.touch.rows)
 
-    def residual(self, point: _Point) -> float:
+    def residual(self, point: ContactPoint) -> float:
         """Return the largest force on a vertex over the mean force of the springs."""
         springs, force = self.state.network.spring_arrays, -self.gradient(point)
         a, b = (point.positions[springs.ends[:, k]] for k in range(2))
@@ -202,7 +216,7 @@ class _Problem:
         weight = np.bincount(springs.ends.ravel(), np.repeat(springs.stiffness, 2), minlength=len(force)).astype(
             np.float64
         )
-        remove_rotation([self._grain], point.positions, force, weight)
+        remove_rotation(self.state.alignments, point.positions, force, weight)
         return float(np.linalg.norm(force, axis=1).max() / max(tension.mean(), 1e-300))
 
 
@@ -216,10 +230,9 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     Returns:
         How it ended; the energies are those of the cloth alone. None if the start is not injective, in which case nothing is done.
     """
-    began, (grain,) = time.perf_counter(), state.alignments
-    start = state.positions()
-    align_grain([grain], start)
-    problem = _Problem(state, grain, gap)
+    began, start = time.perf_counter(), state.positions()
+    align_grain(state.alignments, start)
+    problem = _Problem(state, gap)
     point = problem.at(start)
     if not np.isfinite(point.energy):
         return None
@@ -229,7 +242,7 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
         at_rest = descent.is_at_rest(state.options)
     residual = problem.residual(descent.point)
     end = descent.point.positions.copy()
-    align_grain([grain], end)
+    align_grain(state.alignments, end)
     state.position.assign(end)
     state.steps += descent.iterations
     state.work_units += descent.work_units

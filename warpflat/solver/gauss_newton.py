@@ -79,6 +79,7 @@ class GaussNewtonSteps:
         ]
         self._free = diags_array(network.bonds.freedom.numpy().ravel())
         self._chords = np.array([[each.lower, each.upper] for each in alignments], dtype=np.int32).reshape(-1, 2)
+        self._across = np.array([[each.direction[1], -each.direction[0]] for each in alignments]).reshape(-1, 1, 2)
 
     def direction(self, positions: FloatArray, force: FloatArray) -> FloatArray:
         """Return the full step, #V by 2 [m].
@@ -142,9 +143,9 @@ class GaussNewtonSteps:
         return rows
 
     def _chord_rows(self) -> csr_array:
-        """Return the rows that keep the chords of the aligned pieces upright."""
-        sideways = np.array([[[-1.0, 0.0], [1.0, 0.0]]]) * np.sqrt(self._stiffness.max())
-        return self._rows(self._chords, np.repeat(sideways, len(self._chords), axis=0))
+        """Return the rows that keep the directions of the aligned pieces' chords."""
+        sideways = self._across * np.array([[-1.0], [1.0]]) * np.sqrt(self._stiffness.max())
+        return self._rows(self._chords, sideways)
 
 
 def relax_gauss_newton(

@@ -35,6 +35,7 @@ class RelaxOptions:
             "plain", the paper's steps alone.
         gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.solver.contact`), which acts where its border
             comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
+        contact_share: where contact costs more than this share of the model energy, a note names the cut that would restore it.
     """
 
     time_step: float = 0.01
@@ -47,6 +48,7 @@ class RelaxOptions:
     kinetic_damping: bool = True
     solver: Solver = "multilevel"
     gap_mm: float = 0.5
+    contact_share: float = 0.05
 
     def validate(self) -> None:
         """Raise InputError, with its name, for a value out of its bounds."""
@@ -59,6 +61,7 @@ class RelaxOptions:
             ("max_steps", 1, 10**9),
             ("check_every", 1, 10**6),
             ("gap_mm", 0.0, 1e3),
+            ("contact_share", 0.0, 1e6),
         ):
             value = getattr(self, key)
             if not (is_number(value) and math.isfinite(value)):

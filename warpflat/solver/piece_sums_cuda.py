@@ -157,9 +157,9 @@ class _PieceRotation:
         piece = np.full(len(every), -1, dtype=np.int32)
         for number, vertices in enumerate(own):
             piece[vertices] = number
-        # Ranges of vertices: those of each aligned piece, and those in between.
+        # Ranges of vertices, of one aligned piece or of none: the parts of a cut piece have several.
         first = np.flatnonzero(np.diff(piece, prepend=-2))
-        self._part = np.searchsorted(first, [vertices[0] for vertices in own])
+        self._piece_of_range = piece[first]
         self._sums = DeviceSums(np.diff(first, append=len(every)).tolist(), device)
         self.piece = wp.array(piece, dtype=wp.int32, device=device)
         self.turn = Turn()
@@ -169,6 +169,7 @@ class _PieceRotation:
             setattr(self.turn, name, wp.zeros(len(own), dtype=wp.float64, device=device))
         chords = np.array([[each.lower, each.upper] for each in alignments], dtype=np.int32).ravel()
         self._chord = wp.array(chords, dtype=wp.int32, device=device)
+        self._direction = np.array([each.direction for each in alignments]).reshape(-1, 2)
         self._chord_ends = wp.empty(len(chords), dtype=wp.vec2d, device=device)
         self._moments = wp.empty(MOMENTS * (len(self._sums.blocks) - 1), dtype=wp.float64, device=device)
         self.turn_pieces = record(
@@ -187,9 +188,12 @@ class _PieceRotation:
         blocks = self._sums.blocks
         given = [buffers.position, buffers.velocity, buffers.force, buffers.load, net.spring_stiffness, blocks]
         launch_each(sum_moments, len(blocks) - 1, given, [self._moments], device=device)
-        part_sums = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), self._sums.first_block[:-1])
+        range_sums = np.add.reduceat(self._moments.numpy().reshape(-1, MOMENTS), self._sums.first_block[:-1])
+        held = self._piece_of_range >= 0
+        piece_sums = np.zeros((len(self.alignments), MOMENTS))
+        np.add.at(piece_sums, self._piece_of_range[held], range_sums[held])
         weight, moment, second, place, force, torque, motion, swing = np.split(
-            part_sums[self._part], np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
+            piece_sums, np.cumsum([1, 2, 1, 2, 2, 1, 2]), axis=1
         )
         middle = moment / weight
         inertia = np.maximum(second - weight * (middle**2).sum(axis=1, keepdims=True), 1e-300)
@@ -204,8 +208,11 @@ class _PieceRotation:
             chord = ends[:, 1] - ends[:, 0]
             length = np.linalg.norm(chord, axis=1, keepdims=True)
             with np.errstate(invalid="ignore", divide="ignore"):
-                # i |c| / c: from the chord to straight up.
-                by = np.where(length > 0.0, np.stack([chord[:, 1], chord[:, 0]], axis=1) / length, [1.0, 0.0])
+                # d |c| / c: from the chord to its direction d.
+                along = np.einsum("ij,ij->i", chord, self._direction)
+                by = np.where(
+                    length > 0.0, np.stack([along, _cross(chord, self._direction)[:, 0]], 1) / length, [1.0, 0.0]
+                )
             found |= {"by": by, "centre": place / self._sizes}
         for name, values in found.items():
             getattr(self.turn, name).assign(values if values.shape[1] == 2 else values[:, 0])

@@ -85,6 +85,7 @@ class Metric:
         self._stiffness = max(fabric.stiffness_warp, fabric.stiffness_weft)
         self._laplacian = laplacian_of(network.surface)
         self._chords = np.array([[each.upper, each.lower, each.lower] for each in alignments]).reshape(-1, 3)
+        self._across = np.array([[each.direction[1], -each.direction[0]] for each in alignments]).reshape(-1, 2)
         # The inverse's columns at vertices that have touched; most of the border never does.
         self._column: dict[int, FloatArray] = {}
         self._count = network.vertex_count
@@ -105,7 +106,7 @@ class Metric:
             lever: #C by 3 by 2, the row's entries [(N/m)^1/2].
         """
         chord = np.zeros((len(self._chords), 3, 2))
-        chord[:, :2, 0] = 1.0, -1.0
+        chord[:, 0], chord[:, 1] = self._across, -self._across
         rigid = np.arange(len(chord))
         vertices = self._chords if vertices is None else np.concatenate([self._chords, vertices])
         lever = chord if lever is None else np.concatenate([chord, lever])
@@ -337,7 +338,8 @@ def _without_reaction(state: Relaxation) -> float:
     """Return the largest force without that which keeps the chord upright, over the largest one without that which turns the piece."""
     force, (largest,) = state.cloth_force(), state.piece_sums.largest_forces(state.alignments)
     for each in state.alignments:
-        reaction = 0.5 * (force[each.upper, 0] - force[each.lower, 0])
-        force[each.upper, 0] -= reaction
-        force[each.lower, 0] += reaction
+        across = np.array([each.direction[1], -each.direction[0]])
+        reaction = 0.5 * across * (across @ (force[each.upper] - force[each.lower]))
+        force[each.upper] -= reaction
+        force[each.lower] += reaction
     return float(np.linalg.norm(force, axis=1).max() / max(largest, 1e-300))

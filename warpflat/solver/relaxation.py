@@ -18,7 +18,7 @@ from functools import cached_property
 import numpy as np
 import warp as wp
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.launch import launch_each
 from warpflat.core.sums import dot
@@ -386,10 +386,11 @@ class Relaxation:
         number = np.full(self.network.vertex_count, -1)
         number[rows] = np.arange(len(rows))
         alignments = [
-            GrainAlignment(
+            replace(
+                each,
                 lower=int(number[each.lower]),
                 upper=int(number[each.upper]),
-                vertices=slice(int(number[each.vertices.start]), int(number[each.vertices.stop - 1]) + 1),
+                vertices=_renumbered(each.vertices, number),
             )
             for each in self.alignments
             if number[each.lower] >= 0
@@ -418,3 +419,10 @@ class Relaxation:
         whole.restarts = max(whole.restarts, self.restarts)
         for name, values in vars(self.status).items():
             vars(whole.status)[name][list(self.piece_numbers)] = values
+
+
+def _renumbered(vertices: slice | IntArray, number: IntArray) -> slice | IntArray:
+    """Return vertices, a range or indices, by their new numbers (#V)."""
+    if isinstance(vertices, slice):
+        return slice(int(number[vertices.start]), int(number[vertices.stop - 1]) + 1)
+    return number[vertices]

@@ -1,0 +1,132 @@
+"""The cut that spares a piece its contact: where a piece would lie over itself, a cut across gives both sides room."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import dijkstra
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import polyline_length
+from warpflat.flattening.progress import CONTACT
+from warpflat.solver.contact import Barrier
+from warpflat.surface.connectivity import border_of
+from warpflat.surface.half_edges import half_edges_of
+from warpflat.surface.injective import border_edges_of
+from warpflat.surface.mesh import Surface
+
+if TYPE_CHECKING:
+    from warpflat.flattening.result import Flattening
+
+__all__ = ["contact_note", "cut_between_contacts"]
+
+# Tolerances of a trial are looser by this factor.
+_TRIAL_TOLERANCE = 20.0
+
+
+def contact_note(result: Flattening) -> str | None:
+    """Return a note on a contact that costs more than the share of the energy that is allowed, with the cut that would restore it.
+
+    The cut is made on trial. None if contact costs less, or if the cut does not help.
+    """
+    last = result.stages[-1]
+    if last.name != CONTACT or len(result.stages) < 2:
+        return None
+    free = result.stages[-2].model_energy_j
+    if result.contact_energy <= result.options.contact_share * free:
+        return None
+    path = cut_between_contacts(result)
+    piece = result.unsewn or result
+    options = piece.options
+    quick = replace(
+        options,
+        energy_tolerance=min(_TRIAL_TOLERANCE * options.energy_tolerance, 1.0),
+        residual_tolerance=_TRIAL_TOLERANCE * options.residual_tolerance,
+        gap_mm=0.0,
+    )
+    from warpflat.cutting.cut_piece import cut
+    from warpflat.cutting.cut_plan import CutPlan
+
+    try:
+        opened = None if path is None else cut(piece, CutPlan(name="trial", paths=(path,)), relax=quick)
+    except InputError:
+        opened = None  # The path meets a cut that was made before.
+    price = f"contact costs more than {100 * options.contact_share:.3g} % of the energy"
+    if (
+        path is None
+        or opened is None
+        or opened.overlap
+        or opened.stages[-1].model_energy_j >= piece.stages[-1].model_energy_j
+    ):
+        return f"{price}; no single cut across the piece was found that would restore it"
+    surface = result.surface
+    first, end = (int(surface.input_index[vertex]) for vertex in (path[0], path[-1]))
+    return (
+        f"{price}; a cut of {100 * polyline_length(surface.vertices[path]):.1f} cm from vertex {first} to vertex {end} would restore it "
+        f"({1e3 * opened.stages[-1].model_energy_j:.3g} instead of {1e3 * piece.stages[-1].model_energy_j:.3g} mJ, no overlap)"
+    )
+
+
+def cut_between_contacts(result: Flattening) -> IntArray | None:
+    """Return a cut across a piece between the two places of its border that press on each other; None if none do.
+
+    They part their border loop into two ways. The cut is the shortest path along edges between the middle halves of both; where they lie
+    on two loops, between these.
+
+    Returns:
+        Vertices of the uncut surface.
+    """
+    surface, positions = result.network.surface, result.positions
+    edges = border_edges_of(surface)
+    touch = Barrier(surface, 1e-3 * result.options.gap_mm, 1.0)(positions).vertices
+    if len(touch) == 0:
+        return None
+    at = np.full(len(surface.vertices), -1)
+    at[edges.tail] = np.arange(len(edges.tail))
+    a, b = at[touch[:, 0]], at[touch[:, 1]]
+    one_loop = edges.first[a] == edges.first[b]
+    apart = np.abs(a - b)
+    way = np.where(one_loop, np.minimum(apart, edges.count[a] - apart), np.iinfo(np.int32).max)
+    low, high = sorted(int(end[way.argmax()]) for end in (a, b))
+    loops = [np.arange(edges.first[end], edges.first[end] + edges.count[end]) for end in (low, high)]
+    if edges.first[low] == edges.first[high]:
+        turn = np.roll(loops[0], -(low - loops[0][0]))
+        ways = [_middle_half(surface, edges.tail[part]) for part in (turn[: high - low], turn[high - low :])]
+    else:
+        ways = [edges.tail[loop] for loop in loops]
+    path = _path_between(surface, *ways)
+    return None if path is None else result.vertex_origin[path]
+
+
+def _middle_half(surface: Surface, vertices: IntArray) -> IntArray:
+    """Return the vertices on the middle half of a way along the border."""
+    step = np.linalg.norm(np.diff(surface.vertices[vertices], axis=0), axis=1)
+    station = np.concatenate([[0.0], np.cumsum(step)])
+    middle = np.abs(station - 0.5 * station[-1]) <= 0.25 * station[-1]
+    return vertices[middle] if middle.any() else vertices[len(vertices) // 2 : len(vertices) // 2 + 1]
+
+
+def _path_between(surface: Surface, sources: IntArray, targets: IntArray) -> IntArray | None:
+    """Return the shortest path from one set of border vertices to another along edges inside; None if there is none."""
+    he = half_edges_of(surface)
+    on_border = np.zeros(len(surface.vertices), dtype=bool)
+    on_border[border_of(surface)] = True
+    ends = np.zeros(len(surface.vertices), dtype=bool)
+    ends[sources] = ends[targets] = True
+    inside = he.edges[(~on_border | ends)[he.edges].all(axis=1) & ~on_border[he.edges].all(axis=1)]
+    length = np.linalg.norm(surface.vertices[inside[:, 1]] - surface.vertices[inside[:, 0]], axis=1)
+    graph = csr_array((length, inside.T), shape=(len(on_border), len(on_border)))
+    way, before, _ = dijkstra(graph, directed=False, indices=sources, min_only=True, return_predecessors=True)
+    end = int(targets[way[targets].argmin()])
+    if not np.isfinite(way[end]):
+        return None
+    path = [end]
+    while before[path[-1]] >= 0:
+        path.append(int(before[path[-1]]))
+    # A path through an end of the same side would touch the border twice.
+    row = np.array(path, dtype=np.int32)
+    return row if not on_border[row[1:-1]].any() else None
