@@ -220,3 +220,16 @@ def test_unknown_options_say_what_is_valid(dress, tmp_path):
     with pytest.raises(InputError, match="no size '50'"):
         write_dxf(dress, tmp_path / "p.dxf", sizes=["50"])
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_given_creation_time_gives_the_same_bytes(tmp_path, monkeypatch):
+    dress = draft_garment(sample_dress(("38",)))
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
+    for name in ("a.dxf", "b.dxf"):
+        write_dxf(dress, tmp_path / name)
+    data = (tmp_path / "a.dxf").read_bytes()
+    assert data == (tmp_path / "b.dxf").read_bytes()
+    assert b"CREATION DATE: 14-11-2023" in data
+    monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
+    with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
+        write_dxf(dress, tmp_path / "c.dxf")

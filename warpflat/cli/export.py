@@ -17,7 +17,13 @@ __all__ = ["export"]
     "--format", "formats", type=click.Choice(["dxf", "svg", "pdf", "json"]), multiple=True, required=True, help="Which."
 )
 @click.option("--dialect", type=click.Choice(["aama", "astm"]), default="aama", show_default=True, help="Of the DXF.")
-@click.option("--paper", type=click.Choice(["A4", "Letter", "A0"]), default="A4", show_default=True, help="Of the PDF.")
+@click.option(
+    "--paper",
+    type=click.Choice(["A4", "Letter", "A0", "Projector"]),
+    default="A4",
+    show_default=True,
+    help="Of the PDF.",
+)
 @click.option("--size", "sizes", multiple=True, metavar="SIZE", help="Only this size of a graded pattern; not of json.")
 @click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes.")
 def export(

@@ -90,7 +90,7 @@ def _seam_table(seams: Iterable[Mapping[str, Any]]) -> str:
             " = ".join(seam["sides"]),
             *(f"{length:.1f}" for length in seam["length_mm"]),
             f"{100 * seam['ease']:+.3g} %" if seam["ease"] else "",
-            f"{seam['difference_mm']:+.2f} mm",
+            f"{_rounded(seam['difference_mm'], 2):+.2f} mm",
             _price(seam["price_j"]),
         )
         for seam in seams
@@ -104,7 +104,15 @@ def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
 
 
 def _price(joules: float | None) -> str:
-    return "" if joules is None else f"{1e3 * joules:.3g} mJ"
+    """Return a price in words; what is below a microjoule is rounding."""
+    if joules is None:
+        return ""
+    return f"{1e3 * joules:.3g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
+
+
+def _rounded(value: float, digits: int) -> float:
+    """Return a rounded number without the sign of a negative zero."""
+    return round(value, digits) + 0.0
 
 
 def warnings_of(metrics: Mapping[str, Any]) -> list[str]:

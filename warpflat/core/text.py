@@ -15,6 +15,7 @@ __all__ = [
     "plain_letters",
     "quote_value",
     "size_words",
+    "without_side",
 ]
 
 #: Letters of a message, of one of its words (a path may be one), and of the user's own words in it, at most.
@@ -38,6 +39,12 @@ def format_count(number: int, what: str) -> str:
 def size_words(size: str) -> str:
     """Return the words for a size: "size EU 38", "size EU 38 made to measure", "made to measure"."""
     return size if size == MADE_TO_MEASURE else f"size {size}"
+
+
+def without_side(name: str) -> str:
+    """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
+    words = name.replace("_", " ").split(" ")
+    return " ".join(word for word in words if word not in ("left", "right")) or name
 
 
 def control_in(text: str, allowed: str = "") -> str:

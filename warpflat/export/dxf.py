@@ -12,7 +12,7 @@ import logging
 import os
 import re
 from collections.abc import Sequence
-from datetime import datetime
+from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,7 +61,7 @@ def write_dxf(
         dialect: "aama" (which most systems read) or "astm".
         units: "metric" (millimetres) or "english" (inches).
         sizes: those to write; None writes all.
-        created: date and time for the file's text; None takes the present.
+        created: date and time for the file's text; None takes SOURCE_DATE_EPOCH, or the present.
 
     Raises:
         InputError: unknown dialect, units or size.
@@ -88,9 +88,26 @@ def write_dxf(
             block = document.blocks.new(name, base_point=(0, 0))
             _write_piece(block, piece, title, scale, validation=dialect == "astm")
             space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
-    _write_style(space, garment, units, scale, created or datetime.now().astimezone())
+    _write_style(space, garment, units, scale, created or _now())
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
         gerber_D6673.export_stream(document, stream)
+
+
+def _now() -> datetime:
+    """Return the present, or the time that SOURCE_DATE_EPOCH [s] names, so that a repeat gives the same bytes.
+
+    Raises:
+        InputError: the variable is no number of seconds.
+    """
+    given = os.environ.get("SOURCE_DATE_EPOCH")
+    if not given:
+        return datetime.now().astimezone()
+    try:
+        return datetime.fromtimestamp(int(given), tz=timezone.utc)
+    except (ValueError, OverflowError, OSError):
+        raise InputError(
+            f"SOURCE_DATE_EPOCH = {given!r}: it must be whole seconds since 1970, such as 1700000000"
+        ) from None
 
 
 def _new_document() -> Drawing:

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,13 +19,18 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
+from warpflat.export.pdf_guide import guide_pages
 from warpflat.export.pdf_legend import draw_legend, legend_page
 from warpflat.export.pdf_tiling import LEGEND_SIZE, SIZE_COLOURS, SIZE_DASHES, Paper, Tiling, make_tiling
 from warpflat.export.svg import OF_SIZE, STYLE
+from warpflat.pattern.draft import nest_label, relabelled
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.drawing import Stroke, draw_nest
-from warpflat.pattern.layout import Sheet, lay_out, nests, occupied_points
+from warpflat.pattern.drawing import OnPaper, Stroke, draw_nest
+from warpflat.pattern.half_pieces import halved
+from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_points
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
+from warpflat.pattern.sewing_order import seam_letters
+from warpflat.pattern.tile_nesting import nest_on_tiles
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -40,7 +46,15 @@ PAPERS = {
     "A4": Paper(name="A4", width=0.210, height=0.297, margin=0.010, overlap=0.010),
     "Letter": Paper(name="US Letter", width=0.2159, height=0.2794, margin=0.010, overlap=0.010),
     "A0": Paper(name="A0", width=0.841, height=1.189, margin=0.015, overlap=0.010),
+    # The page of a projector is as large as all pieces need.
+    "Projector": Paper(
+        name="Projector", width=1.0, height=1.0, margin=0.010, overlap=0.0, endless=True, line_width=2.0
+    ),
 }
+#: Width [m] of the page of a projector: that of a cutting table.
+PROJECTED_WIDTH = 0.9
+#: Roles whose strokes lie on the layer of their size in a nest.
+OF_LAYER = (*OF_SIZE, "dart_fold", "drill", "cutout")
 
 
 def write_pdf(
@@ -50,13 +64,15 @@ def write_pdf(
     paper: str = "A4",
     sizes: Sequence[str] | None = None,
 ) -> Tiling:
-    """Write the pattern for a printer.
+    """Write the pattern for a printer; pieces that are their own mirror images lie half on the fold.
 
     Args:
         garment: drafted.
         path: of the file.
-        paper: "A4", "Letter" (tiled, with a first page of instructions) or "A0" (whole pieces wherever they fit).
-        sizes: those to print; several lie upon each other as a nest, told apart by dashes and colour; None prints all.
+        paper: "A4", "Letter" (tiled, with first pages of instructions), "A0" (whole pieces wherever they fit) or
+            "Projector" (everything on one page, in wide lines).
+        sizes: those to print; several lie upon each other as a nest, told apart by dashes and colour, each on a layer
+            of its own that readers can hide; None prints all.
 
     Returns:
         Which tiles were printed: tiles without any part of a piece are left out.
@@ -71,20 +87,26 @@ def write_pdf(
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     for size in chosen:
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
+    whole = replace(garment, pieces={size: row for size, row in garment.pieces.items() if size in chosen})
+    printed = halved(whole)
     kind = PAPERS[paper]
-    sheet, tiling = _arranged(groups, kind)
+    sheet, tiling = _arranged(nests(printed), kind)
+    kind, sheet = tiling.paper, _with_labels_off_joints(sheet, garment.name, tiling)
+    tiling = replace(tiling, sheet=sheet)
     stream = BytesIO()
     canvas = Canvas(stream, pagesize=(kind.width * POINT, kind.height * POINT), invariant=1)
     _register_fonts()
     canvas.setTitle(f"{garment.name}, {' / '.join(chosen)}")
     canvas.setCreator("warpflat")
     canvas.setViewerPreference("PrintScaling", "None")
-    _sheet_form(canvas, sheet, garment, chosen, kind)
+    _sheet_form(canvas, tiling, printed, chosen)
     if kind.tiled:
-        legend_page(canvas, garment, chosen, sheet, tiling)
+        legend_page(canvas, printed, chosen, sheet, tiling)
+        guide_pages(canvas, whole, printed, kind)
     for row, column in tiling.tiles:
         _tile(canvas, tiling, row, column, garment.name.replace("_", " "))
+    if len(chosen) > 1:
+        _name_layers(canvas, chosen)
     canvas.save()
     with atomic_path(path) as temporary:
         Path(temporary).write_bytes(stream.getvalue())
@@ -92,29 +114,65 @@ def write_pdf(
 
 
 def _arranged(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> tuple[Sheet, Tiling]:
-    """Return the layout that needs the fewest pages, over sheets of one to eight tiles' width."""
-    step = paper.step
-    widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
-    best: tuple[Sheet, Tiling] | None = None
-    for columns in range(1, 9 if paper.tiled else 2):
-        width = columns * step[0] + paper.overlap
-        if width < widest + 0.01 and columns < 8 and paper.tiled:
-            continue
-        if paper.tiled:
-            sheet = lay_out(groups, width=width, gap=0.005)
-        else:
-            sheet = lay_out(groups, width=width, gap=0.016, page_height=float(step[1]), reserved=LEGEND_SIZE)
-        tiling = make_tiling(sheet, paper)
-        if best is None or _cost(tiling) < _cost(best[1]):
-            best = sheet, tiling
-    if best is None:
-        raise InputError(f"a piece is {widest * 1000:.0f} mm wide, more than eight columns of {paper.name}")
-    return best
+    """Return a layout that needs few pages."""
+    if paper.tiled:
+        sheet = _nested(groups, paper)
+        return sheet, make_tiling(sheet, paper)
+    if paper.endless:
+        widest = max(float(np.ptp(occupied_points(group)[:, 0])) for group in groups)
+        sheet = lay_out(groups, width=max(PROJECTED_WIDTH, widest + 0.05), gap=0.016, reserved=LEGEND_SIZE)
+        width, height = sheet.size + 2 * paper.margin + paper.overlap
+        paper = replace(paper, width=float(width), height=float(height))
+        return sheet, make_tiling(sheet, paper)
+    width = paper.step[0] + paper.overlap
+    sheet = lay_out(groups, width=width, gap=0.016, page_height=float(paper.step[1]), reserved=LEGEND_SIZE)
+    return sheet, make_tiling(sheet, paper)
 
 
-def _cost(tiling: Tiling) -> float:
-    """Return the number of pages, and a little for a long strip of them, which is hard to glue and to lay out."""
-    return len(tiling.tiles) + 0.2 * (tiling.rows + tiling.columns)
+def _nested(groups: list[tuple[DraftedPiece, ...]], paper: Paper) -> Sheet:
+    """Return pieces, turned where that helps, on the tiles of a grid, of which they take few."""
+    import shapely
+
+    shapes = []
+    for group in groups:
+        label = nest_label(group)
+        parts = [shapely.Polygon(piece.cut_line) for piece in group]
+        # A label beside its piece belongs to it, with all between.
+        shape = shapely.union_all(parts)
+        if label.leader is not None:
+            shape = shapely.union_all([*parts, shapely.Polygon(label.box)]).convex_hull
+        shapes.append(shape)
+    places, size = nest_on_tiles(shapes, step=paper.step, overlap=paper.overlap, gap=0.004)
+    placed = []
+    for group, shape, place in zip(groups, shapes, places, strict=True):
+        quarter = np.array([[0.0, -1.0], [1.0, 0.0]])
+        turn = np.linalg.matrix_power(quarter, place.quarters)
+        corners = np.asarray(shapely.get_coordinates(shape)) @ turn.T
+        low, high = corners.min(axis=0), corners.max(axis=0)
+        matrix = np.column_stack([turn, place.corner - low])
+        box = np.stack([place.corner, place.corner + high - low])
+        placed.append(Placed(pieces=group, matrix=matrix, box=box))
+    return Sheet(placed=tuple(placed), size=size)
+
+
+def _with_labels_off_joints(sheet: Sheet, garment: str, tiling: Tiling) -> Sheet:
+    """Move the labels of pieces to where no joint of two sheets crosses them, where there is room for that."""
+    placed = []
+    for place in sheet.placed:
+        joints = [place.on_piece(joint) for joint in tiling.joints]
+        pieces = tuple(relabelled(piece, garment, joints) for piece in place.pieces) if joints else place.pieces
+        if any(piece.label.leader is not None for piece in pieces):
+            pieces = place.pieces
+        placed.append(replace(place, pieces=tuple(_upright(piece, place.matrix) for piece in pieces)))
+    return replace(sheet, placed=tuple(placed))
+
+
+def _upright(piece: DraftedPiece, matrix: FloatArray) -> DraftedPiece:
+    """Return a piece whose label is turned round where it would stand on its head on the sheet."""
+    turn = float(np.degrees(piece.label.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
+    if -89.5 < (turn + 180.0) % 360.0 - 180.0 < 90.5:
+        return piece
+    return replace(piece, label=replace(piece.label, angle=piece.label.angle + np.pi))
 
 
 def _register_fonts() -> None:
@@ -126,43 +184,79 @@ def _register_fonts() -> None:
         pdfmetrics.registerFont(TTFont(name, str(font_file(name))))
 
 
-def _sheet_form(canvas: Canvas, sheet: Sheet, garment: DraftedGarment, sizes: Sequence[str], paper: Paper) -> None:
+def _sheet_form(canvas: Canvas, tiling: Tiling, garment: DraftedGarment, sizes: Sequence[str]) -> None:
     """Draw the whole sheet once, as a form; every page shows its part of it."""
-    border = 0.05
+    border, sheet = 0.05, tiling.sheet
     low, high = np.array([-border, -3.0]), sheet.size + 3.0
+    letters = seam_letters(garment)
+    widen = tiling.paper.line_width
     canvas.beginForm("sheet", *(low * POINT), *(high * POINT))
     for placed in sheet.placed:
-        for index, drawing in enumerate(draw_nest(placed.pieces)):
-            nested = len(placed.pieces) > 1
+        nested = len(placed.pieces) > 1
+        on_paper = OnPaper(joints=[placed.on_piece(joint) for joint in tiling.joints], letters=letters)
+        for index, drawing in enumerate(draw_nest(placed.pieces, on_paper)):
+            own: list[Stroke] = []
+            shared: list[Stroke] = []
             for stroke in (stroke for stroke in drawing.strokes if not stroke.hidden):
-                _stroke(canvas, stroke, placed.offset, index if nested else None)
-            for words in drawing.words:
-                _words(
-                    canvas, words, placed.offset, SIZE_COLOURS[index % len(SIZE_COLOURS)] if words.tag else "#000000"
-                )
+                (own if nested and stroke.role in OF_LAYER else shared).append(stroke)
+            for stroke in shared:
+                _stroke(canvas, stroke, placed.matrix, index if nested else None, widen)
+            for words in (words for words in drawing.words if not words.tag):
+                _words(canvas, words, placed.matrix, "#000000")
+            if nested:
+                canvas._code.append(f"/OC /size{sizes.index(drawing.piece.size)} BDC")
+            for stroke in own:
+                _stroke(canvas, stroke, placed.matrix, index, widen)
+            for words in (words for words in drawing.words if words.tag):
+                _words(canvas, words, placed.matrix, SIZE_COLOURS[index % len(SIZE_COLOURS)])
+            if nested:
+                canvas._code.append("EMC")
     if sheet.reserved is not None:
-        draw_legend(canvas, sheet.reserved, garment, sizes, paper.name)
+        draw_legend(canvas, sheet.reserved, garment, sizes, tiling.paper.name)
     canvas.endForm()
 
 
-def _stroke(canvas: Any, stroke: Stroke, offset: FloatArray, size_index: int | None) -> None:
-    """Draw one line."""
+def _name_layers(canvas: Any, sizes: Sequence[str]) -> None:
+    """Declare the layers of the sheet, one a size, as optional content that readers list and can hide.
+
+    reportlab has no call for this; the entries are those of ISO 32000-1, 8.11.
+    """
+    from reportlab.pdfbase.pdfdoc import PDFArray, PDFDictionary, PDFName, PDFResourceDictionary, PDFString, xObjectName
+
+    document = canvas._doc
+    groups = {
+        f"size{k}": document.Reference(PDFDictionary({"Type": PDFName("OCG"), "Name": PDFString(f"Size {size}")}))
+        for k, size in enumerate(sizes)
+    }
+    form = document.idToObject[xObjectName("sheet")]
+    form.Resources = PDFResourceDictionary(Properties=groups)
+    form.Resources.basicFonts()
+    order = PDFArray(list(groups.values()))
+    catalog = document.Catalog
+    catalog.OCProperties = PDFDictionary(
+        {"OCGs": order, "D": PDFDictionary({"Order": order, "ON": order, "Name": PDFString("Sizes")})}
+    )
+    catalog.__NoDefault__ = [*catalog.__NoDefault__, "OCProperties"]
+
+
+def _stroke(canvas: Any, stroke: Stroke, matrix: FloatArray, size_index: int | None, widen: float = 1.0) -> None:
+    """Draw one line under a 2 by 3 matrix."""
     colour, width, dashes = STYLE[stroke.role]
     if size_index is not None:
         colour = SIZE_COLOURS[size_index % len(SIZE_COLOURS)] if stroke.role in OF_SIZE else colour
         dashes = SIZE_DASHES[size_index % len(SIZE_DASHES)] if stroke.role == "cut" else dashes
     canvas.setStrokeColor(colour)
-    canvas.setLineWidth(width / 1000 * POINT)
-    canvas.setDash([d / 1000 * POINT for d in dashes])
+    canvas.setLineWidth(widen * width / 1000 * POINT)
+    canvas.setDash([widen * d / 1000 * POINT for d in dashes])
     canvas.setLineJoin(1)
     path = canvas.beginPath()
     if stroke.curve is not None:
-        control = (stroke.curve.bezier + offset) * POINT
+        control = stroke.curve.transformed(matrix).bezier * POINT
         path.moveTo(*control[0, 0])
         for segment in control:
             path.curveTo(*segment[1], *segment[2], *segment[3])
     else:
-        points = (stroke.points + offset) * POINT
+        points = (stroke.points @ matrix[:, :2].T + matrix[:, 2]) * POINT
         path.moveTo(*points[0])
         for point in points[1:]:
             path.lineTo(*point)
@@ -171,12 +265,14 @@ def _stroke(canvas: Any, stroke: Stroke, offset: FloatArray, size_index: int | N
     canvas.drawPath(path)
 
 
-def _words(canvas: Any, words: Words, offset: FloatArray, colour: str) -> None:
-    """Draw one line of text."""
+def _words(canvas: Any, words: Words, matrix: FloatArray, colour: str) -> None:
+    """Draw one line of text, never upside down."""
     font, size = (BOLD if words.bold else FONT), words.height / CAPITALS * POINT
+    angle = float(np.degrees(words.angle + np.arctan2(matrix[1, 0], matrix[0, 0])))
+    angle = (angle + 89.5) % 180.0 - 89.5
     canvas.saveState()
-    canvas.translate(*((words.at + offset) * POINT))
-    canvas.rotate(float(np.degrees(words.angle)))
+    canvas.translate(*((matrix[:, :2] @ words.at + matrix[:, 2]) * POINT))
+    canvas.rotate(angle)
     if words.tag:
         half = canvas.stringWidth(words.text, font, size) / 2 + 2
         canvas.setFillColor("#ffffff")

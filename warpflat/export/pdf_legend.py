@@ -13,17 +13,18 @@ from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.label import fit_label
-from warpflat.pattern.layout import Placed, Sheet
+from warpflat.pattern.layout import Sheet
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width
+from warpflat.pattern.sewing_order import piece_titles
 
 if TYPE_CHECKING:
-    from warpflat.export.pdf_tiling import Tiling
+    from warpflat.export.pdf_tiling import Paper, Tiling
 
-__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page"]
+__all__ = ["TEST_INCHES", "TEST_MM", "draw_legend", "legend_page", "page_footer"]
 
 
-#: Sides of the test squares: 50 mm and 2 inches [m].
-TEST_MM, TEST_INCHES = 0.050, 2 * 0.0254
+#: Sides of the test squares: 50 mm and 1 inch [m].
+TEST_MM, TEST_INCHES = 0.050, 0.0254
 
 POINT = 72 / 0.0254
 #: Height of capitals [m] of the names in the overview.
@@ -36,10 +37,10 @@ _KEY = (
     ("fold", "fold of the cloth"),
     ("dart", "dart leg"),
     ("dart_fold", "fold of a dart"),
-    ("internal", "construction line"),
+    ("internal", "level or line of the body"),
     ("grain", "grain: along the warp"),
     ("drill", "tip of a dart: mark it"),
-    ("notch", "notch: clip; double at the back"),
+    ("notch", "notch: clip; letter of its seam"),
 )
 
 
@@ -53,8 +54,8 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
         _text(canvas, x, top - 0.016, f"Size{'s' if len(sizes) > 1 else ''} {', '.join(sizes)}", 11)
     _text(canvas, x, top - 0.025, "Print at 100 % (actual size). Do not fit to the page.", 10, bold=True)
     _text(canvas, x, top - 0.031, f"Paper: {paper}. Measure both squares before you cut anything.", 8)
-    _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "50 mm")
-    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, "2 inches")
+    _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "5 cm")
+    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, "1 inch")
     y = top - 0.037
     for role, meaning in _KEY:
         y -= 0.0052
@@ -74,9 +75,6 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
             dashes = SIZE_DASHES[index % len(SIZE_DASHES)]
             _sample(canvas, x + 0.001 + 0.045 * column, y, SIZE_COLOURS[index % len(SIZE_COLOURS)], 0.5, dashes)
             _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, f"size {size}", 8)
-    notes = sorted({f"{p.name}: {note}" for pieces in garment.pieces.values() for p in pieces for note in p.notes})
-    for row, note in enumerate(notes[:2]):
-        _text(canvas, x, top - 0.122 - 0.004 * row, note, 6.5)
 
 
 def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
@@ -84,9 +82,8 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     paper = tiling.paper
     low = np.array([paper.margin + 0.005, paper.height - paper.margin - LEGEND_SIZE[1] - 0.002])
     draw_legend(canvas, low, garment, sizes, paper.name)
-    # Unused room for the sizes' lines and the notes is not left empty.
-    noted = any(piece.notes for pieces in garment.pieces.values() for piece in pieces)
-    y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 and not noted else 0.0)
+    # Unused room for the sizes' lines is not left empty.
+    y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 else 0.0)
     lines = [
         "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
         f"the half diamonds meet, and glue. {format_count(len(tiling.tiles), 'sheet')}; empty ones are left out.",
@@ -94,13 +91,8 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     for line in lines:
         _text(canvas, float(low[0]), y, line, 7.5)
         y -= 0.0042
-    pieces = next(iter(garment.pieces.values()))
-    for number, piece in enumerate(pieces, 1):
-        cut = next((text.replace("\n", " ") for text, _ in piece.label.lines if text.startswith("Cut ")), "")
-        entry = f"{number}  {piece.name.replace('_', ' ')}: {cut[:1].lower() + cut[1:]}"
-        _text(canvas, float(low[0]), y - 0.002, entry, 7.5)
-        y -= 0.0042
     _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
+    page_footer(canvas, garment.name, paper, "print this page first and measure both squares")
     canvas.showPage()
 
 
@@ -126,24 +118,28 @@ def _overview(canvas: Any, sheet: Sheet, tiling: Tiling, x: float, y: float, wid
     for number, placed in enumerate(sheet.placed, 1):
         for piece in placed.pieces:
             for line in (piece.cut_line, *(cutout.cut_line for cutout in piece.cutouts.values())):
-                points = (origin + scale * (line + placed.offset)) * POINT
+                points = (origin + scale * placed.on_sheet(line)) * POINT
                 path = canvas.beginPath()
                 path.moveTo(*points[0])
                 for point in points[1:]:
                     path.lineTo(*point)
                 path.close()
                 canvas.drawPath(path)
-        _name(canvas, placed, number, origin + scale * placed.offset, scale)
+        _name(canvas, sheet, number, origin, scale)
 
 
-def _name(canvas: Any, placed: Placed, number: int, origin: FloatArray, scale: float) -> None:
+def _name(canvas: Any, sheet: Sheet, number: int, origin: FloatArray, scale: float) -> None:
     """Write a piece's name in its drawing, or its number in the list above where there is no room."""
     import shapely
 
+    placed = sheet.placed[number - 1]
     piece = placed.pieces[len(placed.pieces) // 2]
-    holes = [shapely.Polygon(cutout.cut_line).buffer(0) for cutout in piece.cutouts.values()]
-    cloth = shapely.Polygon(piece.cut_line).buffer(-0.0005 / scale).difference(shapely.union_all(holes))
-    for text, least in ((piece.name.replace("_", " "), 0.7), (str(number), 0.5)):
+    holes = [shapely.Polygon(placed.on_sheet(cutout.cut_line)).buffer(0) for cutout in piece.cutouts.values()]
+    cloth = (
+        shapely.Polygon(placed.on_sheet(piece.cut_line)).buffer(-0.0005 / scale).difference(shapely.union_all(holes))
+    )
+    title = piece_titles([p.pieces[0].piece for p in sheet.placed])[piece.name]
+    for text, least in ((title, 0.7), (str(number), 0.5)):
         label = fit_label(cloth, [(text, NAME_HEIGHT / scale)], least=least)
         if label is not None:
             break
@@ -158,6 +154,14 @@ def _name(canvas: Any, placed: Placed, number: int, origin: FloatArray, scale: f
         canvas.setFont(FONT, size)
         canvas.drawCentredString(0, -words.height * scale * POINT / 2, words.text)
         canvas.restoreState()
+
+
+def page_footer(canvas: Any, name: str, paper: Paper, words: str) -> None:
+    """Write what a page is of at its foot."""
+    canvas.setFillColor("#555555")
+    canvas.setFont(FONT, 7)
+    line = f"{name.replace('_', ' ')}  -  {words}  -  {paper.name}, print at 100 %"
+    canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, line)
 
 
 def _square(canvas: Any, x: float, y: float, side: float, text: str) -> None:

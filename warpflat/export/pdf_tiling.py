@@ -41,6 +41,8 @@ class Paper:
         width, height: [m].
         margin: what printers leave white [m].
         overlap: of neighbouring tiles [m].
+        endless: the page is as large as everything needs.
+        line_width: lines are so many times as wide as on paper.
     """
 
     name: str
@@ -48,6 +50,8 @@ class Paper:
     height: float
     margin: float
     overlap: float
+    endless: bool = False
+    line_width: float = 1.0
 
     @property
     def step(self) -> FloatArray:
@@ -57,7 +61,7 @@ class Paper:
     @property
     def tiled(self) -> bool:
         """True if the paper is so small that a piece spreads over several sheets."""
-        return self.width < 0.5
+        return self.width < 0.5 and not self.endless
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -84,6 +88,16 @@ class Tiling:
         step = self.paper.step
         return np.array([column * step[0], float(self.sheet.size[1]) - (row + 1) * step[1] - self.paper.overlap])
 
+    @property
+    def joints(self) -> list[FloatArray]:
+        """The lines along which sheets meet, 2 by 2 [m]: each sheet's left and upper line lies on its neighbours."""
+        if not self.joined:
+            return []
+        step, (width, height) = self.paper.step, self.sheet.size
+        across = [np.array([[k * step[0], 0.0], [k * step[0], height]]) for k in range(1, self.columns)]
+        down = [np.array([[0.0, height - k * step[1]], [width, height - k * step[1]]]) for k in range(1, self.rows)]
+        return across + down
+
     def name(self, row: int, column: int) -> str:
         """Return the name of a tile, such as "B3" for the second row and the third column."""
         letters = ""
@@ -96,6 +110,8 @@ class Tiling:
 
 #: Width and height [m] of the legend's block.
 LEGEND_SIZE = (0.180, 0.128)
+#: Half the width [m] of a cutting line.
+LINE = 0.00025
 
 
 def make_tiling(sheet: Sheet, paper: Paper) -> Tiling:
@@ -113,29 +129,39 @@ def _drawn_shapes(sheet: Sheet) -> list[Polygon]:
     """Return the areas of a sheet that are drawn on: pieces, labels beside them, the reserved block."""
     import shapely
 
-    shapes = [shapely.Polygon(piece.cut_line + placed.offset) for placed in sheet.placed for piece in placed.pieces]
-    labels = [(nest_label(placed.pieces), placed.offset) for placed in sheet.placed]
-    shapes += [shapely.Polygon(label.box + offset) for label, offset in labels if label.leader is not None]
+    shapes = [shapely.Polygon(placed.on_sheet(piece.cut_line)) for placed in sheet.placed for piece in placed.pieces]
+    labels = [(nest_label(placed.pieces), placed) for placed in sheet.placed]
+    shapes += [shapely.Polygon(placed.on_sheet(label.box)) for label, placed in labels if label.leader is not None]
     if sheet.reserved is not None:
         shapes.append(shapely.box(*sheet.reserved, *(sheet.reserved + LEGEND_SIZE)))
     return shapes
 
 
 def _drawn_tiles(tiling: Tiling, shapes: Sequence[Polygon]) -> tuple[tuple[int, int], ...]:
-    """Return the tiles on which a part of a shape lies."""
+    """Return the tiles on which a part of a shape lies that no other tile shows.
+
+    Neighbours share a strip: a tile whose part lies in such strips of kept tiles is dropped, the emptiest first.
+    """
     import shapely
 
-    paper, tree = tiling.paper, shapely.STRtree(shapes)
-    tiles = []
-    for row in range(tiling.rows):
-        for column in range(tiling.columns):
-            # The strips on the right and below belong to the neighbours, except on the last tiles.
-            low, high = tiling.corner(row, column), tiling.corner(row, column) + paper.step
-            high += np.array([paper.overlap if column == tiling.columns - 1 else 0.0, paper.overlap])
-            low += np.array([0.0, 0.0 if row == tiling.rows - 1 else paper.overlap])
-            if len(tree.query(shapely.box(*low, *high), predicate="intersects")):
-                tiles.append((row, column))
-    return tuple(tiles)
+    # Lines are drawn with their middle on the border.
+    drawn = shapely.union_all([shape.buffer(LINE) for shape in shapes])
+    tiles = [(row, column) for row in range(tiling.rows) for column in range(tiling.columns)]
+    parts = {tile: drawn.intersection(_window(tiling, tile)) for tile in tiles}
+    kept = {tile for tile, part in parts.items() if part.area > 0.0}
+    for tile in sorted(kept, key=lambda tile: (parts[tile].area, tile)):
+        around = [_window(tiling, other) for other in kept - {tile} if max(np.abs(np.subtract(other, tile))) == 1]
+        if parts[tile].difference(shapely.union_all(around)).area < 1e-9:
+            kept.remove(tile)
+    return tuple(tile for tile in tiles if tile in kept)
+
+
+def _window(tiling: Tiling, tile: tuple[int, int]) -> Polygon:
+    """Return what a tile shows of the sheet."""
+    import shapely
+
+    corner = tiling.corner(*tile)
+    return shapely.box(*corner, *(corner + tiling.paper.step + tiling.paper.overlap))
 
 
 def _is_joined(tiling: Tiling, tiles: Sequence[tuple[int, int]], shapes: Sequence[Polygon]) -> bool:

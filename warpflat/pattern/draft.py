@@ -22,6 +22,7 @@ from warpflat.pattern.drafted import (
     DraftedGarment,
     DraftedPiece,
     DrillHole,
+    Notch,
     SeamReport,
 )
 from warpflat.pattern.drafted_darts import (
@@ -39,7 +40,7 @@ from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
 
-__all__ = ["draft_garment", "draft_piece", "nest_label"]
+__all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 
 
 #: An edge that runs along the grain within this [rad] can carry the grading's fixed point.
@@ -81,6 +82,38 @@ def draft_garment(
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
     """Draft one piece on its own, without the notches that its seams would give it."""
     return _draft(piece, garment, _fitted_edges([piece], (), tolerance)[piece.name], tolerance)
+
+
+def draft_half(
+    piece: Piece,
+    garment: str,
+    edges: tuple[DraftedEdge, ...],
+    notches: tuple[Notch, ...],
+    notes: tuple[str, ...],
+) -> DraftedPiece:
+    """Draft the half of a drafted piece: its lines, its notches in seams and its notes are kept as they are.
+
+    The half's frame is its own: the lower end of its fold is the origin, its grain runs upwards.
+    """
+    half = _draft(piece, garment, edges, 0.0)
+    return replace(half, notches=half.notches + notches, notes=notes)
+
+
+def relabelled(piece: DraftedPiece, garment: str, joints: Sequence[FloatArray]) -> DraftedPiece:
+    """Return a piece with its label where no joint of two sheets (2 by 2 [m] each) crosses it."""
+    legs = [piece.edge(leg).line for dart in piece.darts for leg in (dart.dart.left, dart.dart.right)]
+    holes = [cutout.sew_line for cutout in piece.cutouts.values()] + list(piece.fisheyes.values())
+    return replace(
+        piece,
+        label=place_label(
+            replace(piece.piece, edges=[replace(edge.edge, allowance=edge.width) for edge in piece.edges]),
+            garment,
+            (piece.sew_line, piece.cut_line),
+            holes,
+            [piece.grain, *piece.internal_lines.values(), *legs, *joints],
+            [edge.line for edge in piece.fold_edges],
+        ),
+    )
 
 
 def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance: float | None) -> DraftedPiece:

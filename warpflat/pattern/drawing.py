@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import TYPE_CHECKING
 
@@ -20,7 +21,7 @@ from warpflat.pattern.lettering import Words, text_width
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["Drawing", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
+__all__ = ["Drawing", "OnPaper", "Stroke", "draw_nest", "draw_piece", "grain_strokes"]
 
 
 #: Arrow heads: length and half width [m].
@@ -31,6 +32,10 @@ BRACKET = 0.014
 NAME, NAME_GAP = 0.0024, 0.0028
 #: Least distance [m] of such a name from all else; height of letters with tails below, over that of capitals.
 CLEAR, CAPITALS_AND_TAILS = 0.0004, 1.6
+#: Height [m] of a seam's letter beside a notch, and its distance from it.
+LETTER, LETTER_GAP = 0.0026, 0.0012
+#: What lies closer [m] to a fold lies on it.
+ON_FOLD = 1e-5
 #: Radius [m] of the circle around a drill hole.
 DRILL = 0.002
 
@@ -58,6 +63,19 @@ class Stroke:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
+class OnPaper:
+    """What printing changes: a fold is not cut, words cross no joint, notches have letters.
+
+    Attributes:
+        joints: lines (2 by 2 [m]) where sheets of paper meet.
+        letters: of seams, by their names.
+    """
+
+    joints: Sequence[FloatArray] = ()
+    letters: Mapping[str, str] = field(default_factory=dict)
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
 class Drawing:
     """All strokes and words of one piece in one size (or of the label of a nest)."""
 
@@ -66,39 +84,45 @@ class Drawing:
     words: tuple[Words, ...]
 
 
-def draw_piece(piece: DraftedPiece) -> Drawing:
-    """Draw one piece in one size."""
+def draw_piece(piece: DraftedPiece, paper: OnPaper | None = None) -> Drawing:
+    """Draw one piece in one size; `paper` where it is printed."""
+    joints = () if paper is None else paper.joints
     strokes = [
-        _cut_stroke(piece),
-        *(_edge_stroke(edge) for edge in piece.edges),
+        *_cut_strokes(piece, open_folds=paper is not None),
+        *(_edge_stroke(edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
         *_cutout_sew_strokes(piece),
         *_detail_strokes(piece),
         *grain_strokes(piece.grain),
         *_internal_strokes(piece),
         *_leader_strokes(piece.label),
     ]
-    words = [*piece.label.words(), *_line_names(piece)]
+    words = [*piece.label.words(), *_line_names(piece, joints=joints), *_notch_letters(piece, paper)]
     for edge in piece.fold_edges:
-        fold_strokes, fold_words = _fold_bracket(edge)
+        fold_strokes, fold_words = _fold_bracket(edge, joints)
         strokes += fold_strokes
         words += fold_words
     return Drawing(piece=piece, strokes=tuple(strokes), words=tuple(words))
 
 
-def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
+def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) -> tuple[Drawing, ...]:
     """Draw one piece in all its sizes upon each other: cut lines, darts and notches of each; label and grain once.
 
     The sewing lines of several sizes would be a thicket: they are hidden.
     """
     if len(pieces) == 1:
-        return (draw_piece(pieces[0]),)
+        return (draw_piece(pieces[0], paper),)
+    joints = () if paper is None else paper.joints
     drawings = []
     middle = len(pieces) // 2
     edge = _most_graded_edge(pieces)
     for index, piece in enumerate(pieces):
         strokes = [
-            _cut_stroke(piece),
-            *(replace(_edge_stroke(e), hidden=e.kind not in ("dart", "fold")) for e in piece.edges),
+            *_cut_strokes(piece, open_folds=paper is not None),
+            *(
+                replace(_edge_stroke(e), hidden=e.kind not in ("dart", "fold"))
+                for e in piece.edges
+                if paper is None or e.kind != "fold"
+            ),
             *(replace(line, hidden=True) for line in _cutout_sew_strokes(piece)),
             *_detail_strokes(piece),
         ]
@@ -107,9 +131,10 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
             label = nest_label(pieces)
             strokes += [*grain_strokes(piece.grain), *_internal_strokes(piece), *_leader_strokes(label)]
             sizes = ", ".join(p.size for p in pieces)
-            words += [*_list_sizes(label, piece.size, sizes), *_line_names(piece, borders=False)]
+            words += [*_list_sizes(label, piece.size, sizes), *_line_names(piece, borders=False, joints=joints)]
+            words += _notch_letters(piece, paper)
             for fold in piece.fold_edges:
-                fold_strokes, fold_words = _fold_bracket(fold)
+                fold_strokes, fold_words = _fold_bracket(fold, joints)
                 strokes += fold_strokes
                 words += fold_words
         drawings.append(
@@ -118,8 +143,37 @@ def draw_nest(pieces: tuple[DraftedPiece, ...]) -> tuple[Drawing, ...]:
     return tuple(drawings)
 
 
-def _cut_stroke(piece: DraftedPiece) -> Stroke:
-    return Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)
+def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
+    """Return the cutting line; with `open_folds`, as what is cut and what lies on the fold, up to the cut edges."""
+    if not (open_folds and piece.fold_edges):
+        return [Stroke(role="cut", name="cut", points=piece.cut_line, closed=True)]
+    ring = piece.cut_line
+    onwards = np.roll(ring, -1, axis=0)
+    on_fold = np.zeros(len(ring), dtype=bool)
+    for edge in piece.fold_edges:
+        start, end = edge.line[[0, -1]]
+        along = (end - start) / np.linalg.norm(end - start)
+        away = [np.abs((points - start) @ [-along[1], along[0]]) for points in (ring, onwards)]
+        on_fold |= np.maximum(*away) < ON_FOLD
+    if not on_fold.any() or on_fold.all():
+        whole = Stroke(role="cut", name="cut", points=ring, closed=True)
+        return [whole, *(_edge_stroke(edge) for edge in piece.fold_edges)]
+    first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
+    order = np.roll(np.arange(len(ring)), -first)
+    changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
+    strokes = []
+    for number, (a, b) in enumerate(zip(changes, [*changes[1:], len(ring)], strict=True)):
+        points = ring[order[np.arange(a, b + 1) % len(ring)]]
+        folded = bool(on_fold[order[a]])
+        name = piece.fold_edges[0].name if folded else "cut"
+        strokes.append(
+            Stroke(
+                role="fold" if folded else "cut",
+                name=name if number < 2 else f"{name} {number // 2 + 1}",
+                points=points,
+            )
+        )
+    return strokes
 
 
 def _edge_stroke(edge: DraftedEdge) -> Stroke:
@@ -185,7 +239,33 @@ def _fit_internal_line(line: bytes) -> Curve:
     return fit_curve(np.frombuffer(line).reshape(-1, 2))
 
 
-def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
+def _notch_letters(piece: DraftedPiece, paper: OnPaper | None) -> list[Words]:
+    """Write the letter of its seam beside each notch, in the allowance; not across a joint."""
+    import shapely
+
+    if paper is None:
+        return []
+    joints = paper.joints
+    lines = shapely.union_all([shapely.LineString(joint) for joint in joints])
+    words = []
+    for notch in piece.notches:
+        letter = paper.letters.get(notch.seam)
+        if letter is None:
+            continue
+        along = np.array([notch.direction[1], -notch.direction[0]])
+        half = text_width(letter, LETTER, bold=True) / 2
+        sides = []
+        for base, sign in ((notch.base[-1], 1.0), (notch.base[0], -1.0)):
+            aside = sign * along
+            if len(notch.base) == 2 and (notch.base[-1] - notch.base[0]) @ along * sign < 0:
+                base = notch.base[0] if sign > 0 else notch.base[-1]
+            at = base + (notch.depth / 2 + 0.0004) * notch.direction + (half + LETTER_GAP) * aside
+            sides.append(Words(text=letter, at=at, height=LETTER, bold=True))
+        words.append(max(sides, key=lambda w: min(0.001, float(lines.distance(_text_box(w)))) if joints else 0.0))
+    return words
+
+
+def _line_names(piece: DraftedPiece, *, borders: bool = True, joints: Sequence[FloatArray] = ()) -> list[Words]:
     """Place the names of edges, darts and internal lines along them, where they have room and keep clear of all else.
 
     An edge's name stands inside the sewing line, a dart's beside its first leg. Without `borders` edges have none.
@@ -194,7 +274,7 @@ def _line_names(piece: DraftedPiece, *, borders: bool = True) -> list[Words]:
 
     lines = _named_lines(piece, borders=borders)
     drawn = [shapely.LineString(line) for _, line, _ in lines]
-    obstacles = _name_obstacles(piece)
+    obstacles = [*_name_obstacles(piece), *(shapely.LineString(joint) for joint in joints)]
     words = []
     for index, (name, line, inwards) in enumerate(lines):
         others = shapely.union_all([*obstacles, *(other for key, other in enumerate(drawn) if key != index)])
@@ -290,8 +370,10 @@ def _arrow(tip: FloatArray, direction: FloatArray, role: str) -> Stroke:
     return Stroke(role=role, name="", points=points)
 
 
-def _fold_bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
-    """Draw a line beside the fold whose two arms point to it, with words along it."""
+def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple[list[Stroke], list[Words]]:
+    """Draw a line beside the fold whose two arms point to it, with words along it that cross no joint."""
+    import shapely
+
     start, end = edge.line[0], edge.line[-1]
     span = end - start
     length = float(np.linalg.norm(span))
@@ -305,7 +387,10 @@ def _fold_bracket(edge: DraftedEdge) -> tuple[list[Stroke], list[Words]]:
     if angle > np.pi / 2 + 1e-6 or angle <= -np.pi / 2 + 1e-6:
         angle += np.pi
     height = min(0.0035, length / 20)
-    words = Words(text="PLACE ON FOLD", at=(a + b) / 2 + (depth / 2) * inwards, height=height, angle=angle)
+    places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
+    tries = [Words(text="PLACE ON FOLD", at=at, height=height, angle=angle) for at in places]
+    lines = shapely.union_all([shapely.LineString(joint) for joint in joints])
+    words = next((w for w in tries if not joints or lines.distance(_text_box(w)) > CLEAR), tries[0])
     return strokes, [words]
 
 

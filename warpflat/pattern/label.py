@@ -16,7 +16,7 @@ from warpflat.pattern.pieces import Piece
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["LEADING", "Label", "default_grain", "fit_label", "label_lines", "place_label"]
+__all__ = ["LEADING", "Label", "cutting_words", "default_grain", "fit_label", "label_lines", "place_label"]
 
 
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
@@ -97,7 +97,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     if piece.size:
         words = size_words(piece.size)
         lines.append(words[0].upper() + words[1:])
-    lines.append(_cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
+    lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
     if allowances := _allowance_words(piece):
         lines.append(f"Includes {allowances}")
     title = garment.replace("_", " ")
@@ -106,7 +106,7 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     return tuple(lines)
 
 
-def _cutting_words(piece: Piece) -> str:
+def cutting_words(piece: Piece) -> str:
     """Return how often a piece is cut, and how."""
     if piece.on_fold:
         return f"Cut {piece.quantity} on fold"

@@ -20,13 +20,26 @@ class Placed:
 
     Attributes:
         pieces: upon each other.
-        offset: shift from the pieces' coordinates to the sheet's [m].
+        matrix: 2 by 3, from the pieces' coordinates to the sheet's [m]: quarter turns and a shift.
         box: lower left and upper right on the sheet [m].
     """
 
     pieces: tuple[DraftedPiece, ...]
-    offset: FloatArray
+    matrix: FloatArray
     box: FloatArray
+
+    @property
+    def offset(self) -> FloatArray:
+        """Shift from the pieces' coordinates to the sheet's [m]."""
+        return self.matrix[:, 2]
+
+    def on_sheet(self, points: FloatArray) -> FloatArray:
+        """Return points of the pieces (#P by 2 [m]) on the sheet."""
+        return points @ self.matrix[:, :2].T + self.matrix[:, 2]
+
+    def on_piece(self, points: FloatArray) -> FloatArray:
+        """Return points of the sheet (#P by 2 [m]) in the pieces' coordinates."""
+        return (points - self.matrix[:, 2]) @ self.matrix[:, :2]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -94,7 +107,8 @@ def lay_out(
     placed = []
     for i, group in enumerate(groups):
         offset = corners[i] - boxes[i][0]
-        placed.append(Placed(pieces=tuple(group), offset=offset, box=np.stack([corners[i], corners[i] + extents[i]])))
+        matrix = np.column_stack([np.eye(2), offset])
+        placed.append(Placed(pieces=tuple(group), matrix=matrix, box=np.stack([corners[i], corners[i] + extents[i]])))
     return Sheet(placed=tuple(placed), size=total, reserved=corners.get(len(groups)))
 
 

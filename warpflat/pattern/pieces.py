@@ -273,12 +273,14 @@ class Garment:
         pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
+        units: of lengths in the pattern's words, "cm" or "in".
     """
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
+    units: str = "cm"
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):

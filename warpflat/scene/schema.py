@@ -237,7 +237,7 @@ class PatternTable(Table):
     formats: list[Literal["dxf", "svg", "pdf", "json"]] = ["dxf", "svg", "pdf", "json"]  # noqa: RUF012 (pydantic copies)
     """Formats that are written; an empty list writes none."""
     dialect: Literal["aama", "astm"] = "aama"
-    paper: Literal["A4", "Letter", "A0"] = "A4"
+    paper: Literal["A4", "Letter", "A0", "Projector"] = "A4"
     allowance_mm: Annotated[float, Field(ge=0, le=100)] = 10.0
     hem_mm: Annotated[float, Field(ge=0, le=200)] = 30.0
     kinds: dict[str, Literal["seam", "hem", "fold", "cut"]] = Field(default_factory=dict)

@@ -1,0 +1,216 @@
+"""The pages of a printed pattern that say what to cut, how much cloth it takes, and how it is sewn."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.export.pdf_legend import page_footer
+from warpflat.pattern.cloth_needed import WIDTHS, cloth_needed
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.label import cutting_words
+from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width, wrap_text
+from warpflat.pattern.measures import cloth_words, length_words
+from warpflat.pattern.sewing_order import piece_titles, sewing_steps, sewn_seams
+
+if TYPE_CHECKING:
+    from warpflat.export.pdf_tiling import Paper
+
+__all__ = ["guide_pages"]
+
+
+POINT = 72 / 0.0254
+#: Size of a thumbnail [m], and how many stand in a row.
+THUMBNAIL, IN_ROW = (0.026, 0.034), 6
+#: Sizes of type [pt] and distance of lines [m].
+HEADING, TEXT, LINE = 11.0, 8.0, 0.0046
+
+
+class _Page:
+    """A page that is filled from the top; a new one begins where there is no room left."""
+
+    def __init__(self, canvas: Any, garment: DraftedGarment, paper: Paper) -> None:
+        self.canvas, self.garment, self.paper = canvas, garment, paper
+        self.left, self.width = paper.margin + 0.005, paper.width - 2 * paper.margin - 0.010
+        self.y = paper.height - paper.margin - 0.004
+
+    def need(self, height: float) -> None:
+        """Begin a new page if less than `height` [m] is left."""
+        if self.y - height < self.paper.margin + 0.004:
+            self.end()
+
+    def end(self) -> None:
+        """End the page."""
+        page_footer(self.canvas, self.garment.name, self.paper, "cutting and sewing")
+        self.canvas.showPage()
+        self.y = self.paper.height - self.paper.margin - 0.004
+
+    def heading(self, text: str, follows: float) -> None:
+        """Write a heading that stays with what follows it [m]."""
+        self.need(0.010 + follows)
+        self.y -= 0.008
+        self.text(self.left, text, HEADING, bold=True)
+        self.y -= 0.0030
+
+    def text(self, x: float, text: str, size: float = TEXT, *, bold: bool = False, width: float = 1.0) -> None:
+        """Write a text at the present height, smaller if it is wider than `width` [m]."""
+        wide = text_width(text, size * CAPITALS / POINT, bold=bold)
+        self.canvas.setFillColor("#000000")
+        self.canvas.setFont(BOLD if bold else FONT, size * min(1.0, width / max(wide, 1e-9)))
+        self.canvas.drawString(x * POINT, self.y * POINT, text)
+
+    def paragraph(self, text: str, *, indent: float = 0.0, lead: str = "") -> None:
+        """Write a text in as many lines as it takes, with a word before the first."""
+        rows = wrap_text(text, TEXT * CAPITALS / POINT, self.width - indent).split("\n")
+        self.need(LINE * len(rows))
+        for number, row in enumerate(rows):
+            self.y -= LINE
+            if number == 0 and lead:
+                self.text(self.left, lead, bold=True)
+            self.text(self.left + indent, row)
+
+    def table(self, head: Sequence[str], rows: Sequence[Sequence[str]], shares: Sequence[float]) -> None:
+        """Write rows in columns of the given shares of the width."""
+        starts = self.left + self.width * np.concatenate([[0.0], np.cumsum(shares)[:-1]])
+        for number, row in enumerate([head, *rows]):
+            self.need(LINE)
+            self.y -= LINE
+            for x, share, cell in zip(starts, shares, row, strict=True):
+                self.text(float(x), cell, bold=number == 0, width=share * self.width - 0.002)
+
+
+def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, paper: Paper) -> None:
+    """Draw the pages on cutting and sewing.
+
+    Args:
+        canvas: reportlab's.
+        whole: the garment with whole pieces.
+        printed: the garment as it is printed, with halves on the fold.
+        paper: of the pages.
+    """
+    page = _Page(canvas, whole, paper)
+    size, units = whole.garment.sample, whole.garment.units
+    size = size if size in printed.pieces else next(iter(printed.pieces))
+    _pieces(page, printed.pieces[size], units)
+    _cloth(page, whole, units)
+    _steps(page, whole, size)
+    _seams(page, whole, size, units)
+    notes = dict.fromkeys(
+        f"{piece.name.replace('_', ' ')}: {note}." for piece in printed.pieces[size] for note in piece.notes
+    )
+    if notes:
+        page.heading("Notes", 3 * LINE)
+    for note in notes:
+        page.paragraph(note)
+    page.end()
+
+
+def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
+    """Draw the pieces, small, with what to cut of each."""
+    titles = piece_titles([piece.piece for piece in pieces])
+    page.heading("Cut", THUMBNAIL[1] + 0.02)
+    highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
+    scale = min(THUMBNAIL[1] / highest, 0.06)
+    step = page.width / IN_ROW
+    for start in range(0, len(pieces), IN_ROW):
+        row = pieces[start : start + IN_ROW]
+        page.need(THUMBNAIL[1] + 4 * LINE)
+        top = page.y - 0.002
+        for number, piece in enumerate(row):
+            middle = page.left + (number + 0.5) * step
+            _thumbnail(page.canvas, piece, np.array([middle, top - THUMBNAIL[1] / 2]), scale)
+        page.y = top - THUMBNAIL[1] - LINE
+        for number, piece in enumerate(row):
+            lines = [f"{start + number + 1}  {titles[piece.name]}", cutting_words(piece.piece), piece.piece.fabric]
+            y = page.y
+            for k, line in enumerate(lines):
+                page.text(page.left + number * step + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
+                page.y -= 0.0038
+            page.y = y
+        page.y -= 3 * 0.0038
+    page.paragraph(f"Allowances are included: {_allowances(pieces, units)}. Lay every grain arrow along the selvedge.")
+
+
+def _allowances(pieces: Sequence[DraftedPiece], units: str) -> str:
+    found: dict[tuple[str, float], list[str]] = {}
+    for piece in pieces:
+        for edge in piece.edges:
+            if edge.kind in ("seam", "hem") and edge.width > 0:
+                found.setdefault((edge.kind, round(edge.width, 4)), [])
+    return ", ".join(
+        f"{kind}s {length_words(width, units)}" for kind, width in sorted(found, key=lambda k: (k[0] == "hem", k))
+    )
+
+
+def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: float) -> None:
+    """Draw one piece, small, about a centre [m]; the fold in dashes."""
+    low, high = piece.cut_line.min(axis=0), piece.cut_line.max(axis=0)
+    canvas.setStrokeColor("#000000")
+    canvas.setDash([])
+
+    def draw(points: FloatArray, width: float, *, closed: bool) -> None:
+        canvas.setLineWidth(width)
+        path = canvas.beginPath()
+        placed = (centre + scale * (points - (low + high) / 2)) * POINT
+        path.moveTo(*placed[0])
+        for point in placed[1:]:
+            path.lineTo(*point)
+        if closed:
+            path.close()
+        canvas.drawPath(path)
+
+    draw(piece.cut_line, 0.7, closed=True)
+    draw(piece.grain, 0.4, closed=False)
+    for dart in piece.darts:
+        legs = np.concatenate([piece.edge(dart.dart.left).line, piece.edge(dart.dart.right).line])
+        draw(legs, 0.4, closed=False)
+    canvas.setDash([2, 1.2])
+    canvas.setStrokeColor("#b8460b")
+    for edge in piece.fold_edges:
+        draw(edge.line, 1.4, closed=False)
+    canvas.setDash([])
+
+
+def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
+    """Write how much cloth each size takes at the usual widths."""
+    page.heading("Cloth needed", 3 * LINE)
+    head = ["", *(cloth_words(width, units, of_width=True) + " wide" for width in WIDTHS)]
+    rows = []
+    for size in whole.pieces:
+        for fabric, lengths in cloth_needed(whole, size).items():
+            words = ["too narrow" if length is None else cloth_words(length, units) for length in lengths]
+            rows.append([" ".join(part for part in (fabric, f"size {size}" if size else "") if part), *words])
+    page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
+    page.paragraph("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
+
+
+def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
+    """Write the table of seams: letter, sides, lengths."""
+    seams = sewn_seams(whole, size)
+    if not seams:
+        return
+    page.heading("Seams" + (f", size {size}" if len(whole.pieces) > 1 else ""), 3 * LINE)
+    rows = [
+        [
+            seam.letter,
+            seam.name + (f" ({seam.count} x)" if seam.count > 1 else ""),
+            seam.sides[0],
+            length_words(seam.length_mm[0] / 1000, units),
+            seam.sides[1],
+            length_words(seam.length_mm[1] / 1000, units),
+        ]
+        for seam in seams
+    ]
+    page.table(("", "seam", "side", "length", "sewn to", "length"), rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
+
+
+def _steps(page: _Page, whole: DraftedGarment, size: str) -> None:
+    """Write the order of sewing."""
+    steps = sewing_steps(whole, size)
+    page.heading("Sewing order", 3 * LINE)
+    page.paragraph("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+    for number, step in enumerate(steps, 1):
+        page.paragraph(step, indent=0.006, lead=str(number))

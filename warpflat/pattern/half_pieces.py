@@ -1,0 +1,242 @@
+"""Symmetric pieces as halves on the fold of the cloth, for printing: half the paper, and both sides cut alike."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import without_side
+from warpflat.pattern.curves import Curve
+from warpflat.pattern.draft import draft_half
+from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece, Notch
+from warpflat.pattern.pieces import Edge, Piece, Seam
+
+__all__ = ["halved", "is_symmetric"]
+
+
+#: A piece's cut line may stray from its mirror image by this much [m]; lines inside, which are only drawn, by more.
+SYMMETRIC, INNER = 4e-4, 2e-3
+#: Narrower pieces [m] stay whole: half of them saves no paper.
+NARROW = 0.10
+#: What lies closer to the axis than this [m] lies on it.
+ON_AXIS = 1e-6
+
+
+def halved(garment: DraftedGarment) -> DraftedGarment:
+    """Return the garment with every wide piece that is its own mirror image, in all sizes, as a half on the fold."""
+    names = [piece.name for piece in next(iter(garment.pieces.values()))]
+    on_fold = {name for name in names if all(_is_wide(p) and is_symmetric(p) for p in garment.all_sizes(name))}
+    sides = {name: _kept_side(garment.all_sizes(name)[0], garment.garment.seams) for name in on_fold}
+    pieces = {
+        size: tuple(_half(piece, garment, sides[piece.name]) if piece.name in on_fold else piece for piece in row)
+        for size, row in garment.pieces.items()
+    }
+    return replace(garment, pieces=pieces)
+
+
+def _is_wide(piece: DraftedPiece) -> bool:
+    return float(np.ptp(piece.cut_line[:, 0])) >= NARROW
+
+
+def is_symmetric(piece: DraftedPiece) -> bool:
+    """Return whether a whole piece is its own mirror image about a line along its grain, darts and holes included."""
+    import shapely
+
+    if piece.piece.on_fold or len(piece.piece.edges) < 2 or piece.cutouts or piece.fisheyes:
+        return False
+    axis = _axis(piece)
+
+    def strays(line: FloatArray, others: FloatArray) -> float:
+        return float(shapely.hausdorff_distance(shapely.LineString(line), shapely.LineString(others)))
+
+    mirror = np.array([-1.0, 1.0])
+    ring = shapely.LinearRing(piece.cut_line)
+    image = piece.cut_line * mirror + [2 * axis, 0]
+    if float(shapely.distance(ring, shapely.points(image)).max()) > SYMMETRIC:
+        return False
+    tips = np.array([dart.tip for dart in piece.darts]).reshape(-1, 2)
+    images = tips * mirror + [2 * axis, 0]
+    if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
+        return False
+    lines = list(piece.internal_lines.values())
+    return all(min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER for line in lines)
+
+
+def _axis(piece: DraftedPiece) -> float:
+    """Return where the axis of a symmetric piece lies across its grain [m]."""
+    return float(piece.cut_line[:, 0].min() + piece.cut_line[:, 0].max()) / 2
+
+
+def _kept_side(piece: DraftedPiece, seams: Sequence[Seam]) -> float:
+    """Return the side that is drawn, -1 or 1 along x: whose seams meet the drawn copies, else the left one's."""
+    axis, votes = _axis(piece), 0.0
+    for seam in seams:
+        for own, others in (seam.sides, seam.sides[::-1]):
+            for side in own:
+                if side.piece == piece.name and any(other.mirrored for other in others):
+                    votes -= 2 * _side_of(piece.edge(side.edge).line, axis)
+    for edge in piece.edges:
+        words = edge.name.split(" ")
+        votes += _side_of(edge.line, axis) * (("left" in words) - ("right" in words)) / len(piece.edges)
+    return 1.0 if votes >= 0 else -1.0
+
+
+def _side_of(line: FloatArray, axis: float) -> float:
+    """Return on which side of the axis a line lies, -1 or 1 along x; 0 if it crosses it."""
+    return float(np.sign(line[:, 0].min() - axis + ON_AXIS) + np.sign(line[:, 0].max() - axis - ON_AXIS)) / 2
+
+
+def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedPiece:
+    """Return the half of a symmetric piece on one side, with the fold along x = 0 and its lower end in the origin."""
+    axis = _axis(piece)
+    edges = [part for edge in piece.edges if (part := _kept_part(edge, axis, side)) is not None]
+    first = next(k for k in range(len(edges)) if _gap(edges[k - 1], edges[k]) > 10 * ON_AXIS)
+    edges = [*edges[first:], *edges[:first]]
+    start, end = edges[-1].curve.bezier[-1, 3], edges[0].curve.bezier[0, 0]
+    low = start if start[1] < end[1] else end
+    shift = -low
+    edges = [_moved_edge(edge, shift) for edge in edges]
+    names = {edge.name: without_side(edge.name) for edge in edges}
+    if len(set(names.values())) < len(names):
+        names = {name: name for name in names}
+    edges = [replace(edge, edge=replace(edge.edge, name=names[edge.name])) for edge in edges]
+    edges.append(_fold_edge(piece, edges[-1].line[-1], edges[0].line[0], {edge.name for edge in edges}))
+    darts = [
+        replace(dart.dart, name=without_side(dart.dart.name), left=names[dart.dart.left], right=names[dart.dart.right])
+        for dart in piece.darts
+        if dart.dart.left in names
+    ]
+    half = Piece(
+        name=piece.name,
+        size=piece.size,
+        fabric=piece.piece.fabric,
+        quantity=piece.piece.quantity,
+        edges=[edge.edge for edge in edges],
+        darts=darts,
+        internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
+        paired=piece.piece.paired,
+    )
+    notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
+    notches = tuple(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base)) for n in notches)
+    return draft_half(half, garment.name, tuple(edges), notches, piece.notes)
+
+
+def _kept_notches(
+    piece: DraftedPiece,
+    seams: Sequence[Seam],
+    side: float,
+    names: Mapping[str, str],
+    lines: Sequence[tuple[str, FloatArray]],
+) -> tuple[Notch, ...]:
+    """Return the notches of seams on one side of the axis, each on its edge of the half.
+
+    A seam across the axis (a waist) whose notches all lie on the other side gets their mirror images.
+
+    Args:
+        piece: whole.
+        seams: of the garment.
+        side: that is kept, -1 or 1 along x.
+        names: of the half's edges, by those of the whole.
+        lines: the half's edges by name, where they lie on the whole piece.
+    """
+    import shapely
+
+    axis, own = _axis(piece), {dart.dart.name for dart in piece.darts}
+    kept = [n for n in piece.notches if n.seam not in own and n.edge in names and side * (n.at[0] - axis) > -ON_AXIS]
+    across = {
+        seam.name for seam in seams for row in seam.sides for s in row if s.piece == piece.name and s.edge in names
+    }
+    across -= {notch.seam for notch in kept}
+    flip, shift = np.array([-1.0, 1.0]), np.array([2 * axis, 0.0])
+    for notch in piece.notches:
+        if notch.seam in across:
+            bases = tuple(base * flip + shift for base in notch.base)
+            kept.append(replace(notch, at=notch.at * flip + shift, base=bases, direction=notch.direction * flip))
+    drawn = [shapely.LineString(line) for _, line in lines]
+    nearest = [lines[int(np.argmin(shapely.distance(drawn, shapely.Point(notch.at))))][0] for notch in kept]
+    return tuple(replace(notch, edge=edge) for notch, edge in zip(kept, nearest, strict=True))
+
+
+def _gap(before: DraftedEdge, after: DraftedEdge) -> float:
+    """Return the distance [m] from the end of an edge to the start of the next."""
+    return float(np.linalg.norm(before.curve.bezier[-1, 3] - after.curve.bezier[0, 0]))
+
+
+def _kept_part(edge: DraftedEdge, axis: float, side: float) -> DraftedEdge | None:
+    """Return the part of an edge on one side of the axis; None if there is none."""
+    kept, straight = [], []
+    for control, is_straight in zip(edge.curve.bezier, edge.curve.straight, strict=True):
+        part = _clipped(control, axis, side)
+        if part is not None:
+            kept.append(part)
+            straight.append(is_straight)
+    if not kept:
+        return None
+    return _with_curve(edge, Curve(bezier=np.stack(kept), straight=np.array(straight)))
+
+
+def _clipped(control: FloatArray, axis: float, side: float) -> FloatArray | None:
+    """Return the part of a cubic (4 by 2) on one side of a line x = axis that it crosses once at most."""
+    away = side * (control[:, 0] - axis)
+    if away[0] <= ON_AXIS and away[3] <= ON_AXIS:
+        return None
+    if away[0] >= -ON_AXIS and away[3] >= -ON_AXIS:
+        return control
+    a, b, c, d = away
+    roots = np.roots([d - 3 * c + 3 * b - a, 3 * c - 6 * b + 3 * a, 3 * b - 3 * a, a])
+    t = min((float(r.real) for r in roots if abs(r.imag) < 1e-9 and -1e-9 <= r.real <= 1 + 1e-9), default=0.5)
+    p01, p12, p23 = (control[k] + t * (control[k + 1] - control[k]) for k in range(3))
+    p012, p123 = p01 + t * (p12 - p01), p12 + t * (p23 - p12)
+    at = p012 + t * (p123 - p012)
+    at = np.array([axis, at[1]])
+    return np.stack([control[0], p01, p012, at]) if away[0] > 0 else np.stack([at, p123, p23, control[3]])
+
+
+def _with_curve(edge: DraftedEdge, curve: Curve) -> DraftedEdge:
+    """Return an edge along another curve, of the same name, kind and width."""
+    line = curve.sample()
+    own = Edge(name=edge.name, points=line, kind=edge.kind, allowance=edge.width)
+    places = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
+    return replace(edge, edge=own, curve=curve, line=line, places=places)
+
+
+def _moved_edge(edge: DraftedEdge, shift: FloatArray) -> DraftedEdge:
+    return _with_curve(edge, Curve(bezier=edge.curve.bezier + shift, straight=edge.curve.straight))
+
+
+def _fold_edge(piece: DraftedPiece, start: FloatArray, end: FloatArray, taken: set[str]) -> DraftedEdge:
+    """Return the edge along the axis, named as the line of the piece that lies there."""
+    names = [name for name, line in piece.internal_lines.items() if np.abs(line[:, 0] - _axis(piece)).max() < INNER]
+    name = next((name for name in names if name not in taken), "fold")
+    thirds = np.stack([start + k / 3 * (end - start) for k in range(4)])
+    curve = Curve(bezier=thirds[None], straight=np.array([True]))
+    edge = Edge(name=name, points=np.stack([start, end]), kind="fold")
+    return DraftedEdge(
+        edge=edge,
+        curve=curve,
+        line=np.stack([start, end]),
+        width=0.0,
+        places=np.array([0.0, float(np.linalg.norm(end - start))]),
+        fit_error=0.0,
+        tolerance=0.0,
+    )
+
+
+def _kept_lines(lines: Mapping[str, FloatArray], axis: float, side: float, shift: FloatArray) -> dict[str, FloatArray]:
+    """Return the parts of lines on one side of the axis, without those that lie on it."""
+    import shapely
+
+    far = 10.0
+    box = shapely.box(min(axis, axis + side * far), -far, max(axis, axis + side * far), far)
+    kept: dict[str, FloatArray] = {}
+    for name, line in lines.items():
+        inside = shapely.intersection(shapely.LineString(line), box)
+        parts = [part for part in shapely.get_parts(inside) if part.geom_type == "LineString"]
+        for part in parts:
+            points = np.asarray(part.coords)
+            if len(points) > 1 and np.abs(points[:, 0] - axis).max() > INNER and without_side(name) not in kept:
+                kept[without_side(name)] = points + shift
+    return kept

@@ -1,0 +1,42 @@
+"""Lengths in words, in centimetres or inches, as they stand on patterns."""
+
+from __future__ import annotations
+
+from math import ceil
+
+__all__ = ["UNITS", "cloth_words", "length_words"]
+
+#: Units of a pattern's words.
+UNITS = ("cm", "in")
+INCH = 0.0254
+YARD = 0.9144
+#: A length is written as a fraction of an inch if that is as near as this [m].
+FRACTION = 0.0002
+
+
+def length_words(length: float, units: str = "cm") -> str:
+    """Return a length [m] in words: "1 cm", "35.5 cm", "3/8 in", "13.98 in"."""
+    if units == "cm":
+        return f"{round(100 * length, 1):g} cm"
+    whole, sixteenths = divmod(round(length / INCH * 16), 16)
+    if abs((whole + sixteenths / 16) * INCH - length) > FRACTION:
+        return f"{length / INCH:.2f} in"
+    return f"{_with_fraction(whole, sixteenths, 16)} in"
+
+
+def cloth_words(length: float, units: str = "cm", *, of_width: bool = False) -> str:
+    """Return a length of cloth [m] as it is bought: up to the next 5 cm or eighth of a yard; a width is rounded."""
+    if units == "cm":
+        return f"{round(100 * length)} cm" if of_width else f"{5 * ceil(length / 0.05 - 1e-9) / 100:.2f} m"
+    if of_width:
+        return f"{round(length / INCH)} in"
+    whole, eighths = divmod(ceil(length / YARD * 8 - 1e-9), 8)
+    return f"{_with_fraction(whole, eighths, 8)} yd"
+
+
+def _with_fraction(whole: int, parts: int, of: int) -> str:
+    while parts and parts % 2 == 0:
+        parts, of = parts // 2, of // 2
+    if not parts:
+        return str(whole)
+    return f"{whole} {parts}/{of}" if whole else f"{parts}/{of}"

@@ -1,0 +1,188 @@
+"""The order in which a garment is sewn, read off its darts, seams and free edges, with a letter for each seam."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from string import ascii_uppercase
+
+from warpflat.core.text import without_side
+from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
+from warpflat.pattern.pieces import Piece, Seam, SeamSide
+
+__all__ = ["SewnSeam", "piece_titles", "seam_letters", "sewing_steps", "sewn_seams"]
+
+
+#: Seams in the order in which they are closed, by words of their names; what has none of them comes with the panels.
+_STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
+    ("Join the panels", ("princess", "panel", "yoke", "centre")),
+    ("Sew the shoulders", ("shoulder",)),
+    ("Sew the inner leg seams", ("inseam",)),
+    ("Sew the side seams", ("side", "outseam")),
+    ("Sew the sleeve seams", ("underarm", "overarm")),
+    ("Sew the crotch seam", ("crotch",)),
+    ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
+    ("Set the sleeves in", ("armhole",)),
+    ("Attach the collar", ("neck", "collar")),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class SewnSeam:
+    """A seam as the maker meets it; its mirror image, which is sewn alike, is the same one.
+
+    Attributes:
+        letter: written beside its notches.
+        name: without left and right, if both are sewn.
+        sides: the pieces of both sides, in words.
+        length_mm: of both sides.
+        ease: by how much the second side is eased or gathered in, as a share.
+        stage: its place in `_STAGES`.
+        count: how often it is sewn.
+    """
+
+    letter: str
+    name: str
+    sides: tuple[str, str]
+    length_mm: tuple[float, float]
+    ease: float
+    stage: int
+    count: int
+
+
+def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
+    """Return what each piece is called: one that is cut in pairs has no side."""
+    titles = {
+        piece.name: without_side(piece.name) if _in_pairs(piece) else piece.name.replace("_", " ") for piece in pieces
+    }
+    plain = list(titles.values())
+    return {name: title if plain.count(title) == 1 else name.replace("_", " ") for name, title in titles.items()}
+
+
+def _in_pairs(piece: Piece) -> bool:
+    return piece.paired and piece.quantity % 2 == 0 and not piece.on_fold
+
+
+def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
+    """Return the seams of a garment in their order, each with its letter."""
+    pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
+    titles = piece_titles(list(pieces.values()))
+    lengths = {report.name: report.length_mm for report in garment.seams if report.size == size}
+    groups = _mirror_groups(garment.garment.seams)
+    ordered = sorted(groups, key=lambda group: _stage(group[0], pieces))
+    found = []
+    for number, group in enumerate(ordered):
+        seam = group[0]
+        found.append(
+            SewnSeam(
+                letter=_letter(number),
+                name=without_side(seam.name) if len(group) > 1 else seam.name,
+                sides=(_words(seam.sides[0], titles), _words(seam.sides[1], titles)),
+                length_mm=lengths.get(seam.name, (0.0, 0.0)),
+                ease=seam.ease,
+                stage=_stage(seam, pieces),
+                count=len(group),
+            )
+        )
+    return tuple(found)
+
+
+def seam_letters(garment: DraftedGarment) -> dict[str, str]:
+    """Return the letter of each seam by its name."""
+    size = next(iter(garment.pieces))
+    pieces = {piece.name: piece.piece for piece in garment.pieces[size]}
+    ordered = sorted(_mirror_groups(garment.garment.seams), key=lambda group: _stage(group[0], pieces))
+    return {seam.name: _letter(number) for number, group in enumerate(ordered) for seam in group}
+
+
+def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
+    """Return the steps of making the garment, a sentence each."""
+    pieces = garment.pieces[size]
+    titles = piece_titles([piece.piece for piece in pieces])
+    steps = []
+    darts = [f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece))]
+    if darts:
+        steps.append(f"Sew the darts, from the edge to the tip, and press them: {'; '.join(darts)}.")
+    seams = sewn_seams(garment, size)
+    for stage in sorted({seam.stage for seam in seams}):
+        own = [seam for seam in seams if seam.stage == stage]
+        what = _STAGES[stage][0] if stage < len(_STAGES) else "Sew"
+        parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in own]
+        steps.append(f"{what}, notch to notch: {', '.join(parts)}.")
+    free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
+    if free:
+        steps.append(f"Finish the raw edges with a facing, a band or binding: {free}.")
+    hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
+    if hems:
+        steps.append(f"Turn up and sew the hems: {hems}.")
+    return tuple(steps)
+
+
+def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
+    """Return seams that are each other's mirror images together."""
+    groups: dict[object, list[Seam]] = {}
+    for seam in seams:
+        sides = sorted(
+            tuple(sorted((without_side(s.piece), without_side(s.edge)) for s in side)) for side in seam.sides
+        )
+        groups.setdefault((without_side(seam.name), tuple(sides)), []).append(seam)
+    return list(groups.values())
+
+
+def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
+    """Return when a seam is sewn: by the words of its name, or with the panels."""
+    words = seam.name.lower().replace("_", " ").split(" ")
+    for number, (_, keys) in reversed(list(enumerate(_STAGES))):
+        if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
+            return number
+    return 0
+
+
+def _letter(number: int) -> str:
+    """Return A, B, ... Z, AA, AB, ..."""
+    letters = ""
+    number += 1
+    while number:
+        number, digit = divmod(number - 1, 26)
+        letters = ascii_uppercase[digit] + letters
+    return letters
+
+
+def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
+    return " + ".join(dict.fromkeys(titles[part.piece] for part in side))
+
+
+def _join(seam: SewnSeam) -> str:
+    first, second = seam.sides
+    return f"{seam.name}: {first} to {second}" if first != second else f"{seam.name} of the {first}"
+
+
+def _eased(seam: SewnSeam) -> str:
+    if abs(seam.ease) < 5e-4:
+        return ""
+    longer = seam.sides[1] if seam.ease > 0 else seam.sides[0]
+    share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
+    return f", {'gather' if share > 0.15 else 'ease in'} the {longer}"
+
+
+def _dart_names(piece: DraftedPiece) -> list[str]:
+    names = [without_side(dart.dart.name) for dart in piece.darts]
+    return list(dict.fromkeys([*names, *(without_side(name) for name in piece.fisheyes)]))
+
+
+def _free_edges(
+    pieces: Sequence[DraftedPiece], seams: Sequence[Seam], titles: Mapping[str, str], kinds: Sequence[str]
+) -> str:
+    """Return the edges of some kinds that are in no seam, by name, with their pieces."""
+    sewn = {(part.piece, part.edge) for seam in seams for side in seam.sides for part in side}
+    found: dict[str, list[str]] = {}
+    for piece in pieces:
+        for edge in piece.piece.edges:
+            if edge.kind in kinds and (piece.name, edge.name) not in sewn:
+                own = found.setdefault(without_side(edge.name), [])
+                own += [] if titles[piece.name] in own else [titles[piece.name]]
+    return "; ".join(f"{name} ({', '.join(own)})" for name, own in found.items())
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

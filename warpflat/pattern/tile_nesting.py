@@ -1,0 +1,321 @@
+"""Pieces nested on a grid of tiles so that few tiles are printed, or on a strip of cloth so that little is taken.
+
+Pieces are turned into cells, fine enough for paper, and laid one by one, the largest first, where they take up the
+fewest new tiles (or the least cloth). Free places are found by a correlation with what is occupied, as in raster
+nesting. Several orders are tried; the same input always gives the same result, on every machine.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+
+if TYPE_CHECKING:
+    from shapely import Polygon
+
+__all__ = ["TurnedShape", "nest_on_strip", "nest_on_tiles"]
+
+
+#: Cells are about this wide [m], at most.
+CELL = 0.008
+#: Orders of the pieces that are tried, and tiles in the sheet, across and down, at most.
+ORDERS, MOST_TILES = 8, 24
+#: What one more row or column of the whole sheet counts as, in tiles: a long strip is hard to glue and to lay out.
+SPREAD = 0.2
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class TurnedShape:
+    """A place on the sheet.
+
+    Attributes:
+        quarters: quarter turns counter-clockwise.
+        corner: lower left of the turned shape's box [m], y upwards.
+    """
+
+    quarters: int
+    corner: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Mask:
+    """A shape in one position as cells, rows downwards."""
+
+    cells: BoolArray
+    quarters: int
+    extent: FloatArray
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _Grid:
+    """Tiles of cells.
+
+    Attributes:
+        cell: width and height of a cell [m].
+        per_tile: cells of a tile, down and across.
+        shared: cells of the strip that a tile shares with the one before it, down and across.
+        tiles: rows and columns.
+    """
+
+    cell: FloatArray
+    per_tile: tuple[int, int]
+    shared: tuple[int, int]
+    tiles: tuple[int, int]
+
+
+def nest_on_tiles(
+    shapes: Sequence[Polygon], *, step: FloatArray, overlap: float, gap: float
+) -> tuple[list[TurnedShape], FloatArray]:
+    """Lay shapes on a grid of tiles so that few tiles have anything on them.
+
+    Args:
+        shapes: polygons [m].
+        step: from one tile to the next, across and up [m].
+        overlap: of neighbouring tiles [m].
+        gap: between shapes and to the sheet's border [m].
+
+    Returns:
+        The place of each shape, and the sheet's width and height [m], which are those of whole tiles.
+    """
+    per_tile = tuple(int(np.ceil(side / CELL)) for side in step[::-1])
+    cell = step / per_tile[::-1]
+    shared = (int(overlap // cell[1]), int(overlap // cell[0]))
+    masks = [_masks(shape, cell, gap, (0, 1, 2, 3)) for shape in shapes]
+    total = sum(float(shape.area) for shape in shapes)
+    needed = int(np.ceil(total / float(np.prod(step))))
+    tallest = max(min(m.cells.shape[0] for m in row) for row in masks)
+    least_rows = int(np.ceil((tallest - shared[0]) / per_tile[0]))
+    best: tuple[float, list[tuple[_Mask, int, int]]] | None = None
+    for columns in _column_counts(masks, per_tile, shared, needed):
+        rows = min(MOST_TILES, least_rows + needed // columns + 2)
+        grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=(rows, columns))
+        shape = rows * per_tile[0] + shared[0], columns * per_tile[1] + shared[1]
+        sheet = _Places(shape)
+        for order in _orders(masks):
+            laid = _lay(masks, order, grid, sheet)
+            if laid is not None and (best is None or laid[0] < best[0]):
+                best = laid
+    if best is None:
+        raise ValueError("the shapes do not fit on the grid")
+    return _places(best[1], cell, step, overlap, gap)
+
+
+def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> float | None:
+    """Return the length [m] of a strip of some width [m] that shapes take; None if one is too wide.
+
+    Shapes lie with y along the strip and may be turned round, not across.
+    """
+    across = int(np.floor(width / CELL))
+    cell = np.array([width / across, CELL])
+    masks = [_masks(shape, cell, gap, (0, 2)) for shape in shapes]
+    if any(row[0].cells.shape[1] > across for row in masks):
+        return None
+    longest = sum(row[0].cells.shape[0] for row in masks)
+    lengths, places = [], _Places((longest, across))
+    for order in _orders(masks):
+        places.clear()
+        length = 0
+        for k in order:
+            found = [(*_highest(places, mask), mask) for mask in masks[k]]
+            row, column, mask = min(found, key=lambda item: (max(length, item[0] + len(item[2].cells)), item[0]))
+            places.take(mask, row, column)
+            length = max(length, row + len(mask.cells))
+        lengths.append(length)
+    return min(lengths) * float(cell[1])
+
+
+def _highest(places: _Places, mask: _Mask) -> tuple[int, int]:
+    """Return the first free place (row, column) of a mask."""
+    free = places.free(mask)
+    row = int(np.argmax(free.any(axis=1)))
+    return row, int(np.argmax(free[row]))
+
+
+def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[_Mask]:
+    """Return a shape as cells in its positions, grown by half of the gap; a cell that it touches is its own."""
+    import shapely
+    from shapely.affinity import rotate
+
+    found = []
+    for quarters in turns:
+        turned = rotate(shape, 90.0 * quarters, origin=(0, 0)) if quarters else shape
+        grown = turned.simplify(CELL / 20).buffer(gap / 2 + CELL / 20)
+        low, high = np.array(grown.bounds[:2]), np.array(grown.bounds[2:])
+        columns, rows = np.maximum(1, np.ceil((high - low) / cell - 1e-9)).astype(int)
+        shapely.prepare(grown)
+        x = low[0] + cell[0] * np.arange(columns)
+        y = high[1] - cell[1] * np.arange(1, rows + 1)
+        boxes = shapely.box(x[None, :], y[:, None], x[None, :] + cell[0], y[:, None] + cell[1])
+        extent = np.array(turned.bounds[2:]) - np.array(turned.bounds[:2])
+        found.append(_Mask(cells=shapely.intersects(grown, boxes), quarters=quarters, extent=extent))
+    return found
+
+
+def _column_counts(
+    masks: Sequence[Sequence[_Mask]], per_tile: tuple[int, ...], shared: tuple[int, int], needed: int
+) -> list[int]:
+    """Return the numbers of columns that are tried: around a square sheet, and wide enough for every shape."""
+    narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
+    least = max(1, int(np.ceil((narrowest - shared[1]) / per_tile[1])))
+    square = max(least, round(np.sqrt(1.4 * needed * per_tile[0] / per_tile[1])))
+    return list(range(least, max(least, square) + 3))
+
+
+def _orders(masks: Sequence[Sequence[_Mask]]) -> list[list[int]]:
+    """Return orders of the shapes: by falling area, by falling height, and some at random near these."""
+    area = np.array([row[0].cells.sum() for row in masks], dtype=float)
+    tall = np.array([row[0].cells.shape[0] for row in masks], dtype=float)
+    random = np.random.default_rng(0)
+    orders = [np.argsort(-area, kind="stable"), np.argsort(-tall, kind="stable")]
+    while len(orders) < ORDERS:
+        orders.append(np.argsort(-area * random.uniform(0.4, 1.6, len(area)), kind="stable"))
+    return [list(order) for order in dict.fromkeys(tuple(order.tolist()) for order in orders)]
+
+
+def _lay(
+    masks: Sequence[Sequence[_Mask]], order: Sequence[int], grid: _Grid, sheet: _Places
+) -> tuple[float, list[tuple[_Mask, int, int]]] | None:
+    """Lay shapes in an order; return the price in tiles and each one's mask, row and column; None if one finds no room."""
+    sheet.clear()
+    used = np.zeros(grid.tiles, dtype=bool)
+    places: dict[int, tuple[_Mask, int, int]] = {}
+    for k in order:
+        best: tuple[float, _Mask, int, int] | None = None
+        for mask in masks[k]:
+            if (np.array(mask.cells.shape) > sheet.occupied.shape).any():
+                continue
+            price = _prices(mask.cells, used, grid, sheet.free(mask))
+            row, column = divmod(int(np.argmin(price)), price.shape[1])
+            if np.isfinite(price[row, column]) and (best is None or price[row, column] < best[0] - 1e-9):
+                best = float(price[row, column]), mask, row, column
+        if best is None:
+            return None
+        places[k] = best[1:]
+        sheet.take(*best[1:])
+        used |= _touched(best[1].cells, best[2], best[3], grid)
+    spread = SPREAD * (int(used.any(axis=1).sum()) + int(used.any(axis=0).sum()))
+    return float(used.sum()) + spread, [places[k] for k in range(len(masks))]
+
+
+def _prices(cells: BoolArray, used: BoolArray, grid: _Grid, free: BoolArray) -> FloatArray:
+    """Return for every place of a mask how many new tiles it takes, and a little for rows, columns and distance."""
+    (per_row, per_column), (tile_rows, tile_columns) = grid.per_tile, grid.tiles
+    down, across = free.shape
+    over_rows = _blocks(cells.shape[0], per_row, grid.shared[0])
+    over_columns = _blocks(cells.shape[1], per_column, grid.shared[1])
+    touched = _covered(cells, over_rows, over_columns)
+    new = np.where(used, 0.0, 1.0)
+    price = np.zeros((tile_rows + 1, per_row, tile_columns + 1, per_column))
+    padded = np.pad(new, ((0, touched.shape[1] + 1), (0, touched.shape[3] + 1)))
+    for i in range(touched.shape[1]):
+        for j in range(touched.shape[3]):
+            window = padded[i : i + tile_rows + 1, j : j + tile_columns + 1]
+            price += touched[:, i, :, j][None, :, None, :] * window[:, None, :, None]
+    flat = price.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
+    r, c = np.arange(down)[:, None], np.arange(across)[None, :]
+    # Among places that take equally few tiles: a compact sheet, and the upper left.
+    lower, right = (r + cells.shape[0]) / per_row, (c + cells.shape[1]) / per_column
+    lowest = int(np.flatnonzero(used.any(axis=1))[-1]) + 1 if used.any() else 0
+    widest = int(np.flatnonzero(used.any(axis=0))[-1]) + 1 if used.any() else 0
+    spread = SPREAD * (np.maximum(0, np.ceil(lower) - lowest) + np.maximum(0, np.ceil(right) - widest))
+    return np.where(free, flat + spread + 1e-3 * (lower + right), np.inf)
+
+
+def _blocks(size: int, per_tile: int, shared: int) -> tuple[IntArray, IntArray]:
+    """Return for a mask that starts at each cell of a tile which of its rows lie in the tiles from there on.
+
+    The strip that a tile shares with the one before is printed there, and does not count.
+    """
+    start = np.arange(per_tile)[:, None]
+    tile = np.arange((size + per_tile - 2) // per_tile + 1)[None, :]
+    low = np.clip(tile * per_tile + shared - start, 0, size)
+    high = np.clip((tile + 1) * per_tile - start, 0, size)
+    return low, np.maximum(low, high)
+
+
+def _covered(cells: BoolArray, rows: tuple[IntArray, IntArray], columns: tuple[IntArray, IntArray]) -> BoolArray:
+    """Return whether blocks of a mask hold any cell: by start and tile down, start and tile across."""
+    sums = np.pad(np.cumsum(np.cumsum(cells, axis=0), axis=1), ((1, 0), (1, 0)))
+
+    def at(r: IntArray, c: IntArray) -> IntArray:
+        return np.asarray(sums[r[:, :, None, None], c[None, None, :, :]])
+
+    (top, bottom), (left, right) = rows, columns
+    return np.asarray(at(bottom, right) - at(top, right) - at(bottom, left) + at(top, left) > 0)
+
+
+def _touched(cells: BoolArray, row: int, column: int, grid: _Grid) -> BoolArray:
+    """Return the tiles that a mask takes at one place."""
+    starts = row % grid.per_tile[0], column % grid.per_tile[1]
+    rows, columns = (
+        (blocks[0][start : start + 1], blocks[1][start : start + 1])
+        for blocks, start in (
+            (_blocks(cells.shape[axis], grid.per_tile[axis], grid.shared[axis]), starts[axis]) for axis in (0, 1)
+        )
+    )
+    covered = _covered(cells, rows, columns)[0, :, 0, :]
+    tiles = np.zeros(grid.tiles, dtype=bool)
+    i, j = row // grid.per_tile[0], column // grid.per_tile[1]
+    part = tiles[i : i + covered.shape[0], j : j + covered.shape[1]]
+    part |= covered[: part.shape[0], : part.shape[1]]
+    return tiles
+
+
+class _Places:
+    """The free places of masks on one sheet, by correlation with what is occupied; transforms are kept."""
+
+    def __init__(self, shape: tuple[int, int]) -> None:
+        from scipy.fft import next_fast_len, rfft2
+
+        self.occupied = np.zeros(shape, dtype=bool)
+        self._size = (next_fast_len(shape[0], real=True), next_fast_len(shape[1], real=True))
+        self._transform = lambda cells: rfft2(cells.astype(np.float32), s=self._size)
+        self._masks: dict[int, Any] = {}
+        self._here: Any = None
+
+    def take(self, mask: _Mask, row: int, column: int) -> None:
+        """Lay a mask."""
+        down, across = mask.cells.shape
+        self.occupied[row : row + down, column : column + across] |= mask.cells
+        self._here = None
+
+    def free(self, mask: _Mask) -> BoolArray:
+        """Return the places (row, column of the upper left) at which a mask meets nothing that is occupied."""
+        from scipy.fft import irfft2
+
+        down, across = np.array(self.occupied.shape) - mask.cells.shape + 1
+        if not self.occupied.any():
+            return np.ones((down, across), dtype=bool)
+        if self._here is None:
+            self._here = self._transform(self.occupied)
+        if id(mask) not in self._masks:
+            self._masks[id(mask)] = np.conj(self._transform(mask.cells))
+        meets = irfft2(self._here * self._masks[id(mask)], s=self._size)
+        return np.asarray(meets[:down, :across] < 0.5)
+
+    def clear(self) -> None:
+        """Take everything away."""
+        self.occupied[:] = False
+        self._here = None
+
+
+def _places(
+    laid: Sequence[tuple[_Mask, int, int]], cell: FloatArray, step: FloatArray, overlap: float, gap: float
+) -> tuple[list[TurnedShape], FloatArray]:
+    """Return places on the sheet [m], y upwards, and its size, without unused rows and columns at its end."""
+    margin = gap / 2 + CELL / 20
+    right = max(column * cell[0] + mask.extent[0] for mask, _, column in laid) + 2 * margin
+    lower = max(row * cell[1] + mask.extent[1] for mask, row, _ in laid) + 2 * margin
+    tiles = np.maximum(1, np.ceil((np.array([right, lower]) - overlap) / step - 1e-9))
+    size = tiles * step + overlap
+    places = []
+    for mask, row, column in laid:
+        top = size[1] - row * cell[1] - margin
+        corner = np.array([column * cell[0] + margin, top - mask.extent[1]])
+        places.append(TurnedShape(quarters=mask.quarters, corner=corner))
+    return places, size
