@@ -64,3 +64,18 @@ def test_metrics_of_a_run_are_as_published(reference: ModuleType, tmp_path: Path
     metrics["pieces"]["dome"]["flipped_faces"] = "none"
     with pytest.raises(jsonschema.ValidationError):
         jsonschema.validate(metrics, schema)
+
+
+@pytest.mark.parametrize(
+    ("script", "make", "page"), [("make_api", "api_page", "api"), ("make_gallery", "gallery_page", "gallery")]
+)
+def test_pages_on_disk_are_what_their_scripts_make(reference: ModuleType, script: str, make: str, page: str) -> None:
+    made = getattr(importlib.import_module(script), make)()
+    assert (ROOT / "docs" / f"{page}.md").read_text(encoding="utf-8") == made, f"run python docs/{script}.py"
+
+
+def test_every_scene_has_a_picture_in_the_gallery() -> None:
+    scenes = {path.stem for path in (ROOT / "scenes").glob("*.toml") if not path.name.startswith("batch")}
+    pictures = {path.stem: path.stat().st_size for path in (ROOT / "docs" / "gallery").glob("*.webp")}
+    assert set(pictures) == scenes
+    assert sum(pictures.values()) < 3e6
