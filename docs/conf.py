@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
+from typing import Any
 
 DOCS = Path(__file__).resolve().parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent)]
+
+from docutils.nodes import SkipNode  # noqa: E402
+from latex2mathml.converter import convert  # noqa: E402
 
 import warpflat  # noqa: E402
 
@@ -17,7 +21,6 @@ copyright = "the warpflat authors"
 extensions = [
     "myst_nb",
     "sphinx.ext.autodoc",
-    "sphinx.ext.mathjax",
     "sphinx.ext.napoleon",
 ]
 myst_enable_extensions = ["dollarmath", "fieldlist"]
@@ -29,6 +32,8 @@ exclude_patterns = ["gallery/*"]
 
 autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
+# Named, not spelt out: an array or what NumPy makes one of.
+autodoc_type_aliases = {name: name for name in ("ArrayLike", "FloatArray", "IntArray", "BoolArray")}
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
@@ -37,3 +42,19 @@ html_theme = "furo"
 html_title = f"warpflat {release}"
 html_static_path: list[str] = []
 html_show_sphinx = False
+html_math_renderer = "mathml"
+
+
+def _math(display: str) -> Any:
+    """Return a visitor that writes an equation as MathML, which browsers show without a script from elsewhere."""
+
+    def visit(translator: Any, node: Any) -> None:
+        translator.body.append(convert(node.astext(), display=display))
+        raise SkipNode
+
+    return visit
+
+
+def setup(app: Any) -> None:
+    """Register the renderer of equations."""
+    app.add_html_math_renderer("mathml", (_math("inline"), None), (_math("block"), None))
