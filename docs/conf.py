@@ -11,6 +11,7 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
 from docutils.nodes import SkipNode  # noqa: E402
 from latex2mathml.converter import convert  # noqa: E402
+from sphinx.util.inspect import TypeAliasForwardRef  # noqa: E402
 
 import warpflat  # noqa: E402
 
@@ -34,6 +35,8 @@ autodoc_typehints = "description"
 autodoc_typehints_description_target = "documented"
 # Named, not spelt out: an array or what NumPy makes one of.
 autodoc_type_aliases = {name: name for name in ("ArrayLike", "FloatArray", "IntArray", "BoolArray")}
+# Sphinx writes an alias in a union by its repr.
+TypeAliasForwardRef.__repr__ = lambda alias: alias.name  # type: ignore[method-assign]
 autodoc_member_order = "bysource"
 napoleon_google_docstring = True
 napoleon_use_ivar = True
