@@ -223,7 +223,9 @@ def _without_noise(schema: Any) -> Any:
 
 def schemas() -> dict[str, dict[str, Any]]:
     """Return the published JSON schemas by file name."""
-    metrics = plain_schema(Metrics, "warpflat metrics", "metrics.json, as a run leaves it. Later versions add keys.")
+    metrics = plain_schema(
+        Metrics, "warpflat metrics", "metrics.json, as `run`, `flatten` and `drape` leave it. Later versions add keys."
+    )
     pattern = plain_schema(PatternEntry, "warpflat pattern", "pattern.json; lengths in metres, angles in radians.")
     return {
         "scene.schema.json": scene_schema(),

@@ -55,6 +55,9 @@ class PieceWear(Entry):
     tension_warp: Distribution
     tension_weft: Distribution
     pressure: Distribution
+    stretch_warp: float | None = None
+    """The stretch of the warp that was asked for."""
+    stretch_weft: float | None = None
     would_help: list[Remedy]
 
 
