@@ -214,3 +214,51 @@ def test_import_is_lazy() -> None:
     found = {**os.environ, "PYTHONPATH": str(Path(warpflat.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=found, check=True)
     assert done.stdout.strip() == "[]"
+
+
+class OpenElsewhere:
+    """`os.replace` as on Windows while a program has a file open, which it closes after some attempts."""
+
+    def __init__(self, name: str, attempts: int) -> None:
+        self.name, self.attempts = name, attempts
+        self._replace = os.replace
+
+    def __call__(self, source: Path, target: Path) -> None:
+        # The hidden folder holds others of this name, which nobody has open.
+        if target.name == self.name and not target.parent.name.startswith(("new", "aside")) and self.attempts > 0:
+            self.attempts -= 1
+            error = PermissionError(13, "Access is denied", str(source))
+            error.winerror = 5  # type: ignore[attr-defined, unused-ignore]
+            raise error
+        self._replace(source, target)
+
+
+def test_a_file_that_is_open_for_a_moment_is_replaced(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("time.sleep", lambda seconds: None)
+    monkeypatch.setattr(os, "replace", OpenElsewhere("a.txt", attempts=3))
+    final = tmp_path / "a.txt"
+    final.write_text("before")
+    with atomic_path(final) as temporary:
+        temporary.write_text("after")
+    assert final.read_text() == "after"
+
+
+def test_a_file_that_stays_open_ends_the_run_in_one_line_and_all_files_stay(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("time.sleep", lambda seconds: None)
+    names = ("a.txt", "b.txt", "c.txt")
+    for name in names:
+        (tmp_path / name).write_text("before")
+    monkeypatch.setattr(os, "replace", OpenElsewhere("b.txt", attempts=10**9))
+
+    def run() -> None:
+        with output_folder(tmp_path, names):
+            for name in names:
+                with atomic_path(tmp_path / name) as temporary:
+                    temporary.write_text("after")
+
+    with pytest.raises(InputError, match=r"b\.txt: it is open in another program") as caught:
+        run()
+    assert "\n" not in str(caught.value)
+    assert {path.name: path.read_text() for path in tmp_path.iterdir()} == dict.fromkeys(names, "before")

@@ -27,6 +27,7 @@ from pathlib import Path
 from warpflat.core.errors import InputError, expect
 from warpflat.core.file_names import check_file_name
 from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_replace
+from warpflat.core.replace_file import is_open_elsewhere, replace_file
 
 __all__ = [
     "atomic_path",
@@ -194,7 +195,7 @@ def atomic_path(final: str | os.PathLike[str], *, sources: Iterable[Path] = ()) 
             yield temporary
             temporary.chmod(mode)
             if run is None:
-                os.replace(temporary, final)
+                replace_file(temporary, final)
             else:
                 run.take(temporary, final.name)
     except OSError as error:
@@ -249,7 +250,7 @@ class _Run:
 
     def take(self, temporary: Path, name: str) -> None:
         """A file that is complete."""
-        os.replace(temporary, self.new / name)
+        replace_file(temporary, self.new / name)
         self.names.pop(name, None)
         self.names[name] = None
         self.removed.pop(name, None)
@@ -267,10 +268,10 @@ class _Run:
             (self.hidden / _FRESH).write_text(json.dumps(fresh), encoding="utf-8")
             for name in self.removed:
                 with suppress(FileNotFoundError):
-                    os.replace(self.folder / name, aside / name)
+                    replace_file(self.folder / name, aside / name)
             for name in sorted(self.names, key=lambda name: name == "metrics.json"):
                 _keep_aside(self.folder / name, aside / name)
-                os.replace(self.new / name, self.folder / name)
+                replace_file(self.new / name, self.folder / name)
         except OSError as error:
             raise _cannot_write(self.folder / name, error) from error
         # From here on the new files are those of the folder, whatever happens to what is hidden.
@@ -301,7 +302,7 @@ def _keep_aside(final: Path, aside: Path) -> None:
     try:
         os.link(final, aside, follow_symlinks=False)
     except (OSError, NotImplementedError):
-        os.replace(final, aside)
+        replace_file(final, aside)
 
 
 def _put_back(hidden: Path) -> None:
@@ -317,8 +318,17 @@ def _put_back(hidden: Path) -> None:
         plain = Path(name).name == name and name not in ("", "..")
         if plain and not (hidden / _NEW / name).exists():
             (folder / name).unlink(missing_ok=True)
+    in_the_way: OSError | None = None
     for path in (hidden / _ASIDE).iterdir():
-        os.replace(path, folder / path.name)
+        final = folder / path.name
+        if final.exists() and path.samefile(final):
+            continue  # it was not replaced; one that is open could not be moved, either
+        try:
+            replace_file(path, final)
+        except OSError as error:
+            in_the_way = error
+    if in_the_way is not None:
+        raise in_the_way
     (hidden / _FRESH).unlink()
 
 
@@ -445,4 +455,8 @@ def _reason(error: OSError) -> str:
 
 
 def _cannot_write(final: Path, error: OSError) -> InputError:
+    if is_open_elsewhere(error):
+        return InputError(
+            f"cannot write {final}: it is open in another program or write-protected; close it, and run again"
+        )
     return InputError(f"cannot write {final}: {_reason(error)}; choose a folder that exists and can be written")

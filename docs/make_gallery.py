@@ -1,0 +1,86 @@
+"""Run every scene as its first comment says, and make the gallery of the site: `docs/gallery.md` and its pictures.
+
+python docs/make_gallery.py [SCENE ...]
+
+Without names all scenes are run; scenes with real meshes need `WARPFLAT_DATA`. `--page` writes the page alone.
+"""
+
+from __future__ import annotations
+
+import os
+import shlex
+import subprocess
+import sys
+from pathlib import Path
+
+from PIL import Image
+
+DOCS = Path(__file__).resolve().parent
+SCENES = DOCS.parent / "scenes"
+OUT = DOCS.parent / "out" / "gallery"
+PICTURE_WIDTH = 720  # as wide as a page's text
+
+
+def read_comment(scene: Path) -> tuple[list[str], list[str]]:
+    """Return the paragraphs of a scene's first comment, and the commands in it."""
+    lines = scene.read_text(encoding="utf-8").splitlines()
+    end = next(i for i, line in enumerate(lines) if not line.startswith("#"))
+    text = [line[1:] for line in lines[:end]]
+    commands = [line.split("        ")[0].strip() for line in text if line.startswith("     ")]
+    words = [" " if line.startswith("     ") else line.strip() for line in text]
+    return [each.replace("\n", " ") for each in "\n".join(words).split("\n\n") if each.strip()], commands
+
+
+def scene_files() -> list[Path]:
+    """Return the scenes that `warpflat run` takes: all but batches."""
+    return sorted(path for path in SCENES.glob("*.toml") if not path.name.startswith("batch"))
+
+
+def gallery_page() -> str:
+    """Return the page: each scene with its words, its command and its picture."""
+    blocks = [
+        "# Gallery",
+        "Every scene of `scenes/`, with the command that made its picture. Colours are strain energy density [J/m2].\n"
+        "`python docs/make_gallery.py` runs the commands and makes this page.",
+    ]
+    for path in scene_files():
+        paragraphs, commands = read_comment(path)
+        blocks += [f"## {path.stem}", *paragraphs, "```sh\n" + "\n".join(commands) + "\n```"]
+        if (DOCS / "gallery" / f"{path.stem}.webp").exists():
+            blocks.append(f"![What {path.name} makes](gallery/{path.stem}.webp)")
+    return "\n\n".join(blocks) + "\n"
+
+
+def make_picture(scene: Path) -> None:
+    """Run a scene by its command and keep its picture, made small.
+
+    Raises:
+        subprocess.CalledProcessError: the run fails.
+    """
+    command = next(each for each in read_comment(scene)[1] if " run " in f" {each} ")
+    words = shlex.split(command.removeprefix("WARPFLAT_DATA=path/to/meshes "))
+    assert words[0] == "warpflat"
+    folder = OUT / scene.stem
+    subprocess.run([sys.executable, "-m", *words, "--out", str(folder)], check=True, cwd=DOCS.parent)
+    with Image.open(folder / "picture.png") as picture:
+        height = round(picture.height * PICTURE_WIDTH / picture.width)
+        small = picture.convert("RGB").resize((PICTURE_WIDTH, height), Image.Resampling.LANCZOS)
+    (DOCS / "gallery").mkdir(exist_ok=True)
+    small.save(DOCS / "gallery" / f"{scene.stem}.webp", quality=70, method=6)
+
+
+def main(names: list[str]) -> None:
+    """Run the named scenes, or all, and write the page."""
+    if names != ["--page"]:
+        for path in scene_files():
+            if names and path.stem not in names:
+                continue
+            if "WARPFLAT_DATA" in path.read_text(encoding="utf-8") and "WARPFLAT_DATA" not in os.environ:
+                print(f"{path.name}: left out, WARPFLAT_DATA is not set", file=sys.stderr)
+                continue
+            make_picture(path)
+    (DOCS / "gallery.md").write_text(gallery_page(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(sys.argv[1:])

@@ -1,0 +1,348 @@
+"""The content of `metrics.json` as pydantic models, from which `make_reference.py` makes the published schema.
+
+Keys end in their unit; a key without one is a number, a share or a name. A later version may add keys.
+"""
+
+from __future__ import annotations
+
+from typing import Any, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+
+class Entry(BaseModel):
+    """A part of the file; keys that it does not name are kept."""
+
+    model_config = ConfigDict(extra="allow", use_attribute_docstrings=True, strict=True)
+
+
+class Distribution(Entry):
+    """Values over the cloth; percentiles by area."""
+
+    min: float
+    p05: float
+    p50: float
+    p95: float
+    max: float
+    mean: float
+
+
+class Remedy(Entry):
+    """A dart or seam that would help a piece to fit."""
+
+    cut: str
+    length_m: float
+    outside_after: float | None
+    """Share of the cloth beyond the strain limit with the cut."""
+    piece: str | None = None
+
+
+class PieceWear(Entry):
+    """How a piece is strained when worn; strains are shares, tensions N/m, pressures Pa."""
+
+    fits: bool
+    strain_limit: float
+    outside: float
+    """Share of the cloth beyond the strain limit."""
+    outside_unsewn: float | None = None
+    hollow: float
+    """Share of the cloth over hollows, where no pressure is known."""
+    where_not: list[str]
+    """Places where it does not fit, in words."""
+    strain_warp: Distribution
+    strain_weft: Distribution
+    strain_bias: Distribution
+    tension_warp: Distribution
+    tension_weft: Distribution
+    pressure: Distribution
+    stretch_warp: float | None = None
+    """The stretch of the warp that was asked for."""
+    stretch_weft: float | None = None
+    would_help: list[Remedy]
+
+
+class Stage(Entry):
+    """A stage of a piece's history, with the energies at its end."""
+
+    name: str
+    """develop, relax, contact, sew, cut:NAME and so on."""
+    model_energy_j: float
+    """What is minimised: springs and guard, or membrane and guard."""
+    guard_energy_j: float
+    strain_energy_j: float
+    """Eq. (3) of the paper."""
+    steps: int
+    work_units: float
+    """All work, in approximate implicit steps over all vertices."""
+    seconds: float
+    converged: bool
+    residual: float | None
+    """Largest force on a vertex over the mean spring force."""
+
+
+class CutSeam(Entry):
+    """A seam that a cut has made."""
+
+    kind: Literal["dart", "fish-eye", "parting"]
+    opening_m: float
+    widest_m: float | None = None
+    angle_deg: float | None = None
+    intake_m: float | None = None
+    legs_m: list[float] | None = None
+    tip_to_tip_m: float | None = None
+    left_seam_m: float
+    right_seam_m: float
+    drawn: dict[str, Any] | None = None
+    """The dart as it is drawn."""
+
+
+class Cut(Entry):
+    """A cut that was made."""
+
+    name: str
+    length_m: float
+    seams: list[CutSeam]
+
+
+class LineEnergy(Entry):
+    """Strain energy density along a line."""
+
+    length_m: float
+    mean_j_per_m2: float
+    peak_j_per_m2: float
+
+
+class EnergyMap(Entry):
+    """Where the strain energy is."""
+
+    peak: str
+    peak_j_per_m2: float
+    lines: dict[str, LineEnergy]
+    bricks: dict[str, float] | None = None
+    """Strain energy by brick [J]."""
+
+
+class FormDart(Entry):
+    """A dart of a form's piece."""
+
+    name: str
+    line: str
+    intake_m: float
+    legs_m: list[float]
+    tip_to_point_m: float | None
+
+
+class Piece(Entry):
+    """A piece of cloth."""
+
+    vertices: int
+    faces: int
+    springs: int
+    flipped_faces: int
+    length_error: float
+    """Sum of |flat - body| over the edges, by their length on the body."""
+    area_error: float
+    """Sum of |flat - body| over the faces, by their area on the body."""
+    boundary_error: float
+    strain_energy_j: float
+    model_energy_j: float
+    guard_energy_j: float
+    contact_energy_j: float
+    overlap_m2: float
+    """Area of the pattern that lies over itself."""
+    area_m2: float
+    """Flat area."""
+    converged: bool
+    fabric: str
+    model: Literal["springs", "membrane"]
+    datum: str
+    development: str
+    start: str
+    wear: PieceWear
+    stages: list[Stage]
+    cuts: list[Cut]
+    energy: EnergyMap
+    opened: dict[str, Any] | None
+    """Faces that take up far more of the pattern than of the body."""
+    notes: list[str]
+    darts: list[FormDart] | None = None
+
+
+class GarmentWear(Entry):
+    """How the whole garment fits."""
+
+    fits: bool
+    outside: float
+    where_not: list[str]
+    would_help: list[Remedy]
+
+
+class Level(Entry):
+    """A level of the body."""
+
+    height_m: float
+    girth_m: float
+    """What a tape reads."""
+    section_m: float | None = None
+    girth_over_size_m: float | None = None
+    height_over_size_m: float | None = None
+
+
+class Body(Entry):
+    """The body of a form."""
+
+    source: str
+    notes: list[str]
+    levels: dict[str, Level]
+    nearest_size: str | None = None
+
+
+class Seam(Entry):
+    """A seam of a garment."""
+
+    name: str
+    sides: list[str]
+    length_mm: list[float]
+    length_3d_mm: float
+    difference_mm: float
+    ease: float
+    """How much longer the second side is meant to be, as a share."""
+    price_j: float | None
+
+
+class Girth(Entry):
+    """A level's girths with seams and darts closed."""
+
+    body_m: float
+    form_m: float
+    pattern_m: float
+    ease_m: float
+    ease_wanted_m: float | None = None
+
+
+class Constraint(Entry):
+    """A constraint and its price."""
+
+    name: str
+    kind: str
+    price_j: float
+    amiss_mm: float
+    """What is left of it."""
+
+
+class Sewing(Entry):
+    """The relaxation of the pieces together."""
+
+    converged: bool
+    contradictory: bool
+    steps: int
+    seconds: float
+    energy_before_j: float
+    energy_after_j: float
+    price_j: float
+    largest_difference_mm: float
+
+
+class Drawing(Entry):
+    """The drawn pattern."""
+
+    fit_error_mm: float | None = None
+    seam_difference_mm: float | None = None
+    seam_difference_per_50mm_mm: float | None = None
+    seams_that_differ: list[str] | None = None
+    not_drawn: str | None = None
+    """Why no pattern was drawn."""
+
+
+class Marker(Entry):
+    """The lay plan."""
+
+    width_m: float | None = None
+    length_m: float | None = None
+    utilisation: float | None = None
+    pieces: int | None = None
+    garments: int | None = None
+    not_made: str | None = None
+
+
+class Spread(Entry):
+    """Values over the cloth."""
+
+    mean: float
+    p95: float
+    max: float
+
+
+class Pressure(Spread):
+    """Pressure where the cloth touches."""
+
+    touching: float
+    """Share of the cloth."""
+
+
+class DrapeStrain(Entry):
+    """Strain of the draped cloth."""
+
+    p5: float
+    p95: float
+    min: float
+    max: float
+    beyond_limit: float
+
+
+class Place(Entry):
+    """A place where the cloth does not lie as designed."""
+
+    kind: str
+    line: str
+    worst: float
+    gap_m: float
+    area_m2: float
+    words: str
+
+
+class Drape(Entry):
+    """The garment on its body."""
+
+    converged: bool
+    residual: float
+    steps: int
+    seconds: float
+    vertices: int
+    friction: float
+    bending_n_m: float
+    distance_m: Spread
+    misfit_m: Spread
+    bridged_m: Spread
+    deepest_m: float
+    gap_m: dict[str, float]
+    strain_limit: float
+    strain_warp: DrapeStrain
+    strain_weft: DrapeStrain
+    strain_bias: DrapeStrain
+    pressure_pa: Pressure
+    places: list[Place]
+
+
+class Metrics(Entry):
+    """The whole file."""
+
+    schema_: Literal[1] = Field(alias="schema")
+    warpflat: str
+    warp: str
+    device: str
+    pieces: dict[str, Piece]
+    wear: GarmentWear | None = None
+    mannequin: Body | None = None
+    seams: list[Seam] | None = None
+    pairs: list[list[str]] | None = None
+    girths: dict[str, Girth] | None = None
+    constraints: list[Constraint] | None = None
+    sewing: Sewing | None = None
+    sizes: dict[str, dict[str, Any]] | None = None
+    """Summaries of graded sizes."""
+    pattern: Drawing | None = None
+    marker: Marker | None = None
+    drape: Drape | None = None
+    files: dict[str, dict[str, str]] | None = None
+    """SHA-256 of every file, by run and name."""

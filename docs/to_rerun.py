@@ -1,0 +1,44 @@
+"""Log the meshes of a frames.usdc to rerun: python docs/to_rerun.py FRAMES.usdc FILM.rrd"""
+
+from __future__ import annotations
+
+import sys
+
+import numpy as np
+import rerun as rr
+from pxr import Usd, UsdGeom
+
+
+def log_film(source: str, target: str) -> int:
+    """Write the film of a USD file as a recording of rerun; return the number of frames."""
+    stage = Usd.Stage.Open(source)
+    meshes = [UsdGeom.Mesh(prim) for prim in stage.Traverse() if prim.IsA(UsdGeom.Mesh)]
+    rr.init("warpflat")
+    rr.save(target)
+    rr.log("/", rr.ViewCoordinates.RIGHT_HAND_Y_UP, static=True)
+    frames = range(int(stage.GetStartTimeCode()), int(stage.GetEndTimeCode()) + 1)
+    for frame in frames:
+        rr.set_time("frame", sequence=frame)
+        for mesh in meshes:
+            points = np.array(mesh.GetPointsAttr().Get(frame))
+            counts = np.array(mesh.GetFaceVertexCountsAttr().Get(frame))
+            corners = np.array(mesh.GetFaceVertexIndicesAttr().Get(frame))
+            colours = np.array(mesh.GetDisplayColorAttr().Get(frame))
+            # A fan of triangles for each face. Colours are one for each face, and rerun has one for each vertex.
+            first = np.repeat(np.cumsum(counts) - counts, counts - 2)
+            step = np.concatenate([np.arange(1, count - 1) for count in counts])
+            triangles = np.column_stack([corners[first], corners[first + step], corners[first + step + 1]])
+            face = np.repeat(np.arange(len(counts)), counts)
+            shade = np.ones((len(points), 3))
+            shade[corners] = colours[face] if len(colours) == len(counts) else colours[0]
+            path = UsdGeom.Xformable(mesh).ComputeLocalToWorldTransform(frame)
+            world = np.c_[points, np.ones(len(points))] @ np.array(path)
+            rr.log(
+                str(mesh.GetPath()),
+                rr.Mesh3D(vertex_positions=world[:, :3], triangle_indices=triangles, vertex_colors=shade),
+            )
+    return len(frames)
+
+
+if __name__ == "__main__":
+    print(log_film(*sys.argv[1:3]), "frames")
