@@ -19,7 +19,7 @@ from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import fill_fork, sheet_laplacian
 
-__all__ = ["Adjustment", "adjusted_vertices", "blend_forms"]
+__all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "is_tight"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
@@ -53,6 +53,11 @@ class Adjustment:
         return {
             "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "raise_cm": (-60.0, 60.0),
         }  # fmt: skip
+
+
+def is_tight(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> bool:
+    """Return whether a form is meant to be tighter than its body somewhere, as a knit is."""
+    return min(ease.values(), default=0.0) < 0.0 or any(p.scale < 1.0 or p.offset_cm < 0.0 for p in profiles.values())
 
 
 def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
