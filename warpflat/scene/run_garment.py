@@ -145,7 +145,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
-        drawing = replace(drawing, rules=replace(drawing.rules, ease=seam_ratios(form, wishes).ease))
+        seam_ratios(form, wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,
