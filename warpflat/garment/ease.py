@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.pieces import FormPiece
     from warpflat.pattern.pieces import Seam
 
-__all__ = ["CAP_PART", "SeamRatios", "SeamWish", "measure_ease", "seam_ratios"]
+__all__ = ["CAP_PART", "SeamRatios", "SeamWish", "cap_wishes", "measure_ease", "seam_ratios"]
 
 
 #: A sleeve's cap is eased in between its notches, at these shares of the armhole from underarm to underarm; below them cap
@@ -71,11 +71,11 @@ class SeamRatios:
     edge_ratios: Mapping[int, tuple[FloatArray, ...]] = field(default_factory=dict)
 
 
-def seam_ratios(form: FormResult, wishes: Sequence[SeamWish], *, fabric: Fabric | None = None) -> SeamRatios:
+def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
     """Look up wishes in a form: the ratio of lengths of each of its seams, and the edges with fullness.
 
     A pattern's seam may be several of the form's (a sleeve's cap lies at the front and at the back): all get the same
-    ratio. Sleeves' caps that no wish is about are eased as the fabric needs it, if one is given.
+    ratio.
 
     Raises:
         InputError: there is no such seam (names the nearest), it is named twice, a factor below 1, or `longer` is not
@@ -90,9 +90,6 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish], *, fabric: Fabric 
     eased: dict[str, tuple[float, float]] = {}
     edge_ratios: dict[int, tuple[FloatArray, ...]] = {}
     caps = {name: seam for name, seam in by_name.items() if _is_cap(form, seam)}
-    asked = {wish.name if wish.name in by_name else also.get(wish.name) for wish in wishes}
-    if fabric is not None and fabric.strain_limit <= _WOVEN_STRAIN:
-        wishes = [*wishes, *(SeamWish(name=n, factor=1.0 + _WOVEN_CAP, upper=True) for n in caps if n not in asked)]
     for wish in wishes:
         name = _seam_name(wish, by_name, also, ease)
         longer = _longer_side(by_name[name], wish.longer)
@@ -120,6 +117,17 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish], *, fabric: Fabric 
     )  # fmt: skip
 
 
+def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()) -> list[SeamWish]:
+    """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit."""
+    if fabric.strain_limit > _WOVEN_STRAIN:
+        return []
+    plan = plan_form(form)
+    also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
+    asked = {also.get(wish.name, wish.name) for wish in wishes}
+    caps = [seam.name for seam in plan.seams if _is_cap(form, seam) and seam.name not in asked]
+    return [SeamWish(name=name, factor=1.0 + _WOVEN_CAP, upper=True) for name in caps]
+
+
 def _is_cap(form: FormResult, seam: Seam) -> bool:
     """Return whether a seam's second side is the cap of a sleeve: one edge along an armhole, in a piece cut open under the arm."""
     if len(seam.sides[1]) != 1:
@@ -142,11 +150,13 @@ def _upper_factors(form: FormResult, number: int, side: int, factor: float) -> t
     piece = form.pieces[seam.pieces[side]]
     for run in seam.runs:
         cap, row = piece.edges[run.edges[side]], run.vertices[side]
-        place = dict(zip(cap.tolist(), _shares(piece, cap).tolist(), strict=True))
+        shares = _shares(piece, cap)
+        part = _part(shares)
+        place = dict(zip(cap.tolist(), shares.tolist(), strict=True))
         share = np.array([place[vertex] for vertex in row.tolist()])
-        factors.append(_factors(share, factor))
-        upper = row[(share >= CAP_PART[0]) & (share <= CAP_PART[1])]
-        edges.append(FullEdge(vertices=upper, factor=_upper_factor(factor), gathered=False))
+        factors.append(_factors(share, factor, part))
+        upper = row[(share >= part[0]) & (share <= part[1])]
+        edges.append(FullEdge(vertices=upper, factor=_upper_factor(factor, part), gathered=False))
     return factors, edges
 
 
@@ -186,15 +196,21 @@ def _shares(piece: FormPiece, row: IntArray) -> FloatArray:
     return np.asarray(arc / arc[-1])
 
 
-def _upper_factor(factor: float) -> float:
-    return 1.0 + (factor - 1.0) / (CAP_PART[1] - CAP_PART[0])
+def _part(shares: FloatArray) -> tuple[float, float]:
+    """Return the shares of the vertices of a cap that are nearest to `CAP_PART`: within a mesh edge the ease is even."""
+    first, last = (float(shares[np.abs(shares - share).argmin()]) for share in CAP_PART)
+    return first, last
 
 
-def _factors(share: FloatArray, factor: float) -> FloatArray:
+def _upper_factor(factor: float, part: tuple[float, float]) -> float:
+    return 1.0 + (factor - 1.0) / (part[1] - part[0])
+
+
+def _factors(share: FloatArray, factor: float, part: tuple[float, float]) -> FloatArray:
     """Return by what factor each edge of a cap is longer than the armhole's, from the shares at which its vertices lie."""
     low, high = np.minimum(share[1:], share[:-1]), np.maximum(share[1:], share[:-1])
-    within = np.maximum(np.minimum(high, CAP_PART[1]) - np.maximum(low, CAP_PART[0]), 0.0) / (high - low)
-    return np.asarray(1.0 + (_upper_factor(factor) - 1.0) * within)
+    within = np.maximum(np.minimum(high, part[1]) - np.maximum(low, part[0]), 0.0) / (high - low)
+    return np.asarray(1.0 + (_upper_factor(factor, part) - 1.0) * within)
 
 
 def measure_ease(
@@ -216,9 +232,9 @@ def measure_ease(
         (cap,) = seam.sides[1]
         row = form.pieces[cap.piece].edges[cap.edge]
         share = _shares(form.pieces[cap.piece], row)
-        lengths = np.diff(arc_lengths(positions[cap.piece][row]))
-        armhole = np.concatenate([[0.0], np.cumsum(lengths / _factors(share, 1.0 + wished.ease[seam.name]))])
-        first, last = np.interp(wished.eased[seam.name], share, armhole / armhole[-1])
+        part, lengths = _part(share), np.diff(arc_lengths(positions[cap.piece][row]))
+        armhole = np.concatenate([[0.0], np.cumsum(lengths / _factors(share, 1.0 + wished.ease[seam.name], part))])
+        first, last = np.interp(part, share, armhole / armhole[-1])
         eased[seam.name] = float(first), float(last)
         ease[seam.name] = float(lengths.sum() / armhole[-1] - 1.0)
     return ease, eased

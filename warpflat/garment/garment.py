@@ -13,7 +13,6 @@ from warpflat.core.arrays import IntArray
 from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
-from warpflat.fabric.library import as_fabric
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
 from warpflat.flattening.progress import Progress
@@ -211,8 +210,7 @@ def flatten_form(
         callback: called with the piece's name and its `Progress` after every step of its own.
         sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
             keeps its own minimum.
-        wishes: fullness and gathers of seams. A sleeve's cap without a wish is 5.5 % longer than its armhole in woven
-            cloth, eased in above the notches; a knit's is as long.
+        wishes: fullness and gathers of seams; those of sleeves' caps by cloth are :func:`warpflat.garment.ease.cap_wishes`.
         constraints: on edges and lines of pieces.
 
     Raises:
@@ -229,7 +227,7 @@ def flatten_form(
         "constraints",
         "a Straight, FixedLength, Symmetric or DartMouth",
     )
-    wished = seam_ratios(form, wishes, fabric=as_fabric(fabric))
+    wished = seam_ratios(form, wishes)
     names = list(form.pieces)
     by_name = None if callback is None else _callback_by_name(names, callback)
     flat = flatten_all(
