@@ -9,7 +9,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.polyline import turning_angles
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
-from warpflat.garment.ease import SeamWish, seam_ratios
+from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.fullness import FullEdge, give_fullness, measure_fullness
 from warpflat.garment.garment import Garment, flatten_form
@@ -130,6 +130,31 @@ def test_the_pattern_knows_the_ease_and_its_notches_meet(eased: Garment, shirt: 
     )
     assert len(back) == len(front) > 0
     np.testing.assert_allclose(front, 1.03 * np.array(back), rtol=5e-3)
+
+
+def test_a_woven_cap_is_eased_in_above_its_notches_and_a_knit_one_is_not(mannequin: Mannequin):
+    form = mannequin.form("tshirt", half=True)
+    assert not cap_wishes(form, find_fabric("interlock"))
+    made = flatten_form(mannequin, form, fabric="woven", wishes=cap_wishes(form, find_fabric("woven")))
+    assert made.sewn is not None
+    assert made.sewn.converged
+    assert max(abs(seam.difference) for seam in made.seams) < 2e-4
+    pattern, _ = pattern_of_garment({"EU 38": made}, name="shirt")
+    drafted = draft_garment(pattern)
+    armhole, cap = next(report for report in drafted.seams if report.name == "armhole left").length_mm
+    assert 15.0 < cap - armhole < 40.0
+    # From each notch to the underarm cap and armhole are equally long; the rest lies between: single in front, double at the back.
+    pieces = {piece.name: piece for piece in drafted.pieces["EU 38"]}
+    marks = {
+        name: [notch for notch in pieces[name].notches if notch.seam == "armhole left"]
+        for name in ("front", "back", "sleeve_left")
+    }
+    assert [len(notch.base) for name in ("front", "back") for notch in marks[name]] == [1, 2]
+    (double,) = (notch.length for notch in marks["sleeve_left"] if len(notch.base) == 2)
+    single = max((notch.length for notch in marks["sleeve_left"]), key=lambda at: abs(at - double))
+    back, front = marks["back"][0].length, marks["front"][0].length
+    ends = sorted((min(at, whole - at) for at, whole in ((back, armhole / 1e3), (front, armhole / 1e3))))
+    assert sorted(min(at, cap / 1e3 - at) for at in (double, single)) == pytest.approx(ends, abs=1e-3)
 
 
 def test_no_ease_is_no_fullness(shirt: FormResult):

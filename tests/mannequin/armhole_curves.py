@@ -54,15 +54,16 @@ def corner_degrees(flat: np.ndarray, armhole: np.ndarray, side: np.ndarray) -> f
 
 
 def depth_inside(form: FormResult, body: Mannequin) -> float:
-    """How far the deepest vertex of a form's pieces lies inside the body [m], trunk and arms alike."""
-    vertices, layout = body.vertices, body.layout
+    """How far the deepest vertex of a form's pieces lies inside the body [m]: trunk, arms and legs, but not the tube around both legs."""
+    vertices, faces = body.vertices, body.layout.body_faces
     used = np.unique(np.concatenate([piece.grid_vertices for piece in form.pieces.values()]))
-    moved = used[np.abs(form.vertices - vertices)[used].max(axis=1) > 1e-9]
+    off = np.abs(form.vertices - vertices)[used].max(axis=1) > 1e-9
+    moved = used[off | ~np.isin(used, faces)]
     if not len(moved):
         return 0.0
-    triangles = np.concatenate([layout.faces[:, :3], layout.faces[:, [0, 2, 3]]]).astype(np.int64)
+    triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]]).astype(np.int64)
     triangle, weights, away = Closest(vertices, triangles)(form.vertices[moved])
     place = np.einsum("nk,nkd->nd", weights, vertices[triangles[triangle]])
-    outward = np.einsum("nk,nkd->nd", weights, vertex_normals(vertices, layout.faces)[triangles[triangle]])
+    outward = np.einsum("nk,nkd->nd", weights, vertex_normals(vertices, faces)[triangles[triangle]])
     inside = ((form.vertices[moved] - place) * outward).sum(axis=1) < 0.0
     return float(np.where(inside, away, 0.0).max())

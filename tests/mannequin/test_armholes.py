@@ -1,4 +1,4 @@
-"""Armholes and sleeves as a pattern maker cuts them, on the bodies that had the worst ones; all bodies: `benchmarks/armholes.py`."""
+"""Armholes and sleeves as a pattern maker cuts them, on the bodies that had the worst ones; all bodies: `benchmarks/forms.py`."""
 
 from __future__ import annotations
 
@@ -11,7 +11,9 @@ from armhole_curves import corner_degrees, depth_inside, inflections, sharpest_t
 
 from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import flatten_form
+from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.outside import BodySurface, push_outside
 from warpflat.mannequin.scan_levels import trunk_sections
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
 from warpflat.surface.io.read import read_scan
@@ -40,7 +42,7 @@ def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
     body = _body(name)
     for form, fabric, sharpest in (("bodice", "woven", 26.0), ("tshirt", "interlock", 46.0)):
         made = body.form(form, half=True)
-        assert depth_inside(made, body) < 0.0003
+        assert depth_inside(made, body) < 0.0001
         garment = flatten_form(body, made, fabric=fabric)
         corners = []
         for key, piece in made.pieces.items():
@@ -76,3 +78,29 @@ def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
         ways = np.diff(line[body.layout.level_row["underbust"] :], axis=0)
         ways /= np.linalg.norm(ways, axis=1, keepdims=True)
         assert np.degrees(np.arccos((ways[1:] * ways[:-1]).sum(axis=1).min())) < 18.0
+
+
+@pytest.mark.parametrize(
+    ("name", "form"), [("child", "trousers"), pytest.param("scan child", "dress", marks=needs_bodies)]
+)
+def test_forms_stay_outside_the_body(name: str, form: str) -> None:
+    body = _body(name)
+    assert depth_inside(body.form(form), body) < 0.0001
+
+
+def test_a_dent_is_pushed_out_smoothly_and_negative_ease_is_not() -> None:
+    body = _body("child")
+    whole = body.form("bodice")
+    layout, used = body.layout, np.unique(np.concatenate([p.grid_vertices for p in whole.pieces.values()]))
+    row = layout.rings[layout.level_row["underbust"]]
+    dented = body.vertices.copy()
+    dented[row[2], 2] -= 0.002
+    out = push_outside(dented, layout, body.vertices, used)
+    assert np.linalg.norm(BodySurface(layout, body.vertices).ways_out(out[used]), axis=1).max() < 0.0001
+    pushed = np.linalg.norm(out - dented, axis=1)
+    assert pushed.argmax() == row[2]
+    # Neighbours follow, less and less.
+    assert (np.diff(pushed[row[2:7]]) <= 0.0).all()
+    assert pushed[row[3]] > 0.5 * pushed[row[2]]
+    tight = body.form(form_from_mapping("tight", {"like": "bodice", "ease": {"bust": -6.0, "waist": -4.0}}))
+    assert depth_inside(tight, body) > 0.003

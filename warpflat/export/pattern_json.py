@@ -34,6 +34,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             "name": seam.name,
             "kind": "seam",
             "ease": seam.ease,
+            "eased": list(seam.eased),
             "sides": [[_side(part) for part in side] for side in seam.sides],
         }
         for seam in garment.garment.seams
@@ -43,6 +44,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
             "name": f"{piece.name}.{dart.dart.name}",
             "kind": "dart",
             "ease": 0.0,
+            "eased": [0.0, 1.0],
             "sides": [
                 [_side(SeamSide(piece=piece.name, edge=dart.dart.left))],
                 [_side(SeamSide(piece=piece.name, edge=dart.dart.right, reversed=True))],

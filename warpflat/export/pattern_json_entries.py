@@ -171,6 +171,7 @@ class StitchEntry(Entry):
     name: Name
     kind: Literal["seam", "dart"]
     ease: float
+    eased: tuple[float, float] = (0.0, 1.0)
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 

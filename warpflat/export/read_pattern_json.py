@@ -90,7 +90,12 @@ def _garment(data: PatternEntry) -> DraftedGarment:
         name=data.name,
         pieces={size: tuple(piece.piece for piece in pieces) for size, pieces in drafted.items()},
         seams=[
-            Seam(name=stitch.name, sides=(_side(stitch.sides[0]), _side(stitch.sides[1])), ease=stitch.ease)
+            Seam(
+                name=stitch.name,
+                sides=(_side(stitch.sides[0]), _side(stitch.sides[1])),
+                ease=stitch.ease,
+                eased=(stitch.eased[0], stitch.eased[1]),
+            )
             for stitch in data.stitches
             if stitch.kind == "seam"
         ],

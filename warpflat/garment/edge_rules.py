@@ -24,6 +24,7 @@ class EdgeRules:
         kinds: kind by edge, as "piece.edge", or "edge" for every piece that has one of that name.
         allowances: allowance [m] by edge, named in the same way.
         ease: by seam: how much longer its second side is, as a share of the first.
+        eased: by seam: the shares of its length between which the ease lies; all along it if not named.
     """
 
     seam: float = DEFAULT_ALLOWANCE["seam"]
@@ -31,6 +32,7 @@ class EdgeRules:
     kinds: Mapping[str, str] = field(default_factory=dict)
     allowances: Mapping[str, float] = field(default_factory=dict)
     ease: Mapping[str, float] = field(default_factory=dict)
+    eased: Mapping[str, tuple[float, float]] = field(default_factory=dict)
 
     def check(self, edges: Mapping[str, Sequence[str]]) -> None:
         """Check that every name is an edge, and that every kind exists.

@@ -264,7 +264,13 @@ def _plan_seams(
             around = [chain(sewing.partners(s), turned=s.against) for s in sewing.by_edge[hub.place]]
             sides = (sum(around, ()), (SeamSide(piece=hub.piece, edge=hub.edge),))
         if of_form[-1][0] not in seams:
-            seams[of_form[-1][0]] = Seam(name=name, sides=sides, ease=rules.ease.get(name, 0.0))
+            seams[of_form[-1][0]] = Seam(
+                name=name,
+                sides=sides,
+                ease=rules.ease.get(name, 0.0),
+                eased=rules.eased.get(name, (0.0, 1.0)),
+                notches=rules.eased.get(name),
+            )
     known = [seam.name for seam in seams.values()]
     for name in rules.ease:
         if name not in known:

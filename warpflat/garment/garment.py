@@ -11,7 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import IntArray
 from warpflat.core.errors import expect, expect_callback, expect_each
-from warpflat.core.polyline import polyline_length
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.flattening.fit_report import garment_wear
 from warpflat.flattening.flatten_all import flatten_all
@@ -19,12 +19,11 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
-from warpflat.garment.ease import SeamWish, seam_ratios
+from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
-from warpflat.mannequin.form_seams import FormSeam
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece
@@ -46,7 +45,7 @@ class Garment:
         form: the pieces in space, with their edges and seams.
         pieces: the flat pieces by name, in the form's order.
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
-        ratios: for each of the form's seams the wished length of its first side over its second.
+        wished: the ease of its seams; None if it was not sewn.
     """
 
     name: str
@@ -54,7 +53,7 @@ class Garment:
     form: FormResult
     pieces: Mapping[str, Flattening]
     sewn: Sewn | None = None
-    ratios: tuple[float, ...] = ()
+    wished: SeamRatios | None = None
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -63,13 +62,9 @@ class Garment:
     @property
     def seams(self) -> tuple[SeamLengths, ...]:
         """Every seam with the lengths of its two sides."""
-        ratios = self.ratios or (1.0,) * len(self.form.seams)
         results = () if self.sewn is None else self.sewn.results
         costs = {result.name: result.cost for result in results if result.kind == "seam"}
-        return tuple(
-            self._measured(seam, ratio, costs.get(seam.name))
-            for seam, ratio in zip(self.form.seams, ratios, strict=True)
-        )
+        return tuple(self._measured(number, costs.get(seam.name)) for number, seam in enumerate(self.form.seams))
 
     @property
     def pairs(self) -> tuple[tuple[str, str], ...]:
@@ -99,8 +94,14 @@ class Garment:
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 
-    def _measured(self, seam: FormSeam, ratio: float, cost: float | None) -> SeamLengths:
+    def _measured(self, number: int, cost: float | None) -> SeamLengths:
+        seam = self.form.seams[number]
         first, second = (self.pieces[piece] for piece in seam.pieces)
+        ratio = 1.0 if self.wished is None else self.wished.ratios[number]
+        if self.wished is not None and number in self.wished.edge_ratios:
+            edges = [np.diff(arc_lengths(first.positions[run.vertices[0]])) for run in seam.runs]
+            wished = [own / each for own, each in zip(edges, self.wished.edge_ratios[number], strict=True)]
+            ratio = float(np.concatenate(edges).sum() / np.concatenate(wished).sum())
         return SeamLengths(
             name=seam.name,
             sides=(f"{seam.pieces[0]}.{seam.edges[0]}", f"{seam.pieces[1]}.{seam.edges[1]}"),
@@ -209,7 +210,7 @@ def flatten_form(
         callback: called with the piece's name and its `Progress` after every step of its own.
         sewn: relax the pieces together, both sides of every seam equally long, and folds straight; otherwise each piece
             keeps its own minimum.
-        wishes: fullness and gathers of seams.
+        wishes: fullness and gathers of seams; those of sleeves' caps by cloth are :func:`warpflat.garment.ease.cap_wishes`.
         constraints: on edges and lines of pieces.
 
     Raises:
@@ -226,7 +227,7 @@ def flatten_form(
         "constraints",
         "a Straight, FixedLength, Symmetric or DartMouth",
     )
-    ratios = seam_ratios(form, wishes)
+    wished = seam_ratios(form, wishes)
     names = list(form.pieces)
     by_name = None if callback is None else _callback_by_name(names, callback)
     flat = flatten_all(
@@ -242,20 +243,21 @@ def flatten_form(
     pieces = dict(zip(names, flat, strict=True))
     if not sewn:
         return Garment(name=form.name, mannequin=mannequin, form=form, pieces=pieces)
-    for name, edges in ratios.full.items():
+    for name, edges in wished.full.items():
         pieces[name] = give_fullness(pieces[name], edges, _plain_edges(form, name, edges), options=relax)
     pairs = [
-        SeamPair(name=seam.name, pieces=seam.pieces, vertices=run.vertices, ratio=ratio)
-        for seam, ratio in zip(form.seams, ratios.ratios, strict=True)
-        for run in seam.runs
-    ]
+        SeamPair(
+            name=seam.name, pieces=seam.pieces, vertices=run.vertices,
+            ratio=wished.edge_ratios[number][i] if number in wished.edge_ratios else wished.ratios[number],
+        )
+        for number, seam in enumerate(form.seams)
+        for i, run in enumerate(seam.runs)
+    ]  # fmt: skip
     pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
     held = (*constraints, *dart_constraints(form), *girth_constraints(form))
     result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
-    return Garment(
-        name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, ratios=ratios.ratios
-    )
+    return Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
 
 
 def _callback_by_name(

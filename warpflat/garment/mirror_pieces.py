@@ -75,13 +75,16 @@ def sew_mirror_pairs(seams: Sequence[Seam], mirror_pairs: Sequence[MirrorPair]) 
         image = _mirror_seam(own[0], seams, by_name)
         assert image is not None  # find_mirror_pairs sees to it
         other, place = image
-        ease = seam.ease
+        ease, (first, last) = seam.ease, seam.eased
         if next(number for number in (0, 1) if own[0] in sides[number]) != place:
+            first, last = (seam.reach(share, 1.0) / (1.0 + ease) for share in (first, last))
             sides, ease = (sides[1], sides[0]), 1.0 / (1.0 + ease) - 1.0
         there = next(side for side in other.sides[place] if _key(side) == _key(own[0]))
         if there.reversed != own[0].reversed:
             sides = (_reversed_side(sides[0]), _reversed_side(sides[1]))
-        sewn.append(replace(seam, sides=sides, ease=ease))
+            first, last = 1.0 - last, 1.0 - first
+        notches = None if seam.notches is None else (first, last)
+        sewn.append(replace(seam, sides=sides, ease=ease, eased=(first, last), notches=notches))
     return tuple(sewn)
 
 

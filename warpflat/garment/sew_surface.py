@@ -96,7 +96,7 @@ def sew_surface(
                 polyline_length(after.positions[pair.vertices[0]]),
                 polyline_length(after.positions[pair.vertices[1]]),
             ),
-            ease=1.0 / pair.ratio - 1.0,
+            ease=1.0 / float(pair.ratio) - 1.0,
             cost=result.cost,
         )
         for pair, title, result in zip(pairs, titles, sewn.results, strict=False)

@@ -65,14 +65,14 @@ class SeamPair:
         name: the seam's; pairs of one name are one seam, as where darts interrupt it.
         pieces: names of the two pieces; the same twice where one is sewn to itself.
         vertices: of the two pieces, in corresponding order.
-        ratio: wished length of the first side over the second.
+        ratio: wished length of the first side over the second, for all edges or for each.
         joints: #J by 2, places in the two chains that are sewn to each other; None where all are, one to one.
     """
 
     name: str
     pieces: tuple[str, str]
     vertices: tuple[IntArray, IntArray]
-    ratio: float = 1.0
+    ratio: float | FloatArray = 1.0
     joints: IntArray | None = None
 
 

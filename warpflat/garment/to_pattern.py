@@ -16,6 +16,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
+from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.form_plan import (
     EdgePlan,
@@ -67,6 +68,11 @@ def pattern_of_garment(
             crosses itself, or the sizes differ in their edges.
     """
     rules = rules or EdgeRules()
+    sample = next(iter(garments.values()))
+    if sample.wished is not None:
+        positions = {piece: each.positions for piece, each in sample.pieces.items()}
+        ease, eased = measure_ease(sample.form, sample.wished, positions)
+        rules = replace(rules, ease={**ease, **rules.ease, **{seam: ease[seam] for seam in eased}}, eased=eased)
     garments = _laid_upon_each_other(garments)
     plans = {size: plan_form(garment.form, rules) for size, garment in garments.items()}
     form, plan = next(iter(garments.values())).form, next(iter(plans.values()))

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import itertools
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from warpflat.mannequin.normals import vertex_normals
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import fill_fork, sheet_laplacian
 
-__all__ = ["Adjustment", "adjusted_vertices", "blend_forms"]
+__all__ = ["Adjustment", "adjusted_vertices", "blend_forms", "is_tight"]
 
 # A fold's mitre runs off to nothing where trunk and arm lie against each other: at most twice as far as either side moves.
 _LEAST_MITRE = 0.5
@@ -53,6 +54,11 @@ class Adjustment:
         return {
             "weight": (0.0, 1.0), "scale": (0.5, 6.0), "offset_cm": (-5.0, 100.0), "raise_cm": (-60.0, 60.0),
         }  # fmt: skip
+
+
+def is_tight(profiles: Mapping[str, Adjustment], ease: Mapping[str, float]) -> bool:
+    """Return whether a form is meant to be tighter than its body somewhere, as a knit is."""
+    return min(ease.values(), default=0.0) < 0.0 or any(p.scale < 1.0 or p.offset_cm < 0.0 for p in profiles.values())
 
 
 def blend_forms(first: FloatArray, second: FloatArray, weight: float) -> FloatArray:
@@ -164,15 +170,7 @@ def _move_rings(
     from scipy.interpolate import PchipInterpolator
 
     rows = np.array([layout.level_row[level] for level in RING_LEVELS])
-    moves = []
-    for level in RING_LEVELS:
-        row = body[layout.rings[layout.level_row[level]]]
-        if level not in changes:
-            moves.append(np.zeros_like(row))
-            continue
-        change, ease_cm = changes[level]
-        other = body[layout.rings[layout.level_row[change.like]]] if change.like else None
-        moves.append(_changed(row, other, change, ease_cm) - row)
+    moves = _level_moves(body, layout.rings, layout.level_row, RING_LEVELS, changes, _ring_move)
     heights = [
         float(body[layout.rings[r[0]], 1].mean() + m[:, 1].mean()) for r, m in zip(rows[:, None], moves, strict=True)
     ]
@@ -186,13 +184,50 @@ def _move_rings(
     out[ids] += PchipInterpolator(y[rows], np.stack(moves), axis=0)(y[between])
     # The rings around both legs cut their corners: it is the legs that push a skirt out.
     solid = np.unique(np.concatenate([ids.ravel(), *(grid.ravel() for grid in layout.legs.values())]))
+    row_of = {level: layout.level_row[level] for level in RING_LEVELS}
     for pair in ruled:
         if not set(pair) & {*ARM_LEVELS, *LEG_LEVELS}:
-            _rule(out, layout.rings, {level: layout.level_row[level] for level in RING_LEVELS}, pair, body[solid])
+            _rule(out, layout.rings, row_of, pair, body[solid])
 
 
-def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], solid: FloatArray) -> None:
-    """Hang the rows between two levels of trunk or leg straight, over points of the body that stand out between them."""
+def _level_moves(
+    body: FloatArray,
+    grid: IntArray,
+    row_of: Mapping[str, int],
+    levels: Sequence[str],
+    changes: Mapping[str, tuple[Adjustment, float]],
+    move: Callable[[FloatArray, FloatArray | None, Adjustment, float], FloatArray],
+) -> list[FloatArray]:
+    """Return the displacement of the row of each level, each #P by 3; `move` gives that of a row that changes."""
+    found = []
+    for level in levels:
+        row = body[grid[row_of[level]]]
+        if level not in changes:
+            found.append(np.zeros_like(row))
+            continue
+        change, ease_cm = changes[level]
+        other = body[grid[row_of[change.like]]] if change.like else None
+        found.append(move(row, other, change, ease_cm))
+    return found
+
+
+def _ring_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float) -> FloatArray:
+    return _changed(row, other, change, ease_cm) - row
+
+
+def _rule(
+    out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str], solid: FloatArray | None
+) -> None:
+    """Lay the rows between two levels straight.
+
+    Args:
+        out: #V by 3 [m], changed in place.
+        grid: rows of trunk, arm or leg.
+        row_of: its levels.
+        pair: of levels.
+        solid: #P by 3, the body, over which cloth hangs where it stands out between the levels; None for an arm, whose
+            rows share the way evenly whatever its direction.
+    """
     for level in pair:
         if level not in row_of:
             raise InputError(f"form: ruled: level {level!r} is unknown: {nearest(level, row_of)}")
@@ -201,9 +236,11 @@ def _rule(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tupl
         raise InputError(f"form: ruled: {pair[0]} and {pair[1]} are the same level")
     ids = grid[a : b + 1]
     first, last = out[ids[0]], out[ids[-1]]
-    share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
+    share = np.linspace(0.0, 1.0, len(ids))
+    if solid is not None:
+        share = (out[ids, 1].mean(axis=1) - first[:, 1].mean()) / (last[:, 1].mean() - first[:, 1].mean())
     straight = first + share[:, None, None] * (last - first)
-    if len(ids) > 2:
+    if len(ids) > 2 and solid is not None:
         low, high = sorted((first[:, 1].mean(), last[:, 1].mean()))
         between = solid[(solid[:, 1] > low) & (solid[:, 1] < high)]
         ends = np.concatenate([first, last])
@@ -318,29 +355,13 @@ def _move_arms(
     from scipy.interpolate import PchipInterpolator
 
     for grid in layout.arms.values():
-        moves = [out[grid[0]] - body[grid[0]]]
-        for level in ARM_LEVELS[1:]:
-            row = body[grid[layout.arm_row[level]]]
-            if level not in changes:
-                moves.append(np.zeros_like(row))
-                continue
-            change, ease_cm = changes[level]
-            other = body[grid[layout.arm_row[change.like]]] if change.like else None
-            moves.append(_arm_move(row, other, change, ease_cm))
+        own = _level_moves(body, grid, layout.arm_row, ARM_LEVELS[1:], changes, _arm_move)
+        moves = [out[grid[0]] - body[grid[0]], *own]
         rows = np.array([layout.arm_row[level] for level in ARM_LEVELS])
         out[grid[1:]] = (body[grid] + PchipInterpolator(rows, np.stack(moves), axis=0)(np.arange(len(grid))))[1:]
         for pair in ruled:
             if pair[0] in ARM_LEVELS or pair[1] in ARM_LEVELS:
-                _rule_arm(out, grid, layout.arm_row, pair)
-
-
-def _rule_arm(out: FloatArray, grid: IntArray, row_of: Mapping[str, int], pair: tuple[str, str]) -> None:
-    for level in pair:
-        if level not in row_of:
-            raise InputError(f"form: ruled: arm level {level!r} is unknown: {nearest(level, row_of)}")
-    a, b = sorted((row_of[pair[0]], row_of[pair[1]]))
-    share = (np.arange(a, b + 1) - a) / max(b - a, 1)
-    out[grid[a : b + 1]] = out[grid[a]] + share[:, None, None] * (out[grid[b]] - out[grid[a]])
+                _rule(out, grid, layout.arm_row, pair, None)
 
 
 def _move_legs(
@@ -364,32 +385,20 @@ def _move_legs(
     moved[:, 1] += depth / depth.max() * change.raise_cm / 100.0
     out[curve[1:-1]] = moved[1:-1]
     for side, grid in layout.legs.items():
-        moves = []
-        for level in LEG_LEVELS[1:]:
-            row = body[grid[layout.leg_row[level]]]
-            if level not in changes:
-                moves.append(np.zeros_like(row))
-                continue
-            own, ease_cm = changes[level]
-            other = body[grid[layout.leg_row[own.like]]] if own.like else None
-            moves.append(_leg_move(row, other, own, ease_cm, 1.0 if side == "left" else -1.0))
+        move_leg = functools.partial(_leg_move, sign=1.0 if side == "left" else -1.0)
+        moves = _level_moves(body, grid, layout.leg_row, LEG_LEVELS[1:], changes, move_leg)
         rows = np.array([layout.leg_row[level] for level in LEG_LEVELS[1:]])
         between = np.arange(rows[0], rows[-1] + 1)
         out[grid[between]] = body[grid[between]] + PchipInterpolator(rows, np.stack(moves), axis=0)(between)
     move = out - body
     fill_fork(move, layout)
+    row_of = {level: layout.leg_row[level] for level in LEG_LEVELS[1:]}
     for grid in layout.legs.values():
         fork = grid[1 : layout.leg_row["leg_thigh"]]
         out[fork] = body[fork] + move[fork]
         for pair in ruled:
             if set(pair) & set(LEG_LEVELS):
-                _rule(
-                    out,
-                    grid,
-                    {level: layout.leg_row[level] for level in LEG_LEVELS[1:]},
-                    pair,
-                    body[grid[1:].reshape(-1)],
-                )
+                _rule(out, grid, row_of, pair, body[grid[1:].reshape(-1)])
 
 
 def _leg_move(row: FloatArray, other: FloatArray | None, change: Adjustment, ease_cm: float, sign: float) -> FloatArray:

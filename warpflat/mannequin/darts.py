@@ -145,8 +145,7 @@ def standard_darts(layout: Layout, bricks: Mapping[str, Sequence[str]]) -> tuple
 
 
 def _cloth(layout: Layout, bricks: Sequence[str]) -> _Cloth:
-    index = {b: i for i, b in enumerate(layout.bricks)}
-    corners = layout.faces[np.isin(layout.face_brick, [index[b] for b in bricks])]
+    corners = layout.faces[layout.faces_of(bricks)]
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     edges, counts = np.unique(ends, axis=0, return_counts=True)
     inner = edges[counts == 2].tolist()

@@ -9,16 +9,19 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
+
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_file_name, same_file
 from warpflat.core.text import quote_value
-from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms
+from warpflat.mannequin.blend import Adjustment, adjusted_vertices, blend_forms, is_tight
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import FormDart, PlacedDart, place_darts
 from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.form_seams import FormSeam, find_seams
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.outside import push_outside
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
 
 if TYPE_CHECKING:
@@ -214,11 +217,12 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     Raises:
         InputError: for an unknown brick, line or level, or a piece that is not one disk.
     """
-    vertices = _surface(layout, vertices, form)
+    bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
+    faces = layout.faces_of([brick for own in bricks.values() for brick in own])
+    vertices = _surface(layout, vertices, form, np.unique(layout.faces[faces]))
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:
-        bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
         placed = place_darts(layout, vertices, bricks, form.darts)
     rows: dict[str, dict[str, IntArray]] = {}
     for dart in placed:
@@ -239,12 +243,15 @@ def _keeps_ease(form: Form, level: str) -> bool:
     return not any(low < at < high for low, high in pairs)
 
 
-def _surface(layout: Layout, body: FloatArray, form: Form) -> FloatArray:
+def _surface(layout: Layout, body: FloatArray, form: Form, used: IntArray) -> FloatArray:
+    """Return the body's vertices moved to the form; the vertices `used` lie outside the body, unless the form is tighter than it."""
     vertices = adjusted_vertices(layout, body, form.profiles, form.ruled, form.ease)
-    if form.blend is None:
-        return vertices
-    other, weight = form.blend
-    return blend_forms(vertices, _surface(layout, body, other), weight)
+    tight = is_tight(form.profiles, form.ease)
+    if form.blend is not None:
+        other, weight = form.blend
+        vertices = blend_forms(vertices, _surface(layout, body, other, used), weight)
+        tight = tight or is_tight(other.profiles, other.ease)
+    return vertices if tight else push_outside(vertices, layout, body, used)
 
 
 def _adjustment(values: Mapping[str, Any], where: str) -> Adjustment:

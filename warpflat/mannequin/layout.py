@@ -13,7 +13,7 @@ body to centre back, close to a loop, from which each leg runs down to its ankle
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -145,6 +145,10 @@ class Layout(Strips):
     def body_faces(self) -> IntArray:
         """The faces of the body itself, without the tube around both legs."""
         return self.faces[self.on_body]
+
+    def faces_of(self, bricks: Collection[str]) -> NDArray[np.int64]:
+        """Return the indices of the faces of some bricks."""
+        return np.flatnonzero(np.isin(self.face_brick, [i for i, name in enumerate(self.bricks) if name in bricks]))
 
     @property
     def body_lines(self) -> dict[str, IntArray]:

@@ -95,16 +95,11 @@ def cut_pieces(
     return {name: _piece(layout, vertices, name, *cut, darts.get(name, {}), half) for name, cut in cuts.items()}
 
 
-def _faces_of(layout: Layout, bricks: Sequence[str]) -> NDArray[np.int64]:
-    index = {b: i for i, b in enumerate(layout.bricks)}
-    return np.flatnonzero(np.isin(layout.face_brick, [index[b] for b in bricks]))
-
-
 def _check_opened(layout: Layout, name: str, bricks: Sequence[str], opened: Sequence[str]) -> None:
     """See that a piece lies on both sides of the lines along which it is to be open."""
     if not opened:
         return
-    corners = layout.faces[_faces_of(layout, bricks)]
+    corners = layout.faces[layout.faces_of(bricks)]
     ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
     edges, counts = np.unique(ends, axis=0, return_counts=True)
     inside = {(a, b) for a, b in edges[counts == 2].tolist()}
@@ -129,7 +124,7 @@ def _piece(
     folded = half and lies_on_both(bricks)
     if folded:
         bricks = [b for b in bricks if is_side(b, "left")]
-    rows = _faces_of(layout, bricks)
+    rows = layout.faces_of(bricks)
     own = set(np.unique(layout.faces[rows]).tolist())
     darts = {dart: row for dart, row in darts.items() if own.issuperset(row.tolist())}
     slits = {(min(a, b), max(a, b)) for row in darts.values() for a, b in itertools.pairwise(row.tolist())}

@@ -97,14 +97,19 @@ def join_equations(equations: Sequence[ConstraintEquations]) -> ConstraintEquati
     )
 
 
-def seam_equations(first: IntArray, second: IntArray, ratio: float = 1.0) -> ConstraintEquations:
+def seam_equations(first: IntArray, second: IntArray, ratio: float | FloatArray = 1.0) -> ConstraintEquations:
     """Return equations that make each edge of the first row `ratio` times as long as its partner of the second."""
     ends = np.column_stack([first[:-1], first[1:], second[:-1], second[1:]])
     return _equations(ends, LENGTHS, ratio=ratio, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
 def stretch_equations(
-    first: IntArray, second: IntArray, joints: IntArray, body: FloatArray, positions: FloatArray, ratio: float = 1.0
+    first: IntArray,
+    second: IntArray,
+    joints: IntArray,
+    body: FloatArray,
+    positions: FloatArray,
+    ratio: float | FloatArray = 1.0,
 ) -> ConstraintEquations:
     """Return equations that sew two rows by their lengths on the body, the first `ratio` times as long as the second.
 

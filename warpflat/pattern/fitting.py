@@ -17,6 +17,8 @@ __all__ = ["TOLERANCES", "EdgeKey", "fit_edges", "is_wavy", "smooth_line"]
 #: Names of a piece and of its edge.
 EdgeKey = tuple[str, str]
 Sides = tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
+#: By how much a seam's second side is longer, as a share, and the shares of the first between which it is.
+Eased = tuple[float, tuple[float, float]]
 
 #: How far [m] curves may lie from a border: the first is for clean meshes, the others are tried on ragged ones.
 TOLERANCES = (TOLERANCE, 3e-4, 1e-3, 2e-3)
@@ -163,21 +165,21 @@ def _near_curves(
 
 
 def _both(
-    seam: tuple[Sides, float], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
-) -> tuple[FloatArray, FloatArray, float]:
+    seam: tuple[Sides, Eased], lines: Mapping[EdgeKey, FloatArray], curves: Mapping[EdgeKey, tuple[Curve, float]]
+) -> tuple[FloatArray, FloatArray, Eased]:
     """Return the lengths along both sides of a seam at their points, and the second side's ease."""
     (first, second), ease = seam
     return _lengths_at_points(first, lines, curves), _lengths_at_points(second, lines, curves), ease
 
 
-def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Sides, float]]:
+def _sewn(pieces: Sequence[Piece], seams: Sequence[Seam]) -> Iterator[tuple[Sides, Eased]]:
     """Yield both sides of every seam and dart, in one direction, and the second side's ease."""
     for seam in seams:
-        yield seam.sides, seam.ease
+        yield seam.sides, (seam.ease, seam.eased)
     for piece in pieces:
         for dart in piece.darts:
             left, right = SeamSide(piece=piece.name, edge=dart.left), SeamSide(piece=piece.name, edge=dart.right)
-            yield ((left,), (SeamSide(piece=right.piece, edge=right.edge, reversed=True),)), 0.0
+            yield ((left,), (SeamSide(piece=right.piece, edge=right.edge, reversed=True),)), (0.0, (0.0, 1.0))
 
 
 def _lengths_at_points(
@@ -192,10 +194,10 @@ def _lengths_at_points(
     return np.concatenate(rows)
 
 
-def _difference(first: FloatArray, second: FloatArray, ease: float) -> float:
+def _difference(first: FloatArray, second: FloatArray, ease: Eased) -> float:
     """Return by how much the sides of a seam differ, over what is allowed."""
-    near = worst_difference(first, second, ease)
-    whole = abs(second[-1] - first[-1] * (1 + ease)) / SEAM_TOLERANCE
+    near = worst_difference(first, second, *ease)
+    whole = abs(second[-1] - first[-1] * (1 + ease[0])) / SEAM_TOLERANCE
     return float(whole if near is None else max(whole, near / LOCAL_TOLERANCE))
 
 

@@ -11,7 +11,7 @@ from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.pattern.allowance import CutOutline
 from warpflat.pattern.drafted import DraftedPiece, Notch, SeamReport
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
-from warpflat.pattern.seam_difference import worst_difference
+from warpflat.pattern.seam_difference import eased_length, worst_difference
 from warpflat.pattern.sides import Wedge
 
 __all__ = ["cut_darts", "dart_notches", "seam_notches", "seam_reports"]
@@ -45,7 +45,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
                 length_mm=(first * 1000, second * 1000),
                 ease=seam.ease,
                 difference_mm=(second - first * (1 + seam.ease)) * 1000,
-                local_mm=_local_difference(lines[0], lines[1], seam.ease),
+                local_mm=_local_difference(lines[0], lines[1], seam),
             )
         )
     return reports
@@ -55,7 +55,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     """Return the notches of seams by piece.
 
     Both sides of a seam get a notch at the same fraction of the seam's length, which is the same length wherever the
-    sides are equal; ease is spread evenly. Fractions are not symmetric about the middle, so that a side sewn on the
+    sides are equal; ease is spread evenly, or between two notches. Fractions are not symmetric about the middle, so that a side sewn on the
     wrong way round shows. Where one side has a joint (a shoulder seam at a sleeve's cap, a dart in a side seam) the
     other side gets a single notch for it. Notches on a back are double, unless it is sewn to a front.
 
@@ -72,7 +72,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
                 notches.setdefault(piece, []).append(notch)
         for line, other in ((first, second), (second, first)):
             for joint in line.joints[1:-1] / line.length:
-                length = float(joint * other.length)
+                length = _opposite(seam, float(joint), forward=line is first) * other.length
                 if np.abs(other.joints - length).min() > CLEAR and not other.mirrored(length):
                     single = other.notch(seam.name, length, double=False)
                     if single is not None:
@@ -83,7 +83,9 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
 def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list[tuple[str, Notch]]:
     """Return the notches of both sides at a fraction of the seam's length, by piece; none if they cannot be cut."""
     for share in SHARES_FROM_START:
-        places = [(line, share * fraction * line.length) for line in lines]
+        at = share * fraction
+        opposite = seam.reach(at, 1.0) / (1.0 + seam.ease)
+        places = [(line, part * line.length) for line, part in zip(lines, (at, opposite), strict=False)]
         names = [line.piece_name(length).lower() for line, length in places]
         back = any("back" in name for name in names) and not any("front" in name for name in names)
         double = back if seam.double is None else seam.double
@@ -93,6 +95,13 @@ def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list
         if len(matched) == len(found):
             return matched
     return []
+
+
+def _opposite(seam: Seam, share: float, *, forward: bool) -> float:
+    """Return the share of one side's length opposite to that of the other's; `forward`: from the first side to the second."""
+    shares = np.linspace(0.0, 1.0, 1001)
+    reached = eased_length(shares, 1.0, seam.ease, seam.eased) / (1.0 + seam.ease)
+    return float(np.interp(share, *((shares, reached) if forward else (reached, shares))))
 
 
 def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
@@ -160,11 +169,11 @@ def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_li
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
 
 
-def _local_difference(one: _SeamLine, other: _SeamLine, ease: float) -> float | None:
+def _local_difference(one: _SeamLine, other: _SeamLine, seam: Seam) -> float | None:
     """Return the worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
     if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
         return None
-    worst = worst_difference(one.places, other.places, ease)
+    worst = worst_difference(one.places, other.places, seam.ease, seam.eased)
     return None if worst is None else 1000 * worst
 
 

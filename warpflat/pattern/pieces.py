@@ -15,6 +15,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
+from warpflat.pattern.seam_difference import eased_length
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
@@ -243,13 +244,15 @@ class Seam:
         name: unique in the garment.
         sides: exactly two, each a sequence of `SeamSide`.
         ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
-        notches: fractions of the seam's length in (0, 1) that get notches on both sides; None places them by length.
+        eased: shares of the first side's length between which the second is longer; all along it if not given.
+        notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
         double: double notches; None means double where a back takes part and no front does.
     """
 
     name: str
     sides: tuple[tuple[SeamSide, ...], tuple[SeamSide, ...]]
     ease: float = 0.0
+    eased: tuple[float, float] = (0.0, 1.0)
     notches: tuple[float, ...] | None = None
     double: bool | None = None
 
@@ -260,8 +263,16 @@ class Seam:
             )
         if not -0.5 < self.ease < 5:
             raise InputError(f"seam {self.name!r}: ease {self.ease!r}; it must lie between -0.5 and 5 (0.03 is 3 %)")
+        if not 0.0 <= self.eased[0] < self.eased[1] <= 1.0:
+            raise InputError(
+                f"seam {self.name!r}: eased between {self.eased}; two shares from 0 to 1, rising, are needed"
+            )
         if any(not 0 < f < 1 for f in self.notches or ()):
             raise InputError(f"seam {self.name!r}: notches {self.notches}; each must be a fraction between 0 and 1")
+
+    def reach(self, length: float, whole: float) -> float:
+        """Return the length along the second side opposite to `length` along the first, of `whole`."""
+        return float(eased_length(length, whole, self.ease, self.eased))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
 
-__all__ = ["LOCAL_TOLERANCE", "SEAM_TOLERANCE", "STRETCH", "worst_difference"]
+__all__ = ["LOCAL_TOLERANCE", "SEAM_TOLERANCE", "STRETCH", "eased_length", "worst_difference"]
 
 
 #: Sides of a seam may differ by this [m], and by this over any stretch of `STRETCH` [m].
@@ -14,12 +16,28 @@ SEAM_TOLERANCE, LOCAL_TOLERANCE = 5e-4, 2e-4
 STRETCH = 0.050
 
 
-def worst_difference(first: FloatArray, second: FloatArray, ease: float) -> float | None:
+def eased_length(length: Any, whole: float, ease: float, eased: tuple[float, float] = (0.0, 1.0)) -> Any:
+    """Return the lengths [m] along the second side of a seam opposite to those along the first.
+
+    Args:
+        length: along the first side [m], a number or an array.
+        whole: length of the first side [m].
+        ease: by how much the second side is longer, as a share.
+        eased: shares of the first side between which it is longer.
+    """
+    first, last = eased
+    return length + ease * whole * np.clip((length / whole - first) / (last - first), 0.0, 1.0)
+
+
+def worst_difference(
+    first: FloatArray, second: FloatArray, ease: float, eased: tuple[float, float] = (0.0, 1.0)
+) -> float | None:
     """Return the largest difference [m] of two sides of a seam over any `STRETCH`; None if they share no vertices.
 
     Args:
         first, second: #P, the lengths [m] at which both sides have their common vertices.
         ease: by how much the second side is meant to be longer, as a share.
+        eased: shares of the first side between which it is longer.
     """
     if len(first) != len(second):
         return None
@@ -28,4 +46,5 @@ def worst_difference(first: FloatArray, second: FloatArray, ease: float) -> floa
     starts = starts if len(starts) else first[:1]
     ends = np.minimum(starts + STRETCH, first[-1])
     stretch = np.interp(ends, first, second) - np.interp(starts, first, second)
-    return float(np.abs(stretch - (ends - starts) * (1 + ease)).max())
+    meant = eased_length(ends, first[-1], ease, eased) - eased_length(starts, first[-1], ease, eased)
+    return float(np.abs(stretch - meant).max())

@@ -10,9 +10,10 @@ from typing import Any
 from warpflat.core.activity import report_activity
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
+from warpflat.fabric.library import as_fabric
 from warpflat.flattening.progress import Progress
 from warpflat.garment.constraints import Constraint
-from warpflat.garment.ease import SeamWish, seam_ratios
+from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
@@ -145,7 +146,8 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
     with errors_named(f"{scene.where}: seams"):
-        drawing = replace(drawing, rules=replace(drawing.rules, ease=seam_ratios(form, wishes).ease))
+        seam_ratios(form, wishes)
+        wishes += cap_wishes(form, as_fabric(fabric), wishes)
     with errors_named(scene.where):
         constraints = scene_constraints(
             settings.constraints,

@@ -156,8 +156,9 @@ class SeamTable(Table):
     A form's seam is named as in the pattern, and one side is longer than the other. On a [surface] `sides` names the two lines,
     as "left" or "piece.left"; they may be equally long.
 
-    `fullness` is eased in near the seam (0.02 is 2 %), `gather` is the ratio of the lengths, and its fullness falls on through the
-    piece. `longer` names the piece, "piece.edge" or line that is longer; the seam's second side if not given.
+    `fullness` is eased in near the seam (0.02 is 2 %), at a sleeve's cap above its notches only. `gather` is the ratio of the
+    lengths, and its fullness falls on through the piece. `longer` names the piece, "piece.edge" or line that is longer; the
+    seam's second side if not given.
     """
 
     name: str = Field(min_length=1)

@@ -21,6 +21,7 @@ def scene_wishes(tables: Sequence[SeamTable]) -> list[SeamWish]:
             factor=table.gather if table.gather is not None else 1.0 + (table.fullness or 0.0),
             gathered=table.gather is not None,
             longer=table.longer,
+            upper=True,
         )
         for table in tables
     ]

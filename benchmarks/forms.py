@@ -1,8 +1,9 @@
-"""Measure armholes and sleeves of forms on many bodies: `WARPFLAT_DATA=DIR python benchmarks/armholes.py [--picture FILE]`.
+"""Measure forms on ten sizes and four scans: `WARPFLAT_DATA=DIR python benchmarks/forms.py [BODY ...] [--picture FILE]`.
 
-One line per body and piece: cells over, sharpest turn of armhole or cap [degrees per cm] and its changes of bend, the
-angle between armhole and side seam; of sleeves the underarm seam and what the cap has more than the armhole [mm]; how deep
-forms lie inside the body [mm].
+One line per body and form: cells over, largest difference of a seam's sides [mm], whether it converged, how deep the form
+lies inside the body [mm]; of armholes (front, back) and cap the sharpest turn [degrees per cm], of armholes the angle to the
+side seam, of sleeves the underarm seam, the cap's height and what it has more than the armhole [mm]. `OVER`: a figure out of
+bounds. `--inside` measures the depth of every form and flattens none.
 """
 
 from __future__ import annotations
@@ -15,7 +16,9 @@ from pathlib import Path
 
 import numpy as np
 
+from warpflat.core.polyline import polyline_length
 from warpflat.garment.garment import Garment, flatten_form
+from warpflat.mannequin.forms import form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.scan_pose import ScanOptions
 from warpflat.surface.io.read import read_scan
@@ -30,7 +33,10 @@ MEASURED = {
     "child 128": {"bust": 0.64, "waist": 0.58, "hip": 0.68, "stature": 1.28, "shoulder": 0.095},
 }
 SIZES = ("EU 36", "EU 38", "EU 40", "EU 42", "EU 44", "men 46", "men 50", "men 56")
-FORMS = {"basic_block": "woven", "tshirt": "interlock"}
+#: Forms by the cloth that they are cut from.
+FORMS = {"bodice": "woven", "basic_block": "woven", "tshirt": "interlock", "dress": "woven", "trousers": "woven"}
+#: Bounds: a seam's difference and the depth inside the body [mm], sharpest turn of an armhole and of a cap [degrees per cm].
+SEAM, INSIDE, ARMHOLE, CAP = 0.2, 0.1, 46.0, 20.0
 
 
 def bodies(resolution: float, names: list[str]) -> Iterator[tuple[str, Mannequin]]:
@@ -48,29 +54,35 @@ def bodies(resolution: float, names: list[str]) -> Iterator[tuple[str, Mannequin
             yield name, Mannequin.from_scan(points, faces, options=ScanOptions(mirror=True), resolution_mm=resolution)
 
 
-def measure(garment: Garment) -> Iterator[str]:
-    """Yield a line for every piece with an armhole on the left."""
-    length = {
-        seam: np.sum([s.lengths for s in garment.seams if s.name.startswith(seam)], axis=0)
-        for seam in ("armhole left",)
-    }
+def measure(garment: Garment, inside: float) -> str:
+    """Return a garment's line of the table; `inside` [m]."""
+    over = sum(piece.flipped_faces for piece in garment.pieces.values())
+    sewn = garment.sewn
+    seam = 1000.0 * max((abs(seam.difference) for seam in garment.seams), default=0.0)
+    converged = sewn is not None and sewn.converged
+    bad = over > 0 or seam > SEAM or not converged or 1000.0 * inside > INSIDE
+    line = f"over {over} seams {seam:.3f} {'converged' if converged else 'NOT CONVERGED'} inside {1000 * inside:.2f}"
     for name, piece in garment.form.pieces.items():
-        edges, flat = piece.edges, garment.pieces[name]
+        edges, flat = piece.edges, garment.pieces[name].positions
         if "armhole left" not in edges:
             continue
-        curve = flat.positions[edges["armhole left"]]
-        line = f"  {garment.name:11} {name:13} over {flat.flipped_faces} turn {sharpest_turn(curve):5.1f} bends {inflections(curve)}"
+        curve = flat[edges["armhole left"]]
+        turn = sharpest_turn(curve)
+        line += f" | {name} turn {turn:.0f} bends {inflections(curve)}"
         if "underarm left" in edges:
-            seams = [
-                np.linalg.norm(np.diff(flat.positions[edges[k]], axis=0), axis=1).sum()
-                for k in ("underarm left", "underarm left 2")
-            ]
-            cap = 1000.0 * float(np.ptp(length["armhole left"]))
-            height = 1000.0 * cap_height(curve)
-            line += f" underarm {1000 * seams[0]:4.0f} {1000 * seams[1]:4.0f} cap over armhole {cap:+5.1f} height {height:4.0f}"
-        else:
-            line += f" corner {corner_degrees(flat.positions, edges['armhole left'], edges['side left']):5.1f}"
-        yield line
+            under = 1000.0 * polyline_length(flat[edges["underarm left"]])
+            line += f" underarm {under:.0f} height {1000 * cap_height(curve):.0f} cap {cap_ease_mm(garment):+.1f}"
+            bad |= turn > CAP
+        elif "side left" in edges:
+            line += f" corner {corner_degrees(flat, edges['armhole left'], edges['side left']):.0f}"
+            bad |= turn > ARMHOLE
+    return line + ("  OVER" if bad else "")
+
+
+def cap_ease_mm(garment: Garment) -> float:
+    """Return what the left cap has more than its armhole [mm]."""
+    armhole, cap = np.sum([seam.lengths for seam in garment.seams if seam.name.startswith("armhole left")], axis=0)
+    return 1000.0 * float(cap - armhole)
 
 
 def cap_height(cap: np.ndarray) -> float:
@@ -84,25 +96,28 @@ def main() -> None:
     """Print the table; draw the pieces if asked."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("bodies", nargs="*", help="names of bodies; all of them without")
-    parser.add_argument("--resolution", type=float, default=10.0, help="quad edge [mm]")
+    parser.add_argument("--resolution", type=float, default=15.0, help="quad edge [mm]")
     parser.add_argument("--forms", nargs="+", default=list(FORMS))
+    parser.add_argument("--inside", action="store_true", help="the depth inside the body only, of every shipped form")
     parser.add_argument("--picture", type=Path, help="draw all outlines and grids into this file")
     given = parser.parse_args()
     drawn: list[tuple[str, Garment]] = []
     for name, body in bodies(given.resolution, given.bodies):
-        print(name)
+        if given.inside:
+            depths = {form: 1000.0 * depth_inside(body.form(form), body) for form in form_names()}
+            print(f"{name:11}", *(f"{form} {depth:.2f}" for form, depth in depths.items()), flush=True)
+            continue
         for form in given.forms:
             made = body.form(form)
-            inside = 1000.0 * depth_inside(made, body)
             garment = flatten_form(body, made, fabric=FORMS.get(form, "woven"))
             drawn.append((name, garment))
-            print(*measure(garment), f"  {form:11} inside the body {inside:.1f} mm", sep="\n", flush=True)
+            print(f"{name:11} {form:11} {measure(garment, depth_inside(made, body))}", flush=True)
     if given.picture:
         draw(drawn, given.picture)
 
 
 def draw(garments: list[tuple[str, Garment]], path: Path) -> None:
-    """Draw the pieces with armholes, one garment a row, right sleeves left out."""
+    """Draw the pieces, one garment a row, those of the right side left out."""
     import matplotlib
 
     matplotlib.use("Agg")
@@ -110,7 +125,7 @@ def draw(garments: list[tuple[str, Garment]], path: Path) -> None:
 
     rows = []
     for body, garment in garments:
-        chosen = [name for name, piece in garment.form.pieces.items() if "armhole left" in piece.edges]
+        chosen = [name for name in garment.pieces if not name.endswith("right")]
         rows.append((body, garment, chosen))
     wide = max(len(chosen) for *_, chosen in rows)
     figure, axes = plt.subplots(len(rows), wide, figsize=(5 * wide, 5 * len(rows)), squeeze=False)
