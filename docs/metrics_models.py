@@ -61,6 +61,15 @@ class PieceWear(Entry):
     would_help: list[Remedy]
 
 
+class Left(Entry):
+    """What a relaxation has left, by estimate."""
+
+    energy_share: float
+    """Of the model energy, still to be released."""
+    outline_mm: float
+    """How far the outline can still move."""
+
+
 class Stage(Entry):
     """A stage of a piece's history, with the energies at its end."""
 
@@ -78,6 +87,8 @@ class Stage(Entry):
     converged: bool
     residual: float | None
     """Largest force on a vertex over the mean spring force."""
+    left: Left | None
+    """Of L-BFGS; null for other schemes."""
 
 
 class CutSeam(Entry):
