@@ -27,16 +27,19 @@ from limb_tapes import arm_tapes, foot_tape, head_tape, leg_tapes
 HEIGHT, GIRTH = 4.0, 9.0
 
 
-def by_tape(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:
-    """Return height above the floor and girth [m] of every independent tape that can be laid, by the package's names."""
+def by_tape(points: np.ndarray, faces: np.ndarray, tips: dict[str, int]) -> dict[str, tuple[float, float]]:
+    """Return height above the floor and girth [m] of every independent tape that can be laid, by the package's names.
+
+    `tips` are the vertices at the fingertips.
+    """
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
     on_floor = points - [0.0, points[:, 1].min(), 0.0]
     mesh = trimesh.Trimesh(on_floor, triangles, process=False)
     found: dict[str, tuple[float, float]] = {"head": head_tape(mesh), **tapes(on_floor, faces)}
-    armpit, crotch = armpit_and_crotch(mesh)
+    armpit, crotch, _ = armpit_and_crotch(mesh)
     for side in ("left", "right"):
         left = side == "left"
-        found |= {f"{name} {side}": t for name, t in arm_tapes(mesh, armpit, left).items()}
+        found |= {f"{name} {side}": t for name, t in arm_tapes(mesh, armpit, tips[side]).items()}
         found |= {f"{name} {side}": t for name, t in leg_tapes(mesh, crotch, left).items()}
         found[f"foot {side}"] = foot_tape(mesh, left)
     return found
@@ -48,13 +51,18 @@ def report(name: str, copy: str, worst_only: bool) -> tuple[int, int]:
     points, faces = np.asarray(vertices, float), np.asarray(faces)
     points = points - [0.0, points[:, 1].min(), 0.0]
     triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    points, faces = copy_of_body(points, faces, copy, *armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False)))
+    tips = {"left": int(np.argmax(points[:, 0])), "right": int(np.argmin(points[:, 0]))}
+    whole = faces
+    points, faces = copy_of_body(
+        points, faces, copy, *armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    )
     try:
         body = Mannequin.from_scan(as_given(points, copy), faces, resolution_mm=20.0)
     except InputError as error:
         print(f"{name}, {copy}: refused: {error}")
         return 1, 1
-    independent = by_tape(points, faces)
+    # Holes do not change a body: the tapes lie on the whole one.
+    independent = by_tape(points, whole, tips)
     off = 0
     print(f"{name}, {copy}")
     for tape, (height, girth) in independent.items():
@@ -71,7 +79,9 @@ def report(name: str, copy: str, worst_only: bool) -> tuple[int, int]:
             print(f"  {tape:14} {1000 * height:6.0f} {1000 * girth:6.0f}  {misses[0]:+7.1f} {misses[1]:+7.1f}{words}")
     together = body.measures.get("hip, legs together")
     if together is not None:
-        print(f"  hip, legs together: {1000 * together.girth:.0f} mm, as scanned {1000 * body.measures['hip'].girth:.0f} mm")
+        print(
+            f"  hip, legs together: {1000 * together.girth:.0f} mm, as scanned {1000 * body.measures['hip'].girth:.0f} mm"
+        )
     return len(independent), off
 
 

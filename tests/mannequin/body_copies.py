@@ -11,7 +11,9 @@ _POSES = {"arms down": (-22.0, 0.0), "arms level": (45.0, 0.0), "arms up": (65.0
 COPIES = ("as it is", "turned 90", "turned 180", "in cm", "in mm", "noise", "holes", *_POSES)
 
 
-def copy_of_body(points: np.ndarray, faces: np.ndarray, name: str, armpit: float, crotch: float) -> tuple[np.ndarray, np.ndarray]:
+def copy_of_body(
+    points: np.ndarray, faces: np.ndarray, name: str, armpit: float, crotch: float, half: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return a copy of a body, vertices [m] and faces; turned and scaled by `as_given`.
 
     Args:
@@ -19,6 +21,7 @@ def copy_of_body(points: np.ndarray, faces: np.ndarray, name: str, armpit: float
         faces: #F by 4, -1 in the last column for a triangle.
         name: one of COPIES.
         armpit, crotch: heights [m].
+        half: half the trunk's width at the armpits [m].
     """
     random = np.random.default_rng(7)
     if name == "noise":
@@ -30,7 +33,7 @@ def copy_of_body(points: np.ndarray, faces: np.ndarray, name: str, armpit: float
         near = (np.linalg.norm(middle[:, None] - centres, axis=2) < 0.025).any(axis=1)
         return points, faces[~near]
     if name in _POSES:
-        return _posed(points, faces, *np.radians(_POSES[name]), armpit, crotch), faces
+        return _posed(points, faces, *np.radians(_POSES[name]), armpit, crotch, half), faces
     return points, faces
 
 
@@ -47,7 +50,9 @@ def _smoothstep(t: np.ndarray) -> np.ndarray:
     return t * t * (3.0 - 2.0 * t)
 
 
-def _posed(points: np.ndarray, faces: np.ndarray, arm: float, leg: float, armpit: float, crotch: float) -> np.ndarray:
+def _posed(
+    points: np.ndarray, faces: np.ndarray, arm: float, leg: float, armpit: float, crotch: float, half: float
+) -> np.ndarray:
     """Return vertices after arms turn about the shoulders and legs about the hip joints, outwards in the frontal plane.
 
     Weights grow from 0 to 1 with the distance beyond a joint: 60 mm along an arm, from hip joint to crotch on a leg.
@@ -57,9 +62,7 @@ def _posed(points: np.ndarray, faces: np.ndarray, arm: float, leg: float, armpit
     ends = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])
     for side in (1.0, -1.0):
         x = side * points[:, 0]
-        level = (np.abs(points[:, 1] - armpit) < 0.02) & (x > 0.05)
-        start = float(np.median(x[level & (x < np.quantile(x[level], 0.5))]))
-        beyond = x - start - np.tan(np.radians(9.0)) * (points[:, 1] - armpit)
+        beyond = x - half - np.tan(np.radians(9.0)) * np.maximum(points[:, 1] - armpit, 0.0)
         outer = ends[(beyond[ends] > 0.0).all(axis=1)]
         label = connected_components(coo_matrix((np.ones(len(outer)), outer.T), (len(points),) * 2), directed=False)[1]
         limb = label == label[int(np.argmax(x))]

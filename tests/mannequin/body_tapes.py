@@ -31,15 +31,18 @@ def tape(mesh: trimesh.Trimesh, height: float) -> float:
     return float(ConvexHull(_trunk(mesh, height)).area)
 
 
-def armpit_and_crotch(mesh: trimesh.Trimesh) -> tuple[float, float]:
-    """Return the heights [m] of armpits and crotch: the last level section before the trunk's width leaps, the first of one part."""
+def armpit_and_crotch(mesh: trimesh.Trimesh) -> tuple[float, float, float]:
+    """Return heights of armpits and crotch, half the width there [m].
+
+    The armpit is the last level section before the trunk's width leaps, the crotch the first of one part.
+    """
     floor, stature = mesh.vertices[:, 1].min(), np.ptp(mesh.vertices[:, 1])
     y = floor + np.arange(0.40, 0.58, 0.002 / stature) * stature
     crotch = next(at for at in y if (p := section_parts(mesh, at)[0])[:, 0].min() < 0 < p[:, 0].max())
     y = floor + np.arange(0.69, 0.84, 0.002 / stature) * stature
     width = [np.ptp(_trunk(mesh, at)[:, 0]) for at in y]
     armpit = next(i for i in range(len(y) - 1) if width[i + 1] > 1.2 * width[i])
-    return float(y[armpit] - floor), float(crotch - floor)
+    return float(y[armpit] - floor), float(crotch - floor), 0.5 * float(width[armpit])
 
 
 def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:

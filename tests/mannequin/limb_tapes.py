@@ -64,8 +64,12 @@ def foot_tape(mesh: trimesh.Trimesh, left: bool) -> tuple[float, float]:
     along = low @ axis
     best = (0.0, 0.0, 0.0)
     for at in along.min() + np.arange(0.6, 0.8, 0.01) * np.ptp(along):
-        flat = np.concatenate([p for p in _parts(mesh, at * axis, axis) if p[:, 1].max() < 0.16 and side * p[:, 0].mean() > 0])
-        best = max(best, (float(np.ptp(flat @ np.cross(axis, [0, 1, 0]))), float(flat[:, 1].max() / 2), _girth(flat, axis)))
+        flat = np.concatenate(
+            [p for p in _parts(mesh, at * axis, axis) if p[:, 1].max() < 0.16 and side * p[:, 0].mean() > 0]
+        )
+        best = max(
+            best, (float(np.ptp(flat @ np.cross(axis, [0, 1, 0]))), float(flat[:, 1].max() / 2), _girth(flat, axis))
+        )
     return best[1:]
 
 
@@ -79,18 +83,17 @@ def head_tape(mesh: trimesh.Trimesh) -> tuple[float, float]:
     return float(y[int(np.argmax(girth))]), float(max(girth))
 
 
-def arm_tapes(mesh: trimesh.Trimesh, armpit: float, left: bool) -> dict[str, tuple[float, float]]:
-    """Return tapes around one arm: biceps and wrist across their bones, elbow across both, hand across its palm.
+def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple[float, float]]:
+    """Return tapes around the arm of the fingertip `tip`: biceps and wrist across their bones, elbow across both, hand across its palm.
 
     The arm's middle line runs through the middles of bands of equal way over the surface from the fingertip. Its bones are
     the two straight lines that fit it best. Biceps: fullest from 0.02 of the stature beyond the armpit. Wrist: narrowest.
     Hand: halfway from where the thumb parts from the palm to where the fingers part.
     """
-    side = 1.0 if left else -1.0
+    side = float(np.sign(mesh.vertices[tip, 0]))
     v, stature = mesh.vertices, mesh.vertices[:, 1].max()
     edges = mesh.edges_unique
     graph = coo_matrix((mesh.edges_unique_length, edges.T), (len(v),) * 2)
-    tip = int(np.argmax(side * v[:, 0] * (v[:, 1] > 0.3 * stature)))
     way = dijkstra(graph, directed=False, indices=tip)
     bands = np.arange(0.16, 0.34, 0.004) * stature
     middle = []
@@ -118,7 +121,9 @@ def arm_tapes(mesh: trimesh.Trimesh, armpit: float, left: bool) -> dict[str, tup
                  if p[:, 0].min() < 0 < p[:, 0].max()), key=lambda p: np.ptp(p[:, 0]))  # fmt: skip
     pit = trunk[int(np.argmax(side * trunk[:, 0]))]
     reach = float((pit - elbow) @ upper) - 0.02 * stature
-    found["biceps"] = max((_tape(mesh, elbow + s * upper, upper) for s in np.arange(0.02, reach, 0.002)), key=lambda t: t[1])
+    found["biceps"] = max(
+        (_tape(mesh, elbow + s * upper, upper) for s in np.arange(0.02, reach, 0.002)), key=lambda t: t[1]
+    )
     forearm = [elbow - s * lower for s in np.arange(0.07, 0.16, 0.0012) * stature]
     girths = [_tape(mesh, at, lower)[1] for at in forearm]
     wrist = forearm[int(np.argmin(girths))]
@@ -128,7 +133,9 @@ def arm_tapes(mesh: trimesh.Trimesh, armpit: float, left: bool) -> dict[str, tup
     axis = palm / length
     split = []
     for s in np.arange(0.3, 0.62, 0.01) * length:
-        parts = [p for p in _parts(mesh, wrist + s * axis, axis) if np.linalg.norm(p.mean(axis=0) - wrist - s * axis) < 0.1]
+        parts = [
+            p for p in _parts(mesh, wrist + s * axis, axis) if np.linalg.norm(p.mean(axis=0) - wrist - s * axis) < 0.1
+        ]
         if len(parts) == 2:
             palm = max(parts, key=lambda p: _girth(p, axis))
             split.append((float(0.5 * (palm[:, 1].min() + palm[:, 1].max())), _girth(palm, axis)))

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
@@ -60,6 +61,7 @@ class Mannequin:
         notes: completions and repairs, one sentence each.
         sections: for a scan, the length [m] of the body's own section at each level.
         measures: for a scan, tapes around the scan itself, by name.
+        scan: for a scan, its vertices (#P by 3 [m]) upright with the legs moved together, and its triangles; else None.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
 
@@ -69,6 +71,7 @@ class Mannequin:
     notes: tuple[str, ...] = ()
     sections: Mapping[str, float] = field(default_factory=dict)
     measures: Mapping[str, ScanMeasure] = field(default_factory=dict)
+    scan: tuple[FloatArray, NDArray[np.int64]] | None = None
     sources: tuple[Path, ...] = ()
 
     @classmethod
@@ -117,7 +120,7 @@ class Mannequin:
         found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
         return cls(
             layout=layout, vertices=build_vertices(layout, found.blueprint), source=found.source, notes=found.notes,
-            sections=found.sections, measures=found.measures,
+            sections=found.sections, measures=found.measures, scan=found.scan,
         )  # fmt: skip
 
     @classmethod

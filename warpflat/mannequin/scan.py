@@ -41,6 +41,7 @@ class ScanFound:
         notes: findings from the shape, one sentence each.
         sections: length [m] of the body's own section, hollows followed, at every closed level.
         measures: tapes around the scan itself, by name.
+        scan: vertices (#P by 3 [m]) upright with the legs moved together, and triangles.
     """
 
     blueprint: Blueprint
@@ -48,6 +49,7 @@ class ScanFound:
     notes: tuple[str, ...]
     sections: Mapping[str, float]
     measures: Mapping[str, ScanMeasure]
+    scan: tuple[FloatArray, NDArray[np.int64]]
 
 
 def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
@@ -87,6 +89,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         notes=(*notes, *more, *apart, *guess_note(measures)),
         sections=sections,
         measures=measures,
+        scan=(legs.move(points) if apart else points, triangles),
     )
 
 

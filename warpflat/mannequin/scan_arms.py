@@ -153,18 +153,21 @@ def _centre_line(
     """Return the middles of an arm's sections at `shares` of the way to the hand and the unit directions of their line."""
     from scipy.ndimage import gaussian_filter1d
 
-    axis = to_hand / np.linalg.norm(to_hand)
     line = start + shares[:, None] * to_hand
-    for i, at in enumerate(line.copy()):
-        try:
-            cut = section(at, axis)
-        except InputError:
-            continue
-        line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
-    way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
-    # Next to the armhole sections still hold a part of the shoulder.
-    way[:4] = way[4]
-    return line, way / np.linalg.norm(way, axis=1, keepdims=True)
+    way = np.broadcast_to(to_hand / np.linalg.norm(to_hand), line.shape)
+    # First across the way to the hand, then across the line that was found.
+    for _ in range(2):
+        for i, (at, across) in enumerate(zip(line.copy(), way, strict=True)):
+            try:
+                cut = section(at, across)
+            except InputError:
+                continue
+            line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
+        way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
+        # Next to the armhole sections still hold a part of the shoulder.
+        way[:4] = way[4]
+        way /= np.linalg.norm(way, axis=1, keepdims=True)
+    return line, way
 
 
 def _beyond(

@@ -106,10 +106,22 @@ def leg_sections(slicer: Slicer, y: float, stature: float) -> list[Slice]:
 
     Two parts of similar size are the legs; what hangs between them at the crotch is smaller and belongs to neither.
     """
-    near = [p for p in slicer.cut(_UP, y) if abs(_middle_x(p)) < _REACH * stature and len(p.points) > 8]
+    parts = _whole([p for p in slicer.cut(_UP, y) if abs(_middle_x(p)) < _REACH * stature])
+    near = [p for p in parts if len(p.points) > 8]
     near.sort(key=_box, reverse=True)
     legs = y < _ABOVE_CROTCH * stature and len(near) > 1 and _box(near[1]) > 0.5 * _box(near[0])
     return near[:2] if legs else near[:1]
+
+
+def _whole(parts: list[Slice]) -> list[Slice]:
+    """Return parts of a section, those on one side of the midplane joined that holes in the mesh have parted."""
+    joined = [p for p in parts if p.closed]
+    for side in (-1.0, 0.0, 1.0):
+        torn = [p for p in parts if not p.closed and (0.0 if _straddles(p) else np.sign(_middle_x(p))) == side]
+        if torn:
+            points = np.concatenate([p.points for p in torn])
+            joined.append(Slice(points=points, length=sum(p.length for p in torn), closed=False))
+    return joined
 
 
 def _middle_x(part: Slice) -> float:

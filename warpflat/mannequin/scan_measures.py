@@ -67,7 +67,8 @@ def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict
     girth = smooth(np.array([convex_girth(h) for h in legs.hulls[side]]), 1.5)
     back = smooth(np.array([h[:, 1].min() for h in legs.hulls[side]]), 2.0)
 
-    def extreme(name: str, values: FloatArray, low: float, high: float, share: float) -> float:
+    def extreme(name: str, values: FloatArray, between: tuple[float, float], share: float) -> float:
+        low, high = between
         rows = np.flatnonzero((y > low) & (y < high))
         row = int(rows[np.argmin(values[rows])]) if len(rows) > 2 else -1
         if len(rows) > 2 and rows[0] < row < rows[-1]:
@@ -75,11 +76,11 @@ def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict
         guesses[name] = f"the legs do not show it; it is {share:g} of the crotch's height"
         return share * legs.crotch
 
-    calf = extreme("calf", -girth, *(s * legs.crotch for s in _CALF), 0.44)
-    ankle = extreme("ankle", girth, *(s * legs.crotch for s in _ANKLE), 0.16)
+    calf = extreme("calf", -girth, (_CALF[0] * legs.crotch, _CALF[1] * legs.crotch), 0.44)
+    ankle = extreme("ankle", girth, (_ANKLE[0] * legs.crotch, _ANKLE[1] * legs.crotch), 0.16)
     low, high = calf, 0.86 * legs.crotch
     line = np.interp(y, [low, high], np.interp([low, high], y, back))
-    knee = extreme("knee", line - back, low + 0.25 * (high - low), high - 0.25 * (high - low), 0.63)
+    knee = extreme("knee", line - back, (low + 0.25 * (high - low), high - 0.25 * (high - low)), 0.63)
     return {"knee": knee, "calf": calf, "ankle": ankle}, guesses
 
 
@@ -118,11 +119,15 @@ def body_measures(
     for side, arm in arms.items():
         found |= {f"{name} {side}": measure for name, measure in _arm(arm, trunk, side).items()}
         hand = _hand(slicer, arm)
-        if hand is not None:
+        # A stump of a hand, cut off by a hole, is none.
+        if hand is not None and hand.girth > _POSSIBLE["hand"][0] * trunk.stature:
             found[f"hand {side}"] = hand
     crotch = _crotch(slicer, trunk)
     for side in ("left", "right"):
-        found |= {f"{name} {side}": measure for name, measure in _leg(legs, side, crotch - _BELOW_CROTCH * trunk.stature).items()}
+        found |= {
+            f"{name} {side}": measure
+            for name, measure in _leg(legs, side, crotch - _BELOW_CROTCH * trunk.stature).items()
+        }
         foot = _foot(slicer, trunk.stature, side)
         if foot is not None:
             found[f"foot {side}"] = foot
