@@ -31,12 +31,18 @@ def tape(mesh: trimesh.Trimesh, height: float) -> float:
     return float(ConvexHull(_trunk(mesh, height)).area)
 
 
-def leg_tape(points: np.ndarray, faces: np.ndarray, height: float, left: bool) -> float:
-    """Return the girth [m] of a level tape around one leg at a height above the floor [m]; arguments as `tapes`."""
-    triangles = np.concatenate([faces[:, :3], faces[faces[:, 3] >= 0][:, [0, 2, 3]]])
-    mesh = trimesh.Trimesh(points, triangles, process=False)
-    legs = section_parts(mesh, points[:, 1].min() + height)[:2]
-    return float(ConvexHull(max(legs, key=lambda p: p[:, 0].mean() * (1.0 if left else -1.0))).area)
+def armpit_and_crotch(mesh: trimesh.Trimesh) -> tuple[float, float, float]:
+    """Return heights of armpits and crotch, half the width there [m].
+
+    The armpit is the last level section before the trunk's width leaps, the crotch the first of one part.
+    """
+    floor, stature = mesh.vertices[:, 1].min(), np.ptp(mesh.vertices[:, 1])
+    y = floor + np.arange(0.40, 0.58, 0.002 / stature) * stature
+    crotch = next(at for at in y if (p := section_parts(mesh, at)[0])[:, 0].min() < 0 < p[:, 0].max())
+    y = floor + np.arange(0.69, 0.84, 0.002 / stature) * stature
+    width = [np.ptp(_trunk(mesh, at)[:, 0]) for at in y]
+    armpit = next(i for i in range(len(y) - 1) if width[i + 1] > 1.2 * width[i])
+    return float(y[armpit] - floor), float(crotch - floor), 0.5 * float(width[armpit])
 
 
 def tapes(points: np.ndarray, faces: np.ndarray) -> dict[str, tuple[float, float]]:

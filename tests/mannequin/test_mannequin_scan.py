@@ -9,10 +9,12 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from body_tapes import tapes
+from body_copies import copy_of_body
+from body_tapes import armpit_and_crotch, tapes
+from limb_tapes import arm_tapes, head_tape, leg_tapes
 from self_intersections import self_intersections
 
-from warpflat.cli.tables import mannequin_table
+from warpflat.cli.tables import mannequin_table, measures_table
 from warpflat.core.errors import InputError
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.mannequin import Mannequin
@@ -310,6 +312,45 @@ def test_scan_with_a_vertex_far_off_names_it(tmp_path: Path) -> None:
         mannequin_from_scan_file(file, options=ScanOptions(), resolution_mm=20.0)
     with pytest.raises(InputError, match=r"none\.obj: does not exist"):
         mannequin_from_scan_file(tmp_path / "none.obj", options=ScanOptions(), resolution_mm=20.0)
+
+
+@needs_bodies
+def test_limbs_agree_with_tapes_laid_without_the_package_with_arms_level() -> None:
+    import trimesh
+
+    points, faces = scan("female")
+    points = points - [0.0, points[:, 1].min(), 0.0]
+    triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]])
+    places = armpit_and_crotch(trimesh.Trimesh(points, triangles, process=False))
+    posed, _ = copy_of_body(points, faces, "arms level", *places)
+    mesh = trimesh.Trimesh(posed, triangles, process=False)
+    armpit, crotch, _ = armpit_and_crotch(mesh)
+    body = on_scan(posed, faces)
+    arms = arm_tapes(mesh, armpit, int(np.argmax(points[:, 0])))
+    for name, (height, girth) in {"head": head_tape(mesh), **leg_tapes(mesh, crotch, True), **arms}.items():
+        ours = body.measures[name if name == "head" else f"{name} left"]
+        assert ours.guess is None
+        assert abs(ours.height - height) < 0.004, name
+        assert abs(ours.girth - girth) < 0.009, name
+    # With the legs turned plumb the hip is a little less around, and metrics tell both.
+    told = body.metrics()["measures"]
+    assert 0.004 < told["hip"]["girth_m"] - told["hip, legs together"]["girth_m"] < 0.015
+    assert told["head"]["girth_over_size_m"] < 0.0
+    text = measures_table(body.measures, body.measure_difference())
+    assert max(len(row) for row in text.splitlines()) <= 100
+    assert next(row for row in text.splitlines() if row.startswith("calf left")).endswith("cm")
+
+
+@needs_bodies
+def test_distances_to_the_scan_are_small_and_drawn(tmp_path: Path) -> None:
+    from warpflat.mannequin.distance_picture import signed_distances, write_distance_picture
+
+    body = _plain("female")
+    far = np.abs(signed_distances(body))
+    assert np.median(far) < 0.001
+    assert np.quantile(far, 0.9) < 0.010
+    write_distance_picture(body, tmp_path / "distances.png")
+    assert (tmp_path / "distances.png").stat().st_size > 20_000
 
 
 @needs_bodies

@@ -53,7 +53,7 @@ def mannequin(
       warpflat mannequin --size "EU 38" --measure waist=0.76
       warpflat mannequin --scan body.obj --units m --out body
     """
-    from warpflat.cli.tables import mannequin_table
+    from warpflat.cli.tables import mannequin_table, measures_table
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.toml_file import check_table
     from warpflat.mannequin.output import MANNEQUIN_FILES, write_mannequin
@@ -80,6 +80,8 @@ def mannequin(
         for note in body.notes:
             click.echo(f"warpflat: note: {note}", err=True)
         click.echo(mannequin_table(body.source, body.levels(), body.size_difference()))
+        if (over := body.measure_difference()) is not None:
+            click.echo(f"\n{measures_table(body.measures, over)}\n")
         click.echo(f"{folder}: {', '.join(file.name for file in files.values())}")
     return DONE
 

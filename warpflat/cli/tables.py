@@ -13,6 +13,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger
     from warpflat.mannequin.mannequin import Level
     from warpflat.mannequin.nearest_size import SizeDifference
+    from warpflat.mannequin.scan_measures import ScanMeasure
 
 __all__ = [
     "drape_lines",
@@ -21,6 +22,7 @@ __all__ = [
     "fabric_table",
     "ledger_table",
     "mannequin_table",
+    "measures_table",
     "run_summary",
     "warnings_of",
 ]
@@ -194,20 +196,38 @@ def mannequin_table(source: str, levels: Mapping[str, Level], difference: SizeDi
     if difference is None:
         rows = [(name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm") for name, level in levels.items()]
         return f"{source}\n{_aligned(('level', 'height', 'girth'), rows)}"
-
-    def more(of: Mapping[str, float], name: str) -> str:
-        return f"{100 * of[name]:+.1f} cm" if name in of else ""
-
     head = ("level", "height", "girth", "section", "height over size", "girth over size")
     full = [
         (
             name, f"{100 * level.height:.1f} cm", f"{100 * level.girth:.1f} cm",
             "" if level.section is None else f"{100 * level.section:.1f} cm",
-            more(difference.heights, name), more(difference.girths, name),
+            _more(difference.heights, name), _more(difference.girths, name),
         )
         for name, level in levels.items()
     ]  # fmt: skip
     return f"{source}; nearest size {difference.size}\n{_aligned(head, full)}"
+
+
+def measures_table(measures: Mapping[str, ScanMeasure], difference: SizeDifference) -> str:
+    """Return the tapes around a scan as text, from the head down.
+
+    Args:
+        measures: by name.
+        difference: of the measures to the nearest size.
+    """
+    head = ("tape around the scan", "height", "girth", "height over size", "girth over size", "place")
+    rows = [
+        (
+            name, f"{100 * m.height:.1f} cm", f"{100 * m.girth:.1f} cm", _more(difference.heights, name),
+            _more(difference.girths, name), "" if m.guess is None else "guess",
+        )
+        for name, m in measures.items()
+    ]  # fmt: skip
+    return _aligned(head, rows)
+
+
+def _more(of: Mapping[str, float], name: str) -> str:
+    return f"{100 * of[name]:+.1f} cm" if name in of else ""
 
 
 def ledger_table(ledger: Ledger) -> str:

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
@@ -16,13 +17,14 @@ from warpflat.mannequin.bricks import Brick, brick, select_bricks
 from warpflat.mannequin.builder import build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
-from warpflat.mannequin.nearest_size import SizeDifference, nearest_size
+from warpflat.mannequin.nearest_size import SizeDifference, difference_to_size, nearest_size
 from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.table_body import blueprint_from_measurements, replace_chest
 from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import Form, FormResult
+    from warpflat.mannequin.scan_measures import ScanMeasure
     from warpflat.mannequin.scan_pose import ScanOptions
 
 __all__ = ["Level", "Mannequin"]
@@ -58,6 +60,8 @@ class Mannequin:
         source: where the body comes from: a size, measurements, or a scan.
         notes: completions and repairs, one sentence each.
         sections: for a scan, the length [m] of the body's own section at each level.
+        measures: for a scan, tapes around the scan itself, by name.
+        scan: for a scan, its vertices (#P by 3 [m]) upright with the legs moved together, and its triangles; else None.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
 
@@ -66,6 +70,8 @@ class Mannequin:
     source: str
     notes: tuple[str, ...] = ()
     sections: Mapping[str, float] = field(default_factory=dict)
+    measures: Mapping[str, ScanMeasure] = field(default_factory=dict)
+    scan: tuple[FloatArray, NDArray[np.int64]] | None = None
     sources: tuple[Path, ...] = ()
 
     @classmethod
@@ -114,7 +120,7 @@ class Mannequin:
         found = blueprint_from_scan(np.asarray(vertices, float), np.asarray(faces), options or ScanOptions())
         return cls(
             layout=layout, vertices=build_vertices(layout, found.blueprint), source=found.source, notes=found.notes,
-            sections=found.sections,
+            sections=found.sections, measures=found.measures, scan=found.scan,
         )  # fmt: skip
 
     @classmethod
@@ -227,7 +233,8 @@ class Mannequin:
         """Return the mannequin's entry of ``metrics.json``: its source, and each level's height and girth [m].
 
         ``girth_m`` is what a tape reads, which bridges hollows. A scan's trunk adds ``section_m``, the length of its section
-        there, hollows followed; a scan also adds ``nearest_size`` and, by level, what it has more than that size.
+        there, hollows followed; a scan also adds ``nearest_size`` and, by level, what it has more than that size, and
+        ``measures``, the tapes around the scan itself.
         """
         found = self.levels()
         levels: dict[str, dict[str, float]] = {}
@@ -243,6 +250,21 @@ class Mannequin:
                 levels[name]["girth_over_size_m"] = girth
             for name, height in difference.heights.items():
                 levels[name]["height_over_size_m"] = height
+        over = self.measure_difference()
+        if over is not None:
+            told["measures"] = self._measures_told(over)
+        return told
+
+    def _measures_told(self, over: SizeDifference) -> dict[str, dict[str, float | str]]:
+        told: dict[str, dict[str, float | str]] = {}
+        for name, measure in self.measures.items():
+            told[name] = {"height_m": measure.height, "girth_m": measure.girth}
+            if measure.guess is not None:
+                told[name]["guess"] = measure.guess
+            if name in over.heights:
+                told[name]["height_over_size_m"] = over.heights[name]
+            if name in over.girths:
+                told[name]["girth_over_size_m"] = over.girths[name]
         return told
 
     def size_difference(self) -> SizeDifference | None:
@@ -251,3 +273,11 @@ class Mannequin:
             return None
         levels = self.levels()
         return nearest_size({k: v.height for k, v in levels.items()}, {k: v.girth for k, v in levels.items()})
+
+    def measure_difference(self) -> SizeDifference | None:
+        """Return what the tapes around a scan have more than the nearest size; None without a scan."""
+        nearest = self.size_difference()
+        if nearest is None:
+            return None
+        heights = {name: measure.height for name, measure in self.measures.items()}
+        return difference_to_size(nearest.size, heights, {name: m.girth for name, m in self.measures.items()})

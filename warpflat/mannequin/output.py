@@ -1,4 +1,4 @@
-"""The files of a mannequin: ``mannequin.usdc``, ``mannequin.obj``, ``metrics.json`` and ``picture.png``."""
+"""The files of a mannequin: ``mannequin.usdc``, ``mannequin.obj``, ``metrics.json``, ``picture.png``, ``distances.png``."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from warpflat._version import __version__
 from warpflat.core.atomic_files import atomic_path, output_folder
 from warpflat.core.manifest import require_own_metrics, write_metrics
+from warpflat.mannequin.distance_picture import write_distance_picture
 from warpflat.mannequin.picture import write_mannequin_picture
 from warpflat.mannequin.usd import write_mannequin_usd
 
@@ -21,6 +22,7 @@ MANNEQUIN_FILES = {
     "usd": "mannequin.usdc",
     "obj": "mannequin.obj",
     "picture": "picture.png",
+    "distances": "distances.png",
     "metrics": "metrics.json",
 }
 
@@ -33,7 +35,8 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
         folder: made if missing.
 
     Returns:
-        the files by kind: ``usd``, ``obj``, ``picture``, ``metrics``; metrics come last, so where they are the rest is.
+        the files by kind: ``usd``, ``obj``, ``picture``, of a scan ``distances``, ``metrics``; metrics come last, so where they
+            are the rest is.
 
     Raises:
         InputError: if a file cannot be written, or the body was read from one that would be replaced.
@@ -41,9 +44,13 @@ def write_mannequin(mannequin: Mannequin, folder: str | os.PathLike[str]) -> dic
     with output_folder(folder, MANNEQUIN_FILES.values(), sources=mannequin.sources) as place:
         require_own_metrics(place)
         files = {kind: place / name for kind, name in MANNEQUIN_FILES.items()}
+        if mannequin.scan is None:
+            del files["distances"]
         write_mannequin_usd(mannequin, files["usd"])
         write_mannequin_obj(mannequin, files["obj"])
         write_mannequin_picture(mannequin, files["picture"])
+        if mannequin.scan is not None:
+            write_distance_picture(mannequin, files["distances"])
         write_metrics(place, {"schema": 1, "warpflat": __version__, "mannequin": mannequin.metrics()})
     return files
 

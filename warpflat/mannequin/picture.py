@@ -16,11 +16,15 @@ from warpflat.mannequin.normals import face_normals, vertex_normals
 if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["write_mannequin_picture"]
+__all__ = ["turned_view", "write_mannequin_picture"]
 
 _VIEWS = (("front", 0.0), ("three-quarter", 38.0), ("left side", 90.0), ("back", 180.0))
 _LIGHT = np.array([-0.35, 0.45, 0.82]) / np.linalg.norm([-0.35, 0.45, 0.82])
 _HEIGHT = 8.0
+# Cells of the depth picture, and how far before a line something hides it [m].
+_CELL, _BEFORE = 0.006, 0.012
+# Shorter runs of a line are not drawn [m].
+_SHORT = 0.045
 _LINE, _INK = "#9c1f30", "#333333"
 
 
@@ -36,7 +40,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
 
     low, high = float(mannequin.vertices[:, 1].min()), float(mannequin.vertices[:, 1].max())
     span = high - low
-    views = [(title, _turned(mannequin.vertices, angle)) for title, angle in _VIEWS]
+    views = [(title, turned_view(mannequin.vertices, angle)) for title, angle in _VIEWS]
     # The side view keeps room for the profiles' names behind it.
     widths = [0.62 * span if title == "left side" else 2.06 * float(np.abs(v[:, 0]).max()) for title, v in views]
     inches = _HEIGHT * 0.92 / (1.06 * span)
@@ -64,7 +68,7 @@ def write_mannequin_picture(mannequin: Mannequin, path: str | os.PathLike[str]) 
         figure.savefig(temporary, format="png", metadata={"Software": None})
 
 
-def _turned(vertices: FloatArray, degrees: float) -> FloatArray:
+def turned_view(vertices: FloatArray, degrees: float) -> FloatArray:
     """Return vertices seen by somebody who walked `degrees` around the body to its left; x right, y up, z to the eye."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     x, y, z = vertices.T
@@ -91,27 +95,42 @@ def _draw_body(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     )
 
 
-def _visible(turned: FloatArray, mannequin: Mannequin, ids: Any) -> Any:
-    """Return which vertices of a line face the viewer and are not behind an arm."""
-    from scipy.spatial import cKDTree
-
+def _visible(turned: FloatArray, mannequin: Mannequin, ids: Any, nearest: FloatArray) -> Any:
+    """Return which vertices of a line face the viewer with nothing of the body before them."""
     normals = vertex_normals(turned, mannequin.layout.body_faces)
-    seen = normals[ids, 2] > 0.02
-    arms = np.concatenate([turned[grid.ravel()] for grid in mannequin.layout.arms.values()])
-    tree = cKDTree(arms[:, :2])
-    reach = 1.1 * mannequin.layout.resolution
-    for k, near in enumerate(tree.query_ball_point(turned[ids][:, :2], reach)):
-        if near and arms[near, 2].max() > turned[ids[k], 2] + 0.03:
-            seen[k] = False
+    cell = _cells(turned[ids], turned)
+    seen = (normals[ids, 2] > 0.12) & (turned[ids, 2] > nearest[cell[:, 0], cell[:, 1]] - _BEFORE)
+    # What is left of a line that slips along the outline is no more than stray marks.
+    ends = np.flatnonzero(np.diff(np.r_[False, seen, False].astype(int))).reshape(-1, 2)
+    for first, last in ends[np.diff(ends).ravel() * mannequin.layout.resolution < _SHORT]:
+        seen[first:last] = False
     return seen
+
+
+def _nearest(turned: FloatArray, mannequin: Mannequin) -> FloatArray:
+    """Return the body's depth [m] nearest to the viewer in each cell of the picture."""
+    corners = turned[mannequin.layout.body_faces]
+    steps = np.linspace(0.0, 1.0, 5)
+    u, v = (a.ravel()[:, None, None] for a in np.meshgrid(steps, steps))
+    spots = (1 - u) * ((1 - v) * corners[:, 0] + v * corners[:, 3]) + u * ((1 - v) * corners[:, 1] + v * corners[:, 2])
+    spots = spots.reshape(-1, 3)
+    cell = _cells(spots, turned)
+    depth = np.full(cell.max(axis=0) + 1, -np.inf)
+    np.maximum.at(depth, (cell[:, 0], cell[:, 1]), spots[:, 2])
+    return depth
+
+
+def _cells(points: FloatArray, turned: FloatArray) -> Any:
+    return ((points[:, :2] - turned[:, :2].min(axis=0)) / _CELL).astype(int)
 
 
 def _draw_lines(axes: Any, turned: FloatArray, mannequin: Mannequin) -> None:
     from matplotlib.collections import LineCollection
 
     segments = []
+    nearest = _nearest(turned, mannequin)
     for ids in mannequin.layout.body_lines.values():
-        seen = _visible(turned, mannequin, ids)
+        seen = _visible(turned, mannequin, ids, nearest)
         both = seen[:-1] & seen[1:]
         segments.append(np.stack([turned[ids[:-1]], turned[ids[1:]]], 1)[both][:, :, :2])
     axes.add_collection(LineCollection(list(np.concatenate(segments)), colors=_LINE, linewidths=0.9))

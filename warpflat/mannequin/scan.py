@@ -18,6 +18,7 @@ from warpflat.mannequin.scan_checks import check_girths
 from warpflat.mannequin.scan_legs import leg_curves, plumb_legs, slice_legs
 from warpflat.mannequin.scan_levels import TrunkSections, find_levels, trunk_sections
 from warpflat.mannequin.scan_limbs import neck_and_arms, underarm_point
+from warpflat.mannequin.scan_measures import ScanMeasure, body_measures, guess_note, leg_levels
 from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
 from warpflat.mannequin.table_body import PRINCESS
 
@@ -39,12 +40,16 @@ class ScanFound:
         source: one line for metrics.
         notes: findings from the shape, one sentence each.
         sections: length [m] of the body's own section, hollows followed, at every closed level.
+        measures: tapes around the scan itself, by name.
+        scan: vertices (#P by 3 [m]) upright with the legs moved together, and triangles.
     """
 
     blueprint: Blueprint
     source: str
     notes: tuple[str, ...]
     sections: Mapping[str, float]
+    measures: Mapping[str, ScanMeasure]
+    scan: tuple[FloatArray, NDArray[np.int64]]
 
 
 def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> ScanFound:
@@ -64,21 +69,27 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     levels, more = find_levels(trunk, options.landmarks)
     check_girths(trunk, levels)
     legs = slice_legs(slicer, trunk, levels["hip"])
+    of_legs, _ = leg_levels(legs)
+    levels |= {name: of_legs[name] for name in ("knee", "ankle") if name not in options.landmarks}
+    levels |= {"leg_knee": levels["knee"], "leg_calf": of_legs["calf"], "leg_ankle": levels["ankle"]}
     plumb, apart = plumb_legs(trunk, legs)
     underarms = {side: underarm_point(slicer, trunk, side, levels["underbust"]) for side in ("left", "right")}
     profile = _profiles(plumb, levels, underarms)
-    quarters, arms, neck, collar = neck_and_arms(slicer, trunk, levels, profile, underarms)
+    quarters, arms, neck, collar, sliced = neck_and_arms(slicer, trunk, levels, profile, underarms)
     blueprint = Blueprint(
         profile=profile, heights={level: levels[level] for level in RING_LEVELS}, quarters=quarters, arms=arms,
         legs=leg_curves(slicer, legs, levels, profile(levels["hip"])), neck=neck, collar=collar,
         attract=_attractor(slicer, levels, trunk.armpits), mirror=options.mirror,
     )  # fmt: skip
+    measures = body_measures(slicer, trunk, levels, legs, sliced, neck, more)
     sections = {level: float(np.interp(levels[level], trunk.y, trunk.length)) for level in RING_LEVELS}
     return ScanFound(
         blueprint=blueprint,
         source=f"scan of a body {trunk.stature:.3f} m tall",
-        notes=(*notes, *more, *apart),
+        notes=(*notes, *more, *apart, *guess_note(measures)),
         sections=sections,
+        measures=measures,
+        scan=(legs.move(points) if apart else points, triangles),
     )
 
 

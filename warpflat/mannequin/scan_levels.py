@@ -12,7 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.scan_pose import Slice, Slicer
 
-__all__ = ["TrunkSections", "find_levels", "leg_sections", "trunk_sections"]
+__all__ = ["TrunkSections", "find_levels", "leg_sections", "smooth", "summit", "trunk_sections"]
 
 _UP = np.array([0.0, 1.0, 0.0])
 # Trunk, head and legs have their middles within this distance of the midplane, as a share of the stature; arms do not.
@@ -106,10 +106,22 @@ def leg_sections(slicer: Slicer, y: float, stature: float) -> list[Slice]:
 
     Two parts of similar size are the legs; what hangs between them at the crotch is smaller and belongs to neither.
     """
-    near = [p for p in slicer.cut(_UP, y) if abs(_middle_x(p)) < _REACH * stature and len(p.points) > 8]
+    parts = _whole([p for p in slicer.cut(_UP, y) if abs(_middle_x(p)) < _REACH * stature])
+    near = [p for p in parts if len(p.points) > 8]
     near.sort(key=_box, reverse=True)
     legs = y < _ABOVE_CROTCH * stature and len(near) > 1 and _box(near[1]) > 0.5 * _box(near[0])
     return near[:2] if legs else near[:1]
+
+
+def _whole(parts: list[Slice]) -> list[Slice]:
+    """Return parts of a section, those on one side of the midplane joined that holes in the mesh have parted."""
+    joined = [p for p in parts if p.closed]
+    for side in (-1.0, 0.0, 1.0):
+        torn = [p for p in parts if not p.closed and (0.0 if _straddles(p) else np.sign(_middle_x(p))) == side]
+        if torn:
+            points = np.concatenate([p.points for p in torn])
+            joined.append(Slice(points=points, length=sum(p.length for p in torn), closed=False))
+    return joined
 
 
 def _middle_x(part: Slice) -> float:
@@ -177,7 +189,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     front = (t.y < levels["waist"] - 0.25 * (levels["waist"] - levels["hip"])) & (
         t.y > levels["waist"] - 0.75 * (levels["waist"] - levels["hip"])
     )
-    belly = float(t.y[front][np.argmax(_smooth(t.front, 3)[front])])
+    belly = float(t.y[front][np.argmax(smooth(t.front, 3)[front])])
     levels["abdomen"] = float(np.clip(belly, levels["waist"] - 0.62 * (levels["waist"] - levels["hip"]),
                                       levels["waist"] - 0.38 * (levels["waist"] - levels["hip"])))  # fmt: skip
     levels["underbust"] = given.get("underbust") or _underbust(t, levels["waist"], levels["bust"], notes)
@@ -210,7 +222,7 @@ def find_levels(t: TrunkSections, given: Mapping[str, float]) -> tuple[dict[str,
     return levels, notes
 
 
-def _smooth(values: FloatArray, sigma: float) -> FloatArray:
+def smooth(values: FloatArray, sigma: float) -> FloatArray:
     from scipy.ndimage import gaussian_filter1d
 
     return np.asarray(gaussian_filter1d(values, sigma, mode="nearest"))
@@ -220,12 +232,12 @@ def _waist(t: TrunkSections, armpit: float, notes: list[str]) -> float:
     """Return the height of the narrowest girth between rib and hip bone."""
     window = np.flatnonzero((t.y > 0.565 * t.stature) & (t.y < min(0.69 * t.stature, armpit - 0.06 * t.stature)))
     for values, words in (
-        (_smooth(t.girth, 1.5), ""),
-        (-_smooth(t.back_centre, 2.0), "the trunk has no narrowest section; it is where the back is hollow"),
+        (smooth(t.girth, 1.5), ""),
+        (-smooth(t.back_centre, 2.0), "the trunk has no narrowest section; it is where the back is hollow"),
     ):
         row = int(window[np.argmin(values[window])])
         if window[0] < row < window[-1]:
-            waist = _summit(t.y, values, row)
+            waist = summit(t.y, values, row)
             if words:
                 notes.append(f"waist = {waist:.3f} m is a guess: {words}")
             return waist
@@ -242,7 +254,7 @@ def _bust(t: TrunkSections, waist: float, armpit: float, notes: list[str]) -> fl
         raise InputError(f"scan: no room for a bust between waist ({waist:.3f} m) and armpits ({armpit:.3f} m)")
     row = int(rows[np.argmax(t.girth[rows])])
     if row < rows[-1]:
-        return _summit(t.y, t.girth, row)
+        return summit(t.y, t.girth, row)
     notes.append(f"bust = {high:.3f} m is a guess: the chest grows fuller up to the armpits at {armpit:.3f} m")
     return high
 
@@ -272,13 +284,13 @@ def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:
     # Not smoothed: the seat is rounder above than below, and smoothing would lower it.
     seat = int(rows[np.argmin(t.back[rows])])
     if rows[0] < seat < rows[-1] and t.back[rows].max() - t.back[seat] > 0.01 * t.stature:
-        return _summit(t.y, t.back, seat)
+        return summit(t.y, t.back, seat)
     guess = max(0.52 * t.stature, t.crotch + 0.03 * t.stature)
     notes.append(f"hip = {guess:.3f} m is a guess: the seat does not stand out between crotch and waist")
     return guess
 
 
-def _summit(y: FloatArray, values: FloatArray, row: int) -> float:
+def summit(y: FloatArray, values: FloatArray, row: int) -> float:
     """Return the height where the parabola through `row` and its neighbours has its extreme [m]."""
     a, b, c = values[row - 1 : row + 2]
     bend = a - 2.0 * b + c
@@ -293,11 +305,11 @@ def _neck(t: TrunkSections, armpit: float) -> tuple[float, float]:
     Both are where an outline turns from the chest or the shoulder into the neck: the point furthest inside the chord.
     """
     window = (t.y > 0.80 * t.stature) & (t.y < 0.91 * t.stature)
-    narrow = float(t.y[window][np.argmin(_smooth(t.area, 1.0)[window])])
+    narrow = float(t.y[window][np.argmin(smooth(t.area, 1.0)[window])])
 
     def corner(values: FloatArray, low: float, high: float) -> float:
         rows = (t.y >= low) & (t.y <= high)
-        y, v = t.y[rows], _smooth(values, 1.0)[rows]
+        y, v = t.y[rows], smooth(values, 1.0)[rows]
         chord = v[0] + (v[-1] - v[0]) * (y - y[0]) / (y[-1] - y[0])
         return float(y[int(np.argmax(chord - v))])
 

@@ -5,16 +5,15 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, polyline_length, resample
 from warpflat.mannequin.blueprint import ArmCurves, Profile, QuarterCurves
 from warpflat.mannequin.layout import QUARTERS
+from warpflat.mannequin.scan_arms import ScanArm, slice_arm
 from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
-from warpflat.surface.connectivity import join_labels
 
 __all__ = ["neck_and_arms", "underarm_point"]
 
@@ -25,9 +24,8 @@ _LEAN = np.radians(9.0)
 _DROP, _SHOULDER_HEIGHT = 0.016, 0.075
 # Down to this far above the armpit the armhole is the body's own section.
 _SCOOP = 0.012
-# The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew; the elbow at this share
-# of the way from the shoulder point to the wrist.
-_SHORTEST_SLEEVE, _ELBOW = 0.070, 0.575
+# The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew.
+_SHORTEST_SLEEVE = 0.070
 _HARMONICS = 5
 _NOTCH = 0.22
 
@@ -38,7 +36,7 @@ def neck_and_arms(
     levels: Mapping[str, float],
     profile: Callable[[float], Profile],
     underarms: Mapping[str, FloatArray],
-) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray]:
+) -> tuple[dict[str, QuarterCurves], dict[str, ArmCurves], float, FloatArray, dict[str, ScanArm]]:
     """Return the curves above the bust.
 
     Args:
@@ -49,7 +47,8 @@ def neck_and_arms(
         underarms: the left and the right armhole's lowest point (see :func:`underarm_point`).
 
     Returns:
-        the quarters' curves, the arms' curves, the neck base's length [m], and the collar's curve (#P by 3 [m]).
+        the quarters' curves, the arms' curves, the neck base's length [m], the collar's curve (#P by 3 [m]),
+        and the sliced arms.
 
     Raises:
         InputError: if the neck or an arm cannot be sliced.
@@ -61,13 +60,15 @@ def neck_and_arms(
     back = int(np.argmin(np.abs(neckline[:, 0]) + 10.0 * (neckline[:, 2] > neckline[:, 2].mean())))
     quarters: dict[str, QuarterCurves] = {}
     arms: dict[str, ArmCurves] = {}
+    sliced: dict[str, ScanArm] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         around = neckline if sign > 0 else np.vstack([neckline[:1], neckline[:0:-1]])
         end = back if sign > 0 else len(neckline) - back
         corner = int(np.argmax(sign * around[: end + 1, 0]))
         hole = _armhole(slicer, trunk, side, underarms[side])
         tip = int(np.argmax(hole[:, 1]))
-        arms[side] = _arm(slicer, hole, sign, side)
+        sliced[side] = slice_arm(slicer, hole, sign, side)
+        arms[side] = _arm_curves(sliced[side])
         # The loop runs from the underarm forward: its first half is the front.
         halves = {"front": hole[tip::-1], "back": np.vstack([hole[tip:], hole[:1]])}
         seam = _shoulder(slicer, around[corner], hole[tip])
@@ -85,7 +86,7 @@ def neck_and_arms(
                 centre=_centre(slicer, bottom, row[0], line[0], face),
             )  # fmt: skip
     length = polyline_length(neckline, closed=True)
-    return {name: quarters[name] for name in QUARTERS}, arms, length, collar
+    return {name: quarters[name] for name in QUARTERS}, arms, length, collar, sliced
 
 
 def _loop(
@@ -297,80 +298,16 @@ def _centre(slicer: Slicer, bottom: FloatArray, chest: FloatArray, top: FloatArr
     return np.column_stack([np.zeros_like(y), y, z])
 
 
-def _arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ArmCurves:
-    """Return biceps, elbow and wrist from planes across the arm's own centre line, which a bent elbow turns."""
-    points, triangles = slicer.vertices, slicer.triangles
-    middle = hole.mean(axis=0)
-    normal = np.array([sign * np.cos(_LEAN), -np.sin(_LEAN), 0.0])
-    limb = _beyond(points, triangles, normal, float(middle @ normal) + 0.004, middle)
-    away = np.linalg.norm(limb - middle, axis=1)
-    hand, reach = limb[int(np.argmax(away))], float(away.max())
-    if reach < 0.2 * points[:, 1].max():
-        raise InputError(f"scan: the {side} arm is only {reach:.2f} m long; its mesh is broken")
-    axis = (hand - middle) / reach
-
-    def section(at: FloatArray, across: FloatArray) -> FloatArray:
-        # The arm may be bent, so its section lies anywhere near; the trunk's and the legs' lie further off.
-        near = [p for p in slicer.cut(across, float(at @ across))
-                if len(p.points) > 6 and np.linalg.norm(p.points.mean(axis=0) - at) < 0.30 * reach
-                and sign * p.points[:, 0].mean() > sign * middle[0]]  # fmt: skip
-        if not near:
-            raise InputError(f"scan: the {side} arm has no section at {at[1]:.2f} m; its mesh is broken there")
-        return max(near, key=lambda p: p.length).points
-
-    shares = np.linspace(0.14, 0.86, 37)
-    line, way = _centre_line(section, middle, reach * axis, shares)
+def _arm_curves(arm: ScanArm) -> ArmCurves:
+    """Return the curves at biceps, elbow and wrist."""
 
     def ring(share: float) -> FloatArray:
-        at, across = (np.array([np.interp(share, shares, values[:, k]) for k in range(3)]) for values in (line, way))
-        across /= np.linalg.norm(across)
+        at, across = arm.frame(share)
         up = np.array([0.0, 1.0, 0.0]) - across * across[1]
         up /= np.linalg.norm(up)
         ahead = np.cross(across, up)
-        cut = section(at, across)
+        cut = arm.cut(at, across)
         return _loop(cut, cut.mean(axis=0), -up, np.sign(ahead[2]) * ahead, 4, 240)
 
-    low = np.linspace(0.60, 0.84, 25)
-    girths = np.array([polyline_length(ring(float(s)), closed=True) for s in low])
-    # Where the scan's hand is missing, the arm's torn end gives sections of half its girth and less.
-    whole = np.flatnonzero(girths > 0.6 * np.median(girths[:9]))
-    wrist = float(low[whole[int(np.argmin(girths[whole]))]])
-    under, tip = (float((p - middle) @ axis) / reach for p in (hole[0], hole[int(np.argmax(hole[:, 1]))]))
-    elbow = tip + _ELBOW * (wrist - tip)
-    biceps = float(np.clip(max(under, tip) + _SHORTEST_SLEEVE / reach, 0.10, elbow - 0.10))
-    return ArmCurves(biceps=ring(biceps), elbow=ring(elbow), wrist=ring(wrist))
-
-
-def _centre_line(
-    section: Callable[[FloatArray, FloatArray], FloatArray], start: FloatArray, to_hand: FloatArray, shares: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Return the middles of an arm's sections at `shares` of the way to the hand and the unit directions of their line."""
-    from scipy.ndimage import gaussian_filter1d
-
-    axis = to_hand / np.linalg.norm(to_hand)
-    line = start + shares[:, None] * to_hand
-    for i, at in enumerate(line.copy()):
-        try:
-            cut = section(at, axis)
-        except InputError:
-            continue
-        line[i] = 0.5 * (cut.min(axis=0) + cut.max(axis=0))
-    way = np.gradient(gaussian_filter1d(line, 2.0, axis=0, mode="nearest"), axis=0)
-    # Next to the armhole sections still hold a part of the shoulder.
-    way[:4] = way[4]
-    return line, way / np.linalg.norm(way, axis=1, keepdims=True)
-
-
-def _beyond(
-    points: FloatArray, triangles: NDArray[np.int64], normal: FloatArray, offset: float, near: FloatArray
-) -> FloatArray:
-    """Return the vertices of the one connected part of the mesh beyond a plane that starts nearest to `near`."""
-    outside = points @ normal > offset
-    kept = triangles[outside[triangles].all(axis=1)]
-    ends = np.concatenate([kept[:, :2], kept[:, 1:]])
-    label = join_labels(len(points), ends[:, 0], ends[:, 1])
-    used = np.unique(kept)
-    if not len(used):
-        raise InputError("scan: nothing lies beyond the armhole; arms are missing")
-    close = used[int(np.argmin(np.linalg.norm(points[used] - near, axis=1)))]
-    return points[used[label[used] == label[close]]]
+    biceps = float(np.clip(max(arm.under, arm.tip) + _SHORTEST_SLEEVE / arm.reach, 0.10, arm.elbow - 0.10))
+    return ArmCurves(biceps=ring(biceps), elbow=ring(arm.elbow), wrist=ring(arm.wrist))

@@ -84,10 +84,12 @@ class Slice:
     Attributes:
         points: #P by 3, where the plane meets mesh edges [m], in no order.
         length: summed length of the section's segments [m].
+        closed: false where a hole in the mesh leaves a gap.
     """
 
     points: FloatArray
     length: float
+    closed: bool = True
 
 
 class Slicer:
@@ -123,7 +125,10 @@ class Slicer:
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
         label = join_labels(len(used), local[:, 0], local[:, 1])
         length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
-        parts = [Slice(points=points[label == i], length=float(length[i])) for i in np.argsort(-length)]
+        loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
+        parts = [
+            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i]) for i in np.argsort(-length)
+        ]
         return [p for p in parts if len(p.points) > 3]
 
 

@@ -1,0 +1,144 @@
+"""Tapes around head, arms, hands, legs and feet of a body mesh with trimesh and SciPy alone."""
+
+from __future__ import annotations
+
+import numpy as np
+import trimesh
+from body_tapes import section_parts
+from scipy.ndimage import gaussian_filter1d
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.spatial import ConvexHull
+
+
+def _parts(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
+    """Return the connected parts of a plane section, each #P by 3."""
+    ends = np.asarray(trimesh.intersections.mesh_plane(mesh, normal, at)).reshape(-1, 3)
+    if not len(ends):
+        return []
+    key = np.unique(np.round(ends * 1e7).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
+    graph = coo_matrix((np.ones(len(key) // 2), (key[::2], key[1::2])), (key.max() + 1,) * 2)
+    label = connected_components(graph, directed=False)[1][key]
+    parts = [ends[label == i] for i in range(label.max() + 1)]
+    return [p for p in parts if len(p) > 5]
+
+
+def _girth(points: np.ndarray, normal: np.ndarray) -> float:
+    axes = np.linalg.svd(normal[None])[2][1:]
+    return float(ConvexHull(points @ axes.T).area)
+
+
+def _tape(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
+    """Return height and girth [m] of a tape across `normal` around the part of the section whose middle is nearest."""
+    part = min(_parts(mesh, at, normal), key=lambda p: np.linalg.norm(0.5 * (p.min(axis=0) + p.max(axis=0)) - at))
+    return float(0.5 * (part[:, 1].min() + part[:, 1].max())), _girth(part, normal)
+
+
+def leg_tapes(mesh: trimesh.Trimesh, crotch: float, left: bool) -> dict[str, tuple[float, float]]:
+    """Return level tapes around one leg of a body on the floor y = 0: thigh, knee, calf, ankle.
+
+    Calf fullest, ankle narrowest, thigh 0.03 of the stature below the crotch, knee at the crease behind it.
+    """
+    stature = mesh.vertices[:, 1].max()
+    y = np.arange(0.04 * stature, crotch, 0.002)
+    sides = [max(section_parts(mesh, at)[:2], key=lambda p: p[:, 0].mean() * (1.0 if left else -1.0)) for at in y]
+    girth = gaussian_filter1d([ConvexHull(s).area for s in sides], 3.0)
+    back = gaussian_filter1d([s[:, 1].min() for s in sides], 3.0)
+    share = y / crotch
+    calf = int(np.argmax(np.where((share > 0.3) & (share < 0.6), girth, 0.0)))
+    ankle = int(np.argmin(np.where(share < 0.3, girth, np.inf)))
+    line = np.interp(y, [y[calf], 0.86 * crotch], np.interp([y[calf], 0.86 * crotch], y, back))
+    knee = int(np.argmax(np.where((y > y[calf]) & (share < 0.86), back - line, -np.inf)))
+    thigh = int(np.argmin(np.abs(y - crotch + 0.03 * stature)))
+    places = {"thigh": thigh, "knee": knee, "calf": calf, "ankle": ankle}
+    return {name: (float(y[i]), float(ConvexHull(sides[i]).area)) for name, i in places.items()}
+
+
+def foot_tape(mesh: trimesh.Trimesh, left: bool) -> tuple[float, float]:
+    """Return the tape around a foot where it is broadest across its length, which runs where it is narrowest."""
+    side = 1.0 if left else -1.0
+    low = mesh.vertices[(mesh.vertices[:, 1] < 0.025 * mesh.vertices[:, 1].max()) & (side * mesh.vertices[:, 0] > 0)]
+    angles = np.radians(np.arange(-40.0, 40.0, 0.5))
+    narrow = angles[int(np.argmin([np.ptp(low @ [np.cos(a), 0.0, -np.sin(a)]) for a in angles]))]
+    axis = np.array([np.sin(narrow), 0.0, np.cos(narrow)])
+    along = low @ axis
+    best = (0.0, 0.0, 0.0)
+    for at in along.min() + np.arange(0.6, 0.8, 0.01) * np.ptp(along):
+        flat = np.concatenate(
+            [p for p in _parts(mesh, at * axis, axis) if p[:, 1].max() < 0.16 and side * p[:, 0].mean() > 0]
+        )
+        best = max(
+            best, (float(np.ptp(flat @ np.cross(axis, [0, 1, 0]))), float(flat[:, 1].max() / 2), _girth(flat, axis))
+        )
+    return best[1:]
+
+
+def head_tape(mesh: trimesh.Trimesh) -> tuple[float, float]:
+    """Return the fullest level tape around the head above the ears, where its width leaps."""
+    y = np.arange(0.985, 0.90, -0.001) * mesh.vertices[:, 1].max()
+    parts = [section_parts(mesh, at)[0] for at in y]
+    width = np.array([np.ptp(p[:, 0]) for p in parts])
+    ears = next((i for i in range(30, len(y) - 4) if width[i + 4] > 1.08 * width[i]), len(y))
+    girth = [ConvexHull(p).area for p in parts[:ears]]
+    return float(y[int(np.argmax(girth))]), float(max(girth))
+
+
+def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple[float, float]]:
+    """Return tapes around the arm of the fingertip `tip`: biceps and wrist across their bones, elbow across both, hand across its palm.
+
+    The arm's middle line runs through the middles of bands of equal way over the surface from the fingertip. Its bones are
+    the two straight lines that fit it best. Biceps: fullest from 0.02 of the stature beyond the armpit. Wrist: narrowest.
+    Hand: halfway from where the thumb parts from the palm to where the fingers part.
+    """
+    side = float(np.sign(mesh.vertices[tip, 0]))
+    v, stature = mesh.vertices, mesh.vertices[:, 1].max()
+    edges = mesh.edges_unique
+    graph = coo_matrix((mesh.edges_unique_length, edges.T), (len(v),) * 2)
+    way = dijkstra(graph, directed=False, indices=tip)
+    bands = np.arange(0.16, 0.34, 0.004) * stature
+    middle = []
+    for at in bands:
+        near = v[np.abs(way - at) < 0.006 * stature]
+        middle.append(0.5 * (near.min(axis=0) + near.max(axis=0)))
+    line = np.array(middle)
+    for _ in range(2):
+        # Across the line instead of along equal ways over the surface, which lie askew where an arm is bent.
+        towards = np.gradient(gaussian_filter1d(line, 3.0, axis=0, mode="nearest"), axis=0)
+        for i, (at, normal) in enumerate(zip(line.copy(), towards, strict=True)):
+            parts = _parts(mesh, at, normal)
+            boxes = [0.5 * (p.min(axis=0) + p.max(axis=0)) for p in parts if np.ptp(p, axis=0).max() < 0.13 * stature]
+            line[i] = min(boxes, key=lambda m: np.linalg.norm(m - at), default=at)
+    misses = []
+    for joint in bands[8:-8]:
+        bones = np.column_stack([np.ones_like(bands), bands - joint, np.maximum(bands - joint, 0.0)])
+        fit = np.linalg.lstsq(bones, line, rcond=None)[0]
+        misses.append((float(np.linalg.norm(bones @ fit - line)), fit))
+    _, (elbow, lower, turn) = min(misses, key=lambda m: m[0])
+    upper = lower + turn
+    lower, upper = lower / np.linalg.norm(lower), upper / np.linalg.norm(upper)
+    found = {"elbow": _tape(mesh, elbow, (lower + upper) / np.linalg.norm(lower + upper))}
+    trunk = max((p for p in _parts(mesh, np.array([0, armpit - 0.002, 0]), np.array([0, 1.0, 0]))
+                 if p[:, 0].min() < 0 < p[:, 0].max()), key=lambda p: np.ptp(p[:, 0]))  # fmt: skip
+    pit = trunk[int(np.argmax(side * trunk[:, 0]))]
+    reach = float((pit - elbow) @ upper) - 0.02 * stature
+    found["biceps"] = max(
+        (_tape(mesh, elbow + s * upper, upper) for s in np.arange(0.02, reach, 0.002)), key=lambda t: t[1]
+    )
+    forearm = [elbow - s * lower for s in np.arange(0.07, 0.16, 0.0012) * stature]
+    girths = [_tape(mesh, at, lower)[1] for at in forearm]
+    wrist = forearm[int(np.argmin(girths))]
+    found["wrist"] = _tape(mesh, wrist, lower)
+    palm = v[tip] - wrist
+    length = np.linalg.norm(palm)
+    axis = palm / length
+    split = []
+    for s in np.arange(0.3, 0.62, 0.01) * length:
+        parts = [
+            p for p in _parts(mesh, wrist + s * axis, axis) if np.linalg.norm(p.mean(axis=0) - wrist - s * axis) < 0.1
+        ]
+        if len(parts) == 2:
+            palm = max(parts, key=lambda p: _girth(p, axis))
+            split.append((float(0.5 * (palm[:, 1].min() + palm[:, 1].max())), _girth(palm, axis)))
+    if split:
+        found["hand"] = split[len(split) // 2]
+    return found
