@@ -1,18 +1,17 @@
-"""Cloth in space: forces of the membrane and of bending, contact with a body, and steps of dynamic relaxation.
+"""Cloth in space: energy, forces and stiffness of the membrane, bending, weight, and contact with a body under friction.
 
 The membrane is that of `membrane.py`, with F = dX/dx now a 3 by 2 matrix: psi = W(e_warp, e_weft) + 1/2 G gamma^2 per
 flat area, where the rest state is the flat pattern in its own thread directions. Bending is the quadratic energy of
 cloth that hardly stretches, 1/2 B |Laplacian of x|^2 (Wardetzky et al. 2007), with the cotangent Laplacian of the flat
 pieces at the vertices inside. By edges, as Bergou et al. 2006 have it, grids are three times too stiff along their
-lines. The body is one plane per vertex, which is renewed every few steps; friction is Coulomb's. The relaxation is
-explicit with fictitious masses, and all velocities are set to zero when the forces begin to do negative work (kinetic
-damping: Cundall 1976, Barnes 1999).
+lines. The body is one plane per vertex with a stiff skin. Friction is Coulomb's: a spring to an anchor in the plane, whose
+force is bounded.
 """
 
 import warp as wp
 
 from .indices import natural
-from .membrane import Cloth, sheared_threads, stretched_sheet
+from .membrane import Cloth, beyond_hooke, sheared_threads, stretched_sheet
 
 wp.set_module_options({"enable_backward": False})
 
@@ -20,6 +19,8 @@ wp.set_module_options({"enable_backward": False})
 TOUCH = wp.constant(wp.float64(1.0e-6))
 # Way per step below which a vertex does not slide [m].
 STILL = wp.constant(wp.float64(1.0e-7))
+# What holds a vertex that may not move [N/m].
+HELD = wp.constant(wp.float64(1.0e6))
 TINY = wp.constant(wp.float64(1.0e-30))
 
 
@@ -39,16 +40,23 @@ class Motion:
 
 @wp.struct
 class Contact:
-    """The body as one plane per vertex.
+    """The body as one plane per vertex, and where friction holds the cloth; each #V but for friction and longest_step.
 
-    centre: #V, the nearest place of the body [m]. normal: #V, outwards; zero where no body is near.
-    friction: Coulomb's coefficient. longest_step: bound of the way in one step [m].
+    centre: the nearest place of the body [m]. normal: outwards; zero where no body is near. friction: Coulomb's coefficient.
+    longest_step: bound of the way in one step of relaxation [m]. skin: stiffness of the body [N/m]. pressed: the normal force at
+    no depth [N]. anchor: where friction does not act [m]. grip: stiffness of friction before it slides [N/m]. most: the
+    largest force of friction [N].
     """
 
     centre: wp.array(dtype=wp.vec3d)
     normal: wp.array(dtype=wp.vec3d)
     friction: wp.float64
     longest_step: wp.float64
+    skin: wp.array(dtype=wp.float64)
+    pressed: wp.array(dtype=wp.float64)
+    anchor: wp.array(dtype=wp.vec3d)
+    grip: wp.array(dtype=wp.float64)
+    most: wp.array(dtype=wp.float64)
 
 
 @wp.struct
@@ -74,11 +82,12 @@ def evaluate_cloth(
     first: int,
     # outputs
     force: wp.array(dtype=wp.vec3d),
+    energy: wp.array(dtype=wp.float64),
 ):
-    """Compute the membrane's forces on the corners of each cell, minus the gradient of (flat area) psi.
+    """Compute the membrane's energy, and its forces on the corners of each cell, minus the gradient of (flat area) psi.
 
     position: #V [m]. corner: #C. gradient: #C, of the weight of corner 1 along warp and weft, then of corner 2 [1/m].
-    area: #C, flat [m2]. force: 3 #C [N].
+    area: #C, flat [m2]. force: 3 #C [N]. energy: #C [J].
     """
     c = natural(wp.tid() + first)
     at = corner[c]
@@ -92,7 +101,9 @@ def evaluate_cloth(
     length_weft = wp.max(wp.length(weft), TINY)
     e = wp.vec2d(length_warp - wp.float64(1.0), length_weft - wp.float64(1.0))
     law = stretched_sheet(e, cloth)
-    tau = sheared_threads(wp.dot(warp, weft), cloth)[0]
+    shear = sheared_threads(wp.dot(warp, weft), cloth)
+    tau = shear[0]
+    energy[c] = (law[2] + shear[1]) * area[c]
     pull_warp = (warp * (law[0] / length_warp) + weft * tau) * area[c]
     pull_weft = (weft * (law[1] / length_weft) + warp * tau) * area[c]
     f1 = -(pull_warp * g[0] + pull_weft * g[1])
@@ -160,6 +171,34 @@ def find_planes(
 
 
 @wp.func
+def sheet_slopes(e: wp.vec2d, cloth: Cloth):
+    """Return the second derivatives of W by e_warp, by e_weft, and by both [N/m]."""
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    a = cloth.c_warp
+    b = cloth.c_weft
+    both = cloth.c_cross
+    if cloth.c_warp * e[0] + cloth.c_cross * e[1] < zero or cloth.c_weft * e[1] + cloth.c_cross * e[0] < zero:
+        f = cloth.compression
+        a = f * a + (one - f) * wp.where(e[0] > zero, cloth.k_warp, zero)
+        b = f * b + (one - f) * wp.where(e[1] > zero, cloth.k_weft, zero)
+        both = f * both
+    a += beyond_hooke(e[0], cloth.k_warp, cloth.strain_warp, cloth.tension_warp)[2]
+    b += beyond_hooke(e[1], cloth.k_weft, cloth.strain_weft, cloth.tension_weft)[2]
+    return wp.vec3d(a, b, both)
+
+
+@wp.func
+def corner_gradient(g: wp.vec4d, k: int):
+    """Return the gradient of the weight of corner k along warp and weft, by those of corners 1 and 2 [1/m]."""
+    if k == 1:
+        return wp.vec2d(g[0], g[1])
+    if k == 2:
+        return wp.vec2d(g[2], g[3])
+    return wp.vec2d(-g[0] - g[2], -g[1] - g[3])
+
+
+@wp.func
 def gather(
     i: int,
     offset: wp.array(dtype=wp.int32),
@@ -181,6 +220,204 @@ def gather(
         total -= moment[natural(bending.neighbor[s])] * bending.weight[s]
         s += 1
     return total
+
+
+@wp.kernel
+def gather_drape(
+    motion: Motion,
+    ground: wp.float64,
+    contact: Contact,
+    offset: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.int32),
+    cell_force: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    moment: wp.array(dtype=wp.vec3d),
+    first: int,
+    # outputs
+    force: wp.array(dtype=wp.vec3d),
+    energy: wp.array(dtype=wp.float64),
+):
+    """Compute the force on each vertex, and the energy of bending, weight, contact and friction.
+
+    motion: of which position, weight and fixed count. ground: the height of no potential energy [m].
+    offset: #V+1, entry: where in `cell_force` those of the cells on each vertex are [N]. moment: as of `evaluate_curvature`.
+    force: #V, zero where a vertex is held [N]. energy: #V [J].
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    half = wp.float64(0.5)
+    x = motion.position[i]
+    f = gather(i, offset, entry, cell_force, bending, moment)
+    f[1] = f[1] - motion.weight[i]
+    e = motion.weight[i] * (x[1] - ground)
+    if bending.stiffness[i] > zero:
+        e += half * wp.dot(moment[i], moment[i]) / bending.stiffness[i]
+    n = contact.normal[i]
+    if wp.dot(n, n) > half:
+        skin = contact.skin[i]
+        before = contact.pressed[i]
+        push = wp.max(before + skin * wp.dot(contact.centre[i] - x, n), zero)
+        e += half * (push * push - before * before) / skin
+        f += n * push
+        most = contact.most[i]
+        if most > zero:
+            off = x - contact.anchor[i]
+            off = off - n * wp.dot(off, n)
+            way = wp.length(off)
+            pull = contact.grip[i] * way
+            if pull <= most:
+                e += half * pull * way
+                f -= off * contact.grip[i]
+            else:
+                e += most * (way - half * most / contact.grip[i])
+                f -= off * (most / way)
+    energy[i] = e
+    if motion.fixed[i] != wp.int8(0):
+        f = wp.vec3d(zero, zero, zero)
+    force[i] = f
+
+
+@wp.kernel
+def load_contact(
+    motion: Motion,
+    contact: Contact,
+    offset: wp.array(dtype=wp.int32),
+    entry: wp.array(dtype=wp.int32),
+    cell_force: wp.array(dtype=wp.vec3d),
+    bending: Bending,
+    moment: wp.array(dtype=wp.vec3d),
+    sticking: int,
+    first: int,
+):
+    """Set the normal forces and the anchors of friction so that the body carries what it can of the forces on the cloth.
+
+    motion, offset, entry, cell_force, moment: as of `gather_drape`. contact: pressed, anchor and most are set. sticking: 1 if
+    friction holds all that is near the body, whatever presses it there.
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    x = motion.position[i]
+    f = gather(i, offset, entry, cell_force, bending, moment)
+    f[1] = f[1] - motion.weight[i]
+    n = contact.normal[i]
+    push = zero
+    if wp.dot(n, n) > wp.float64(0.5) and wp.dot(x - contact.centre[i], n) < TOUCH:
+        push = wp.max(-wp.dot(f, n), zero)
+    contact.pressed[i] = push
+    most = contact.friction * push
+    if sticking != 0:
+        contact.pressed[i] = zero
+        most = wp.float64(1.0e3)
+    f = f - n * wp.dot(f, n)
+    pull = wp.length(f)
+    contact.most[i] = most
+    contact.anchor[i] = x - f * (wp.min(most, pull) / wp.max(pull, TINY) / contact.grip[i])
+
+
+@wp.kernel
+def stiffen_cloth(
+    position: wp.array(dtype=wp.vec3d),
+    corner: wp.array(dtype=wp.vec3i),
+    gradient: wp.array(dtype=wp.vec4d),
+    area: wp.array(dtype=wp.float64),
+    cloth: Cloth,
+    pull: wp.float64,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.mat33d),
+):
+    """Compute the second derivatives of each cell's energy by its corners, without what is negative.
+
+    Of the stress, as a symmetric 2 by 2 matrix, the part under tension stiffens the cell across its threads.
+
+    position, corner, gradient, area: as of `evaluate_cloth`. stiffness: 9 #C, of corners 00, 01, 02, 10, ... [N/m].
+    """
+    c = natural(wp.tid() + first)
+    at = corner[c]
+    g = gradient[c]
+    zero = wp.float64(0.0)
+    one = wp.float64(1.0)
+    half = wp.float64(0.5)
+    origin = position[natural(at[0])]
+    d1 = position[natural(at[1])] - origin
+    d2 = position[natural(at[2])] - origin
+    warp = d1 * g[0] + d2 * g[2]
+    weft = d1 * g[1] + d2 * g[3]
+    length_warp = wp.max(wp.length(warp), TINY)
+    length_weft = wp.max(wp.length(weft), TINY)
+    e = wp.vec2d(length_warp - one, length_weft - one)
+    law = stretched_sheet(e, cloth)
+    shear = sheared_threads(wp.dot(warp, weft), cloth)
+    slope = sheet_slopes(e, cloth)
+    # The part of the stress [[a, tau], [tau, b]] that pulls.
+    a = law[0] / length_warp
+    b = law[1] / length_weft
+    middle = half * (a + b)
+    radius = wp.max(wp.sqrt(half * half * (a - b) * (a - b) + shear[0] * shear[0]), TINY)
+    high = wp.abs(middle + radius)
+    low = wp.abs(middle - radius)
+    across = half * (high - low) / radius
+    mean = half * (high + low)
+    a_pull = mean + across * half * (a - b)
+    b_pull = mean - across * half * (a - b)
+    tau_pull = across * shear[0]
+    u = warp / length_warp
+    v = weft / length_weft
+    unit = wp.identity(n=3, dtype=wp.float64)
+    of_warp = (
+        wp.outer(u, u) * wp.max(slope[0] - a_pull, zero) + unit * (a_pull + pull) + wp.outer(weft, weft) * shear[2]
+    )
+    of_weft = (
+        wp.outer(v, v) * wp.max(slope[1] - b_pull, zero) + unit * (b_pull + pull) + wp.outer(warp, warp) * shear[2]
+    )
+    of_both = wp.outer(u, v) * slope[2] + unit * tau_pull + wp.outer(weft, warp) * shear[2]
+    for k in range(9):
+        i = k / 3
+        j = k % 3
+        along_i = corner_gradient(g, i)
+        along_j = corner_gradient(g, j)
+        stiffness[natural(9 * c + k)] = (
+            of_warp * (along_i[0] * along_j[0])
+            + of_weft * (along_i[1] * along_j[1])
+            + of_both * (along_i[0] * along_j[1])
+            + wp.transpose(of_both) * (along_i[1] * along_j[0])
+        ) * area[c]
+
+
+@wp.kernel
+def stiffen_contact(
+    motion: Motion,
+    contact: Contact,
+    least: wp.float64,
+    first: int,
+    # outputs
+    stiffness: wp.array(dtype=wp.mat33d),
+):
+    """Compute the second derivatives of the energy of contact and friction at each vertex, with a least stiffness everywhere.
+
+    motion: of which position and fixed count. least: [N/m]. stiffness: #V [N/m].
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    unit = wp.identity(n=3, dtype=wp.float64)
+    total = unit * least
+    n = contact.normal[i]
+    x = motion.position[i]
+    if wp.dot(n, n) > wp.float64(0.5):
+        beside = unit - wp.outer(n, n)
+        if contact.pressed[i] + contact.skin[i] * wp.dot(contact.centre[i] - x, n) > zero:
+            total += wp.outer(n, n) * contact.skin[i]
+        most = contact.most[i]
+        if most > zero:
+            off = beside * (x - contact.anchor[i])
+            way = wp.length(off)
+            if contact.grip[i] * way <= most:
+                total += beside * contact.grip[i]
+            else:
+                total += (beside - wp.outer(off, off) / (way * way)) * (most / way)
+    if motion.fixed[i] != wp.int8(0):
+        total += unit * HELD
+    stiffness[i] = total
 
 
 @wp.func

@@ -1,0 +1,199 @@
+"""The energy of sewn cloth on a body, and one sparse factor of its stiffness as the metric of a minimisation."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import warp as wp
+from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array
+from scipy.sparse.linalg import splu
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.launch import Sequence, launch_each, record
+from warpflat.core.sums import range_offsets
+from warpflat.draping.body import Body
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.kernels.drape import (
+    Bending,
+    Contact,
+    Motion,
+    evaluate_cloth,
+    evaluate_curvature,
+    find_planes,
+    gather_drape,
+    load_contact,
+    stiffen_cloth,
+    stiffen_contact,
+)
+from warpflat.model.membrane import make_cloth
+from warpflat.solver.quasi_newton import Point, Solve
+
+__all__ = ["DrapeEnergy", "WornPoint"]
+
+# Stiffness of the body's skin and of friction that holds, per area [N/m3]. The body carries what presses at no depth; these
+# only hold back what changes.
+_SKIN, _GRIP = 1e6, 1e5
+# A vertex that nothing holds moves by its weight over this stiffness, so that no step of the minimisation is longer [m]
+_LONGEST_STEP = 0.05
+# and no step of dynamic relaxation longer than this [m].
+_LONGEST_EXPLICIT_STEP = 1e-3
+_REACH = 0.15  # [m]
+
+
+@dataclass(frozen=True, kw_only=True)
+class WornPoint(Point):
+    """Places of the cloth (#V by 3 [m]), the energy there [J], and the forces (#V by 3 [N])."""
+
+    force: FloatArray
+
+
+class DrapeEnergy:
+    """Energy of membrane, bending, weight, contact and friction, with its arrays on a device.
+
+    Attributes:
+        motion: state of the vertices on the device.
+        contact: the body's planes on the device.
+        device: where they are.
+        forces_of: inputs of kernels that gather the forces at vertices: offset, entry, cells' forces, bending, moment.
+        evaluate_cells: launches of the cells' forces and the moments.
+        planes: launches that find the body's planes, none without a body.
+        weight: #V [N].
+    """
+
+    def __init__(self, cloth: SewnCloth, body: Body | None, options: DrapeOptions, held: BoolArray) -> None:
+        """Build the cells, the bending and the pattern of the stiffness; the contact is that of the first `renew_contact`."""
+        self.device = device = wp.get_device("cpu") if body is None else body.device
+        self._count = count = len(cloth.designed)
+        self._ground = float(cloth.designed[:, 1].mean())
+        corner, _, gradient, area = cloth.cells()
+        laplacian, stiffness = cloth.laplacian()
+        self._pattern = _BlockPattern(corner, csr_array(laplacian.T @ diags_array(stiffness) @ laplacian))
+        fabric, vertex_area = cloth.fabric, cloth.vertex_areas()
+        soft = replace(fabric, compression_factor=min(fabric.compression_factor, options.compression))
+        law = make_cloth(soft, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), device)
+        self.weight = fabric.areal_density * options.gravity * vertex_area
+        self.motion = Motion()
+        self.motion.position, self.motion.velocity = self._zeros(wp.vec3d), self._zeros(wp.vec3d)
+        self.motion.weight, self.motion.fixed = (
+            self._on(self.weight, wp.float64),
+            self._on(held.astype(np.int8), wp.int8),
+        )
+        self.contact = _contact(vertex_area, options, device)
+        bending = Bending()
+        bending.offset, bending.neighbor = self._on(laplacian.indptr, wp.int32), self._on(laplacian.indices, wp.int32)
+        bending.weight, bending.stiffness = self._on(laplacian.data, wp.float64), self._on(stiffness, wp.float64)
+        moment, force = self._zeros(wp.vec3d), wp.zeros(3 * len(corner), wp.vec3d, device)
+        offset = self._on(range_offsets(np.bincount(corner.ravel(), minlength=count)), wp.int32)
+        entry = self._on(np.argsort(corner.ravel(), kind="stable").astype(np.int32), wp.int32)
+        x, at = self.motion.position, {"device": device}
+        self._cells = [x, self._on(corner, wp.vec3i), self._on(gradient, wp.vec4d), self._on(area, wp.float64), law]
+        self._cell_energy, self._energy = wp.zeros(len(corner), wp.float64, device), self._zeros(wp.float64)
+        self._force = self._zeros(wp.vec3d)
+        self.forces_of = [offset, entry, force, bending, moment]
+        outputs = [force, self._cell_energy]
+        self.evaluate_cells = [
+            record(evaluate_cloth, dim=len(corner), inputs=self._cells, outputs=outputs, least=512, **at),
+            record(evaluate_curvature, dim=count, inputs=[x, bending], outputs=[moment], least=512, **at),
+        ]
+        inputs = [self.motion, self._ground, self.contact, *self.forces_of]
+        outputs = [self._force, self._energy]
+        gather = record(gather_drape, dim=count, inputs=inputs, outputs=outputs, least=256, **at)
+        self._evaluate = Sequence([*self.evaluate_cells, gather])
+        self.planes = []
+        if body is not None:
+            query = [wp.uint64(body.mesh.id), body.normals, x, _REACH]
+            outputs = [self.contact.centre, self.contact.normal]
+            self.planes = [record(find_planes, dim=count, inputs=query, outputs=outputs, least=256, turns=4, **at)]
+        self._renew = Sequence([*self.planes, *self.evaluate_cells])
+        self._keep = body
+        self._solve: Solve | None = None
+
+    def _on(self, values: object, dtype: object) -> wp.array:
+        return wp.array(np.ascontiguousarray(values), dtype=dtype, device=self.device)
+
+    def _zeros(self, dtype: type) -> wp.array:
+        return wp.zeros(self._count, dtype, self.device)
+
+    def renew_contact(self, positions: FloatArray, *, sticking: bool = False) -> None:
+        """Find the body's planes anew; body and friction carry what they can of the forces that act there.
+
+        Args:
+            positions: #V by 3, where the cloth is [m].
+            sticking: friction holds all that is near the body, whatever presses it there.
+        """
+        self.motion.position.assign(positions)
+        self._renew.launch()
+        inputs = [self.motion, self.contact, *self.forces_of, int(sticking)]
+        launch_each(load_contact, self._count, inputs, [], device=self.device, least=512)
+
+    def at(self, positions: FloatArray) -> WornPoint:
+        """Evaluate the cloth at #V by 3 places [m]."""
+        self.motion.position.assign(positions)
+        self._evaluate.launch()
+        energy = float(self._cell_energy.numpy().sum() + self._energy.numpy().sum())
+        return WornPoint(positions=positions, energy=energy, force=self._force.numpy().copy())
+
+    def gradient(self, point: WornPoint) -> FloatArray:
+        """Return the gradient of the energy, #V by 3 [N]."""
+        return -point.force
+
+    def factor(self, positions: FloatArray, pull: float) -> None:
+        """Factor the stiffness of the cloth under an additional tension in all directions, from where on it is the metric.
+
+        Args:
+            positions: #V by 3, where the cloth is [m].
+            pull: [N/m].
+        """
+        self.motion.position.assign(positions)
+        cells = wp.zeros(9 * len(self._cell_energy), wp.mat33d, self.device)
+        vertices = self._zeros(wp.mat33d)
+        least = float(self.weight.mean()) / _LONGEST_STEP
+        at = {"device": self.device, "least": 512}
+        launch_each(stiffen_cloth, len(self._cell_energy), [*self._cells, pull], [cells], **at)
+        launch_each(stiffen_contact, self._count, [self.motion, self.contact, least], [vertices], **at)
+        matrix = self._pattern.matrix(cells.numpy(), vertices.numpy())
+        factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
+        self._solve = lambda force: factor.solve(np.ascontiguousarray(force.ravel())).reshape(-1, 3)
+
+    def solver(self, point: WornPoint) -> Solve:
+        """Return the solution by the last factor."""
+        assert self._solve is not None
+        return self._solve
+
+
+def _contact(area: FloatArray, options: DrapeOptions, device: wp.Device) -> Contact:
+    contact = Contact()
+    for name in ("centre", "normal", "anchor"):
+        setattr(contact, name, wp.zeros(len(area), wp.vec3d, device))
+    contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
+    contact.skin, contact.grip = (wp.array(each * area, dtype=wp.float64, device=device) for each in (_SKIN, _GRIP))
+    contact.pressed, contact.most = (wp.zeros(len(area), wp.float64, device) for _ in range(2))
+    return contact
+
+
+class _BlockPattern:
+    """Where the blocks of cells, vertices and bending go in a symmetric matrix of 3 by 3 blocks."""
+
+    def __init__(self, corner: IntArray, bending: csr_array) -> None:
+        count = bending.shape[0]
+        stiff = coo_array(bending)
+        own = np.arange(count)
+        rows = np.concatenate([np.repeat(corner, 3, axis=1).ravel(), own, stiff.row])
+        columns = np.concatenate([np.tile(corner, (1, 3)).ravel(), own, stiff.col])
+        key = rows.astype(np.int64) * count + columns
+        self._order = np.argsort(key, kind="stable")
+        places, self._begin = np.unique(key[self._order], return_index=True)
+        self._columns = (places % count).astype(np.int32)
+        self._offset = np.searchsorted(places // count, np.arange(count + 1)).astype(np.int32)
+        self._bending = stiff.data[:, None] * np.eye(3).ravel()
+        self._size = 3 * count
+
+    def matrix(self, cells: FloatArray, vertices: FloatArray) -> csc_array:
+        """Return the sum of the blocks of cells (9 #C by 3 by 3) and of vertices (#V by 3 by 3), and of bending."""
+        values = np.concatenate([cells.reshape(-1, 9), vertices.reshape(-1, 9), self._bending])
+        blocks = np.add.reduceat(values[self._order], self._begin, axis=0).reshape(-1, 3, 3)
+        rows = bsr_array((blocks, self._columns, self._offset), shape=(self._size, self._size)).tocsr()
+        # It is symmetric.
+        return csc_array((rows.data, rows.indices, rows.indptr), shape=rows.shape)
