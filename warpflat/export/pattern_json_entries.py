@@ -27,6 +27,12 @@ def _text(text: str) -> str:
     return text
 
 
+def _ascending(shares: list[float]) -> list[float]:
+    if shares[0] >= shares[1]:
+        raise ValueError("the first share must be less than the second")
+    return shares
+
+
 def _ring(points: list[list[float]]) -> list[list[float]]:
     x, y = np.transpose(points)
     if abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2 < SMALLEST_AREA:
@@ -40,6 +46,9 @@ Length = Annotated[float, Field(ge=0, le=10_000)]
 Name = Annotated[str, AfterValidator(lambda name: check_label(name, "name"))]
 Text = Annotated[str, AfterValidator(_text)]
 Point = Annotated[list[Coordinate], Field(min_length=2, max_length=2)]
+Shares = Annotated[
+    list[Annotated[float, Field(ge=0.0, le=1.0)]], Field(min_length=2, max_length=2), AfterValidator(_ascending)
+]
 Ends = Annotated[list[Point], Field(min_length=2, max_length=2)]
 Line = Annotated[list[Point], Field(min_length=2)]
 Ring = Annotated[list[Point], Field(min_length=3), AfterValidator(_ring)]
@@ -171,7 +180,7 @@ class StitchEntry(Entry):
     name: Name
     kind: Literal["seam", "dart"]
     ease: float
-    eased: tuple[float, float] = (0.0, 1.0)
+    eased: Shares = Field(default=[0.0, 1.0])
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 
