@@ -15,7 +15,6 @@ from numpy.typing import ArrayLike
 
 from warpflat.core.compile import start_warp
 from warpflat.core.errors import InputError, expect, expect_callback, nearest
-from warpflat.core.free_memory import return_freed_memory
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.datum import resolve_datum
@@ -33,9 +32,9 @@ from warpflat.solver.multigrid.coarsen import hierarchy_in_background
 from warpflat.solver.options import RelaxOptions, given_options
 from warpflat.surface.io.read import read_surface
 from warpflat.surface.laplacian import factor_pays
-from warpflat.surface.mesh import Surface, is_large
+from warpflat.surface.mesh import Surface
 
-__all__ = ["flatten", "return_memory_of"]
+__all__ = ["flatten"]
 
 
 def flatten(
@@ -190,14 +189,11 @@ def develop_piece(
         model=settings.model,
         wear=settings.wear,
     )
-    return_memory_of(surface)
     has_levels = settings.options.solver == "multilevel" and not factor_pays(surface)
     with hierarchy_in_background(surface) if has_levels else nullcontext():
         development = choose_start(surface, line) if start is None else given_start(surface, line, start)
         development = task.shrink_to_rest(development)
-        return_memory_of(surface)
         network = task.build_network(development.positions)
-    return_memory_of(surface)
     return DevelopedPiece(
         task=task,
         datum_name=line_name,
@@ -260,9 +256,3 @@ def _device(name: str | None) -> wp.Device:
     except Exception as error:
         devices: Sequence[str] = [d.alias for d in wp.get_devices()]
         raise InputError(f"device {name!r} is not available; {nearest(str(name), devices)}") from error
-
-
-def return_memory_of(surface: Surface) -> None:
-    """Return freed memory to the system if the surface has many triangles, whose development frees much."""
-    if is_large(surface) and not surface.is_quad.all():
-        return_freed_memory()

@@ -70,10 +70,6 @@ class Transfer:
         """Keep the function that makes the prolongation."""
         self._make_prolongation = make_prolongation
 
-    def make(self) -> None:
-        """Make prolongation and transpose now."""
-        _ = self.transpose
-
     @cached_property
     def prolongation(self) -> csr_array:
         """The weights of interpolation, #V by #C; rows add up to 1."""

@@ -10,7 +10,6 @@ import warp as wp
 from scipy.sparse import csr_array, eye
 
 from warpflat.core.arrays import FloatArray, IntArray
-from warpflat.core.free_memory import return_freed_memory
 from warpflat.core.launch import launch_each
 from warpflat.kernels.stiffness import sum_strain_fields, weigh_by_direction
 from warpflat.model.network import SpringNetwork
@@ -120,10 +119,6 @@ def drop_caches(network: SpringNetwork, coarse_levels: Sequence[CoarseLevel]) ->
             drop_result(made.surface, half_edges_of)
             if made.surface.is_quad.all():
                 made.spring_arrays.around.drop_numbers()
-        # Make the transfers now, so that the memory they need on the way is returned, too.
-        for level in coarse_levels:
-            level.coarsening.transfer.make()
-        return_freed_memory()
 
 
 def _is_lowest(network: SpringNetwork) -> bool:
