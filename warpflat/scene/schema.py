@@ -297,8 +297,9 @@ class SceneTable(Table):
     """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
-    shape: Literal["none", "darts", "princess"] = "none"
-    """How a form's pieces are shaped: not, by the darts of a pattern book's block, or by seams along the princess lines."""
+    shape: Literal["none", "darts", "princess", "auto"] = "none"
+    """How a form's pieces are shaped: not, by the darts of a pattern book's block, by seams along the princess lines, or by as
+    many of a book's darts as bring the strain within the cloth's limit."""
     ease: str | dict[str, Any] | None = None
     """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
@@ -362,8 +363,8 @@ class SceneTable(Table):
         """Refuse what belongs to a surface."""
         if self.lines or self.datum:
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.auto_cut:
-            raise ValueError('auto_cut belongs to a [surface]; a form has shape = "darts" or "princess"')
+        if self.auto_cut and self.shape == "auto":
+            raise ValueError('give [auto_cut] or shape = "auto"')
         for number, cut in enumerate(self.cuts):
             cut.check_for_form(f"cuts[{number}]")
         for number, seam in enumerate(self.seams):
@@ -405,8 +406,10 @@ class CutTable(Table):
 
     On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
     "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
-    the waist in a skirt, the dart ends. `towards` puts it between two lines, `between` at that share of the way. `mouth_mm` is
-    how wide it opens; the energy that this costs is told. It is `mirrored` unless that is false.
+    the waist in a skirt, the dart ends. `at` names the line on which its mouth lies, as "shoulder left". `towards` puts it
+    between two lines, `between` at that share of the way. `mouth_mm` is how wide it opens, or `like` another dart of its
+    piece; the energy that this costs is told. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts
+    the piece. `omit` leaves out the dart that the form's `shape` has there.
     """
 
     name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
@@ -423,7 +426,15 @@ class CutTable(Table):
     between: Share = 0.5
     tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
     mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
+    like: str | None = None
+    at: str | None = None
+    omit: bool = False
     mirrored: bool = True
+
+    @property
+    def parts_piece(self) -> bool:
+        """Whether it cuts a whole line."""
+        return self.part is not None and set(self.part) == {0.0, 1.0}
 
     def check_for_form(self, where: str) -> None:
         """Refuse what a dart in a form does not have."""
@@ -434,12 +445,28 @@ class CutTable(Table):
             )
         if self.tip_back:
             raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
-        if self.part is not None and (self.tip_mm is not None or self.towards is not None):
-            raise ValueError(f"{where}: give part, or tip_mm and towards")
+        if self.part is not None and (self.tip_mm is not None or self.towards is not None or self.at is not None):
+            raise ValueError(f"{where}: give part, or tip_mm, towards and at")
+        if self.mouth_mm is not None and self.like is not None:
+            raise ValueError(f"{where}: give mouth_mm or like")
+        if self.parts_piece and (self.mouth_mm is not None or self.like is not None):
+            raise ValueError(
+                f"{where}: a cut along the whole line is a seam, which has no mouth; leave out mouth_mm and like"
+            )
 
     def check_for_surface(self, where: str) -> None:
         """Refuse what only a dart in a form has."""
-        given = self.model_fields_set & {"piece", "towards", "between", "tip_mm", "mouth_mm", "mirrored"}
+        given = self.model_fields_set & {
+            "piece",
+            "towards",
+            "between",
+            "tip_mm",
+            "mouth_mm",
+            "like",
+            "at",
+            "omit",
+            "mirrored",
+        }
         if given:
             raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
 
