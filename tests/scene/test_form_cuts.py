@@ -10,10 +10,12 @@ import tomllib
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import make_scene
+from warpflat.scene.run import run_scene
 from warpflat.scene.run_garment import plan_garment, scene_form
 
 BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
@@ -142,3 +144,16 @@ def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.Captur
     best = json.loads((tmp_path / "out/ledger.json").read_text())["entries"][0]["cut"]
     assert tomllib.loads((tmp_path / "out/cuts.toml").read_text())["cuts"] == [best]
     assert "beyond the limit" in capsys.readouterr().out
+
+
+def test_the_advice_of_a_run_can_be_pasted(tmp_path: Path):
+    quiet = {"output": {"frames": 0, "picture": False}, "pattern": {"formats": []}}
+    wear = run_scene(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, **quiet), tmp_path).metrics["pieces"][
+        "front"
+    ]["wear"]
+    best = wear["would_help"][0]
+    assert best["cut"].startswith("a dart along bust, ")
+    assert best["table"]["piece"] == "front"
+    form = scene_form(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, cuts=[best["table"]]))[1]
+    lengths = [arc_lengths(form.vertices[dart.row])[-1] for dart in form.darts]
+    assert lengths == pytest.approx([best["length_m"]] * 2, rel=1e-6)

@@ -97,9 +97,9 @@ def _compare(
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.json_file import write_json
+    from warpflat.core.toml_file import tables_as_toml
     from warpflat.cutting.ledger_picture import write_ledger_picture
     from warpflat.scene.cuts import cuts_of_entry
-    from warpflat.scene.form_cuts import tables_as_toml
     from warpflat.scene.form_ledger import form_ledger, with_cut
     from warpflat.scene.run import files_of_run, run_scene, scene_ledger
 

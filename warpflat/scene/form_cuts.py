@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -14,7 +14,7 @@ from warpflat.mannequin.part_pieces import part_pieces
 from warpflat.scene.load import Scene, make_scene
 from warpflat.scene.schema import CutTable
 
-__all__ = ["cut_form", "cut_of_dart", "scene_with", "tables_as_toml"]
+__all__ = ["cut_form", "cut_of_dart", "scene_with"]
 
 
 def cut_form(mannequin: Mannequin, form: Form, tables: Sequence[CutTable]) -> Form:
@@ -98,23 +98,3 @@ def scene_with(scene: Scene, **tables: Any) -> Scene:
     kept = {key: value for key, value in data.items() if value is not None}
     made = make_scene(kept, name=scene.name, folder=scene.folder, where=scene.where)
     return replace(made, name=scene.name, sources=scene.sources)
-
-
-def tables_as_toml(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
-    """Return arrays of plain tables, as `cuts` and `seams`, as TOML to be pasted into a scene."""
-    return "\n".join(
-        f"[[{name}]]\n" + "".join(f"{key} = {_toml(value)}\n" for key, value in table.items())
-        for name, rows in tables.items()
-        for table in rows
-    )
-
-
-def _toml(value: Any) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
-        return f'"{escaped}"'
-    if isinstance(value, Sequence):
-        return f"[{', '.join(_toml(each) for each in value)}]"
-    return f"{value:.6g}"

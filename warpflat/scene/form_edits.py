@@ -11,10 +11,11 @@ from typing import Any
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
+from warpflat.core.toml_file import tables_as_toml
 from warpflat.garment.form_plan import plan_form
 from warpflat.garment.garment import Garment
 from warpflat.mannequin.darts import FormDart, PlacedDart
-from warpflat.scene.form_cuts import cut_of_dart, scene_with, tables_as_toml
+from warpflat.scene.form_cuts import cut_of_dart, scene_with
 from warpflat.scene.form_ledger import place_of
 from warpflat.scene.form_shaping import settle_shape
 from warpflat.scene.load import Scene

@@ -11,18 +11,21 @@ from warpflat.core.activity import report_activity
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.ease import SeamWish, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.forms import Form, FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.drape import write_drape
-from warpflat.scene.form_cuts import cut_form
+from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
@@ -163,7 +166,6 @@ def run_garment(
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     from warpflat.core.atomic_files import expect_files
-    from warpflat.cutting.remedies import advise
 
     plan = plan_garment(scene, device=device)
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
@@ -172,7 +174,7 @@ def run_garment(
     others = _other_sizes(scene)
     garment = _flatten_with_frames(plan, out, on_progress=on_progress)
     report_activity("measuring how it fits")
-    garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
+    garment = replace(garment, pieces=_advised(plan, garment))
     report = on_progress or (lambda progress: None)
     graded = {
         size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
@@ -180,6 +182,27 @@ def run_garment(
     }
     draped = write_drape(scene, garment, out, device=device)
     return _write_garment(plan, garment, graded, out, draped=draped)
+
+
+def _advised(plan: GarmentPlan, garment: Garment) -> dict[str, Flattening]:
+    """Return the pieces with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
+    from warpflat.cutting.remedies import advise
+
+    layout, recipes = plan.mannequin.layout, scene_recipe(plan.scene, plan.mannequin)[1].pieces
+    found: dict[str, Flattening] = {}
+    for name, piece in garment.pieces.items():
+        advised, cloth = advise(piece), plan.form.pieces[name]
+        bricks = select_bricks(layout, recipes[name].bricks)
+        on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
+        remedies = []
+        for remedy in advised.remedies:
+            row = cloth.grid_vertices[remedy.path]
+            words = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            dart = dart_along(layout, plan.form.vertices, bricks, row, piece=name, name=words)
+            table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
+            remedies.append(replace(remedy, table=table))
+        found[name] = advised.with_remedies(remedies) if remedies else advised
+    return found
 
 
 def _flatten_with_frames(
