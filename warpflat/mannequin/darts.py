@@ -280,6 +280,8 @@ def dart_along(
             for end, way in ((0.0, run), (1.0, run[::-1])):
                 if way[: len(wanted)] != wanted:
                     continue
+                if len(wanted) == len(way):
+                    return FormDart(name=name, piece=piece, line=line, part=(0.0, 1.0))
                 arc = arc_lengths(vertices[way])
                 share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
                 return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))

@@ -205,9 +205,10 @@ def candidate_cuts(base: FormTrial, *, usual_only: bool = False) -> Iterator[dic
             yield cut_of_dart(dart if (dart.piece, dart.like) in names else replace(dart, like=None))
     if usual_only:
         return
-    for name, own in bricks.items():
-        yield from (cut_of_dart(dart) for dart in princess_seams(layout, own, name))
     found: set[tuple[Any, ...]] = set()
+    for dart in (dart for name, own in bricks.items() for dart in princess_seams(layout, own, name)):
+        found.add((dart.piece, dart.line, dart.part))
+        yield cut_of_dart(dart)
     for name, piece in base.garment.pieces.items():
         if all(is_side(brick, "right") for brick in bricks[name]):
             continue
