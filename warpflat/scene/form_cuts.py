@@ -11,8 +11,8 @@ from warpflat.mannequin.darts import FormDart
 from warpflat.mannequin.forms import Form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.part_pieces import part_pieces
+from warpflat.scene.cut_tables import CutTable
 from warpflat.scene.load import Scene, make_scene
-from warpflat.scene.schema import CutTable
 
 __all__ = ["cut_form", "cut_of_dart", "scene_with"]
 
