@@ -90,7 +90,8 @@ def test_a_shoulder_dart_ends_before_the_bust_point():
 
 
 def test_darts_are_made_until_the_cloth_keeps_its_limit():
-    shaped, notes = settle_shape(scene(shape="auto"))
+    front = {"pieces": {"front": {"bricks": ["shoulder-waist/front-*"], "datum": "centre front"}}}
+    shaped, notes = settle_shape(scene(shape="auto", form=front))
     garment = plan_garment(shaped).flatten()
     assert garment.pieces["front"].fit.fits
     made = {(dart.piece, dart.asked.name) for dart in garment.form.darts}
@@ -135,7 +136,8 @@ def test_a_dart_turned_into_gathers_lengthens_its_seam():
 
 
 def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    table = 'form = "bodice"\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[output]\nframes = 0\npicture = false\n'
+    table = '[form.pieces]\nfront = { bricks = ["shoulder-waist/front-*"], datum = "centre front" }\n'
+    table += '[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[output]\nframes = 0\npicture = false\n'
     (tmp_path / "b.toml").write_text(table + "[pattern]\nformats = []\n")
     assert (
         main(["cuts", str(tmp_path / "b.toml"), "--out", str(tmp_path / "out"), "--apply", "1", "--by", "released"])
