@@ -5,6 +5,13 @@
 The scene is `scenes/basic_block.toml`, as it ships. The drafted block was made by another program, FreeSewing's public
 designs `bella` (bodice) and `penelope` (skirt), for EU 38 (bust 880, waist 720, hip 960 mm) with low ease and with ease as
 the designs have it. All values are of half a piece [mm; areas in cm2], a range where these two differ.
+
+    python benchmarks/blocks.py --men
+
+compares the bodice of three men's sizes, without darts and with 5 cm of ease at the chest, with FreeSewing's `brian` 4.10.2 (MIT
+licence), drafted for the lengths and girths of the package's own form and the same ease, its other options as they are. That is
+a boxy block: its side is straight down, and no waist is fitted. Its neck point lies farther from the centre, so its shoulder is
+shorter, and its armhole is cut deeper.
 """
 
 from __future__ import annotations
@@ -47,6 +54,23 @@ DRAFTED: dict[str, tuple[float, float]] = {
 }
 
 
+#: Of `brian` by size: back and front.
+DRAFTED_MEN: dict[str, tuple[dict[str, float], dict[str, float]]] = {
+    "men 46": (
+        {"centre": 423, "shoulder": 139, "side": 197, "width": 242, "neck": 86, "armhole": 211, "area": 945},
+        {"centre": 380, "shoulder": 139, "side": 197, "width": 242, "neck": 109, "armhole": 211, "area": 919},
+    ),
+    "men 50": (
+        {"centre": 426, "shoulder": 139, "side": 197, "width": 262, "neck": 89, "armhole": 225, "area": 1002},
+        {"centre": 380, "shoulder": 139, "side": 197, "width": 262, "neck": 113, "armhole": 225, "area": 973},
+    ),
+    "men 54": (
+        {"centre": 429, "shoulder": 139, "side": 197, "width": 282, "neck": 93, "armhole": 240, "area": 1060},
+        {"centre": 382, "shoulder": 139, "side": 197, "width": 282, "neck": 118, "armhole": 241, "area": 1029},
+    ),
+}
+
+
 def measured(garment: Garment) -> dict[str, float]:
     """Return the values of half a block [mm, cm2]."""
     metrics = garment.metrics()["pieces"]
@@ -62,9 +86,7 @@ def measured(garment: Garment) -> dict[str, float]:
         return 1e3 * sum(found[f"{dart} left"] for dart in darts)
 
     def area(piece: str) -> float:
-        corners = garment.pieces[piece].positions[garment.pieces[piece].faces]
-        x, y = corners[..., 0], corners[..., 1]
-        return 1e4 * 0.25 * float(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)))
+        return half_area(garment, piece)
 
     front, back = "front_bodice", "back_bodice"
     return {
@@ -91,6 +113,42 @@ def measured(garment: Garment) -> dict[str, float]:
     }
 
 
+def half_area(garment: Garment, piece: str) -> float:
+    """Return the area of half a piece [cm2]."""
+    corners = garment.pieces[piece].positions[garment.pieces[piece].faces]
+    x, y = corners[..., 0], corners[..., 1]
+    return 1e4 * 0.25 * float(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)))
+
+
+def compare_men() -> None:
+    """Print the bodices of men's sizes beside drafted ones."""
+    for size, drafted in DRAFTED_MEN.items():
+        table = {"form": "basic_block", "fabric": "woven", "ease": {"preset": "close", "bust": 5.0}}
+        scene = make_scene({**table, "mannequin": {"size": size}}, name="men", folder=Path(), where=str(SCENE))
+        garment = plan_garment(scene).flatten()
+        print(f"{size}: {quality(garment)}")
+        for face, there in zip(("back", "front"), drafted, strict=True):
+            piece = f"{face}_bodice"
+            lines, positions = garment.form.pieces[piece].surface.lines, garment.pieces[piece].positions
+            own = {
+                "centre": f"centre {face}",
+                "shoulder": "shoulder left",
+                "side": "side left",
+                "armhole": "armhole left",
+            }
+            here = {key: 1e3 * polyline_length(positions[lines[line]]) for key, line in own.items()}
+            here |= {
+                key: 5e2 * polyline_length(positions[lines[line]])
+                for key, line in {"width": "bust", "neck": "neck"}.items()
+            }
+            here["area"] = half_area(garment, piece)
+            row = ", ".join(f"{key} {here[key]:.0f} ({value:g})" for key, value in there.items())
+            print(
+                f"  {face}, ours (drafted): {row}; waist {5e2 * polyline_length(positions[lines['waist']]):.0f}",
+                flush=True,
+            )
+
+
 def quality(garment: Garment) -> str:
     """Return one line about flips, seams, girths, strain and price."""
     metrics = garment.metrics()
@@ -109,7 +167,12 @@ def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--sizes", nargs="+", default=SIZES)
-    sizes = parser.parse_args().sizes
+    parser.add_argument("--men", action="store_true", help="men's bodices instead")
+    arguments = parser.parse_args()
+    if arguments.men:
+        compare_men()
+        return
+    sizes = arguments.sizes
     scene = load_scene(SCENE)
     columns: dict[str, dict[str, float]] = {}
     for size in sizes:

@@ -191,7 +191,7 @@ def test_darts_whose_legs_overlap_are_refused(sewn):
         ({"cuts": [{"line": "bust", "piece": "front"}]}, "cuts: dart 'bust': no piece 'front'"),
         ({"cuts": [{"line": "bust", "piece": "front_bodice", "tip_back": 0.02}]}, "give tip_mm"),
         ({"ease": "clos"}, "ease 'clos' is unknown"),
-        ({"auto_cut": {}}, "auto_cut belongs to a"),
+        ({"auto_cut": {}, "shape": "auto"}, r"give \[auto_cut\] or shape"),
     ],
 )
 def test_scenes_that_ask_for_impossible_shapes(tmp_path, more, message):

@@ -1,14 +1,22 @@
-"""`warpflat cuts`: candidates for a cut are compared, and one is made on demand."""
+"""`warpflat cuts`: candidates for a cut are compared, and one is made on demand; darts of a form are rotated, split and turned."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
-from warpflat.cli.options import DONE, EXIT_CODES, ComputingCommand, output_options
+from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, ComputingCommand, output_options
 from warpflat.cli.run import report_run, start_warp_silently
+from warpflat.core.errors import InputError
+
+if TYPE_CHECKING:
+    from warpflat.cutting.ledger import Ledger
+    from warpflat.scene.form_ledger import FormLedger
+    from warpflat.scene.load import Scene
+    from warpflat.scene.write import SceneResult
 
 __all__ = ["cuts"]
 
@@ -23,6 +31,10 @@ __all__ = ["cuts"]
     show_default=True,
     help="What the order goes by: energy released per centimetre cut, or in all.",
 )
+@click.option("--rotate", nargs=2, metavar="DART LINE", help="A form's dart is to lie along another line of its piece.")
+@click.option("--split", nargs=2, metavar="DART LINE", help="A second dart along LINE, or between the dart and LINE.")
+@click.option("--turn", nargs=2, metavar="DART KIND", help="A form's dart becomes a seam, ease, gathers or nothing.")
+@click.option("--at", metavar="LINE", help="Where the mouth of the rotated or second dart lies, as 'shoulder left'.")
 @output_options(printed="ledger.json, with --apply metrics.json,")
 def cuts(
     scene: Path,
@@ -32,46 +44,136 @@ def cuts(
     device: str | None,
     apply: int | None,
     by: Literal["per_cm", "released"],
+    rotate: tuple[str, str] | None,
+    split: tuple[str, str] | None,
+    turn: tuple[str, str] | None,
+    at: str | None,
 ) -> int:
     """Compare cuts: where the energy is, and what each candidate would release.
 
-    Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, and
-    paths that follow the energy. Each is tried with a coarse relaxation, without the scene's seams and constraints;
-    --apply relaxes fully, with them. Writes ledger.json and ledger.png, with --apply all that a run leaves, too.
+    Candidates are the feature lines through or near the peaks of the energy, whole or from the border to the peak, paths
+    that follow the energy and, on a form, the darts of a pattern book. Each is tried with a coarse relaxation, without the
+    scene's seams and constraints; --apply relaxes fully, with them. Writes ledger.json and ledger.png, on a form cuts.toml
+    instead of the picture, and with --apply all that a run leaves, too.
+
+    A form's dart, named as "piece.dart", can be rotated, split or turned into something else. The energies of the sewn
+    garment before and after are told, and the scene's tables that make the change are printed.
 
     \b
     Examples:
       warpflat cuts scenes/bodice.toml
       warpflat cuts scenes/bodice.toml --apply 1 --out cut
+      warpflat cuts scenes/basic_block.toml --rotate "front_bodice.bust dart" "princess front left" --at "shoulder left"
+      warpflat cuts scenes/basic_block.toml --turn "front_bodice.waist dart" seam
     """
-    from warpflat.cli.progress_bar import ProgressBar
-    from warpflat.cli.tables import ledger_table
-    from warpflat.core.atomic_files import output_folder
-    from warpflat.core.json_file import write_json
-    from warpflat.cutting.ledger_picture import write_ledger_picture
-    from warpflat.scene.cuts import cuts_of_entry
     from warpflat.scene.load import load_scene
-    from warpflat.scene.run import files_of_run, run_scene, scene_ledger
 
     loaded = load_scene(scene)
     start_warp_silently()
     target = out if out is not None else Path("out") / loaded.name
-    files = ["ledger.json", "ledger.png", *(files_of_run(loaded) if apply is not None else [])]
-    result = None
-    with (
-        ProgressBar(loaded.name, hidden=quiet or as_json) as bar,
-        output_folder(target, files, sources=loaded.sources) as folder,
-    ):
+    edits = {"rotate": rotate, "split": split, "turn": turn}
+    if any(edits.values()):
+        return _edit(loaded, target, edits, at, quiet=quiet, as_json=as_json, device=device)
+    if at is not None:
+        raise InputError("--at belongs to --rotate and --split")
+    ledger, folder, result = _compare(loaded, target, apply=apply, by=by, hidden=quiet or as_json, device=device)
+    if as_json and result is None:
+        click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
+    elif not (quiet or as_json):
+        _print_ledger(ledger, folder)
+    return DONE if result is None else report_run(result, folder, quiet=quiet, as_json=as_json)
+
+
+def _compare(
+    loaded: Scene,
+    target: Path,
+    *,
+    apply: int | None,
+    by: Literal["per_cm", "released"],
+    hidden: bool,
+    device: str | None,
+) -> tuple[Ledger | FormLedger, Path, SceneResult | None]:
+    """Write the ledger of a scene, and run it with one of its cuts on demand."""
+    from warpflat.cli.progress_bar import ProgressBar
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.json_file import write_json
+    from warpflat.core.toml_file import tables_as_toml
+    from warpflat.cutting.ledger_picture import write_ledger_picture
+    from warpflat.scene.cuts import cuts_of_entry
+    from warpflat.scene.form_ledger import form_ledger, with_cut
+    from warpflat.scene.run import files_of_run, run_scene, scene_ledger
+
+    is_form = loaded.settings.mannequin is not None
+    files = ["ledger.json", "cuts.toml" if is_form else "ledger.png"]
+    files += files_of_run(loaded) if apply is not None else []
+    result: SceneResult | None = None
+    with ProgressBar(loaded.name, hidden=hidden) as bar, output_folder(target, files, sources=loaded.sources) as folder:
+        if is_form:
+            own = form_ledger(loaded, by=by, device=device)
+            write_json(folder / "ledger.json", own.as_dict())
+            tables = [tables_as_toml({"cuts": [entry.cut]}) for entry in own.entries]
+            chosen = tables if apply is None else [tables_as_toml({"cuts": [own.cut(apply)]})]
+            _write_toml(folder, "Cuts, the best first: paste one into the scene.", chosen)
+            if apply is not None:
+                result = run_scene(with_cut(loaded, own.cut(apply)), folder, on_progress=bar, device=device)
+            return own, folder, result
         ledger = scene_ledger(loaded, by=by, device=device)
         write_json(folder / "ledger.json", ledger.as_dict())
         write_ledger_picture(folder / "ledger.png", ledger)
         if apply is not None:
-            sequence = cuts_of_entry(ledger, apply)
-            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=sequence)
-    if as_json and result is None:
-        click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
-    elif not (quiet or as_json):
-        for note in ledger.notes:
-            click.echo(f"warpflat: note: {note}", err=True)
+            result = run_scene(loaded, folder, on_progress=bar, device=device, cuts=cuts_of_entry(ledger, apply))
+        return ledger, folder, result
+
+
+def _print_ledger(ledger: Ledger | FormLedger, folder: Path) -> None:
+    from warpflat.cli.tables import form_ledger_table, ledger_table
+    from warpflat.cutting.ledger import Ledger
+
+    for note in ledger.notes:
+        click.echo(f"warpflat: note: {note}", err=True)
+    if isinstance(ledger, Ledger):
         click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
-    return DONE if result is None else report_run(result, folder, quiet=quiet, as_json=as_json)
+    else:
+        click.echo(f"{form_ledger_table(ledger)}\n{folder}: ledger.json, cuts.toml")
+
+
+def _write_toml(folder: Path, words: str, tables: Sequence[str]) -> None:
+    from warpflat.core.atomic_files import atomic_path
+
+    with atomic_path(folder / "cuts.toml") as temporary:
+        temporary.write_text("\n".join([f"# {words}\n", *tables]), encoding="utf-8")
+
+
+def _edit(
+    scene: Scene,
+    target: Path,
+    edits: Mapping[str, tuple[str, str] | None],
+    at: str | None,
+    *,
+    quiet: bool,
+    as_json: bool,
+    device: str | None,
+) -> int:
+    """Edit a dart, compare the garment before and after, and write `edit.json` and `cuts.toml`."""
+    from warpflat.cli.tables import edit_table
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.json_file import write_json
+    from warpflat.scene.form_edits import edit_dart
+
+    (how, (dart, aim)), *more = [(how, edit) for how, edit in edits.items() if edit]
+    if more:
+        raise InputError(f"--{how} and --{more[0][0]}: give one edit at a time")
+    if how == "turn" and at is not None:
+        raise InputError("--at belongs to --rotate and --split")
+    if scene.settings.mannequin is None:
+        raise InputError(f"{scene.where}: --{how} edits the darts of a form; on a [surface] edit [[cuts]]")
+    with output_folder(target, ["edit.json", "cuts.toml"], sources=scene.sources) as folder:
+        edit = edit_dart(scene, dart, how=how, aim=aim, at=at, device=device)
+        data = edit.as_dict()
+        write_json(folder / "edit.json", data)
+        _write_toml(folder, "The scene's cuts and seams after the edit, instead of its own.", [edit.as_toml()])
+    if as_json:
+        click.echo((folder / "edit.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        click.echo(f"{edit_table(data)}\n\n{edit.as_toml()}\n{folder}: edit.json, cuts.toml")
+    return DONE if data["after"]["converged"] else NOT_CONVERGED

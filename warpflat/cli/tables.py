@@ -14,12 +14,15 @@ if TYPE_CHECKING:
     from warpflat.mannequin.mannequin import Level
     from warpflat.mannequin.nearest_size import SizeDifference
     from warpflat.mannequin.scan_measures import ScanMeasure
+    from warpflat.scene.form_ledger import FormLedger
 
 __all__ = [
     "drape_lines",
+    "edit_table",
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
+    "form_ledger_table",
     "ledger_table",
     "mannequin_table",
     "measures_table",
@@ -258,6 +261,44 @@ def ledger_table(ledger: Ledger) -> str:
     refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
     note = "released and left: model energy, relaxed coarsely"
     return "\n".join([peaks, _aligned(head, rows, left=(1,)), note, *refused])
+
+
+def form_ledger_table(ledger: FormLedger) -> str:
+    """Return the cuts of a form as text, best first, with the numbers that `--apply` takes."""
+    head = ("", "piece", "cut", "per cm", "released", "left", "length", "mouth", "beyond the limit", "flips")
+    rows = [
+        (
+            str(number),
+            str(entry.cut["piece"]),
+            str(entry.cut["name"]),
+            f"{1e3 * entry.per_cm:.2f} mJ",
+            f"{1e3 * entry.released:.3g} mJ",
+            f"{100 * entry.model_energy_after / max(entry.model_energy_before, 1e-300):.0f} %",
+            f"{100 * entry.length:.1f} cm",
+            "seam" if entry.mouth is None else f"{1e3 * entry.mouth:.0f} mm",
+            f"{100 * entry.outside_before:.1f} > {100 * entry.outside_after:.1f} %",
+            str(entry.flipped_faces),
+        )
+        for number, entry in enumerate(ledger.entries, start=1)
+    ]
+    note = "released and left: model energy of the pieces that it changes; both sides of the body are cut"
+    refused = [f"not possible: {name} ({reason})" for name, reason in ledger.refused]
+    return "\n".join([_aligned(head, rows, left=(1, 2)), note, *refused])
+
+
+def edit_table(edit: Mapping[str, Any]) -> str:
+    """Return energies, strain and darts of a garment before and after an edit as text."""
+    before, after = edit["before"], edit["after"]
+    rows = [
+        (f"{words} energy", *(f"{1e3 * each[f'{words}_energy_j']:.4g} mJ" for each in (before, after)))
+        for words in ("strain", "model")
+    ]
+    rows.append(("beyond the limit", *(f"{100 * each['outside']:.1f} %" for each in (before, after))))
+    rows.append(("fits", *("yes" if each["fits"] else "no" for each in (before, after))))
+    for name in dict.fromkeys((*before["mouths_m"], *after["mouths_m"])):
+        widths = (each["mouths_m"].get(name) for each in (before, after))
+        rows.append((name, *("-" if width is None else f"{1e3 * width:.1f} mm" for width in widths)))
+    return _aligned(("", "before", "after"), rows)
 
 
 def fabric_table(fabrics: Iterable[Fabric]) -> str:

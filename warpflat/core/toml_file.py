@@ -1,10 +1,10 @@
-"""TOML files are read and checked against a pydantic model; a mistake becomes one line."""
+"""TOML files are read and checked against a pydantic model; a mistake becomes one line. Plain tables are written as TOML."""
 
 from __future__ import annotations
 
 import sys
 import types
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar, Union, get_args, get_origin
 
@@ -20,7 +20,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "read_toml"]
+__all__ = ["Table", "check_table", "read_toml", "tables_as_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -206,3 +206,23 @@ def _similar_file(path: Path) -> str:
         return ""
     close = difflib.get_close_matches(path.name, names, n=1, cutoff=0.7)
     return f"; did you mean {str(path.parent / close[0])!r}?" if close else ""
+
+
+def tables_as_toml(tables: Mapping[str, Sequence[Mapping[str, Any]]]) -> str:
+    """Return arrays of plain tables, as `cuts` and `seams`, as TOML to be pasted into a scene."""
+    return "\n".join(
+        f"[[{name}]]\n" + "".join(f"{key} = {_toml(value)}\n" for key, value in table.items())
+        for name, rows in tables.items()
+        for table in rows
+    )
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    if isinstance(value, str):
+        escaped = value.replace("\\", "\\\\").replace('"', '\\"')
+        return f'"{escaped}"'
+    if isinstance(value, Sequence):
+        return f"[{', '.join(_toml(each) for each in value)}]"
+    return f"{value:.6g}"

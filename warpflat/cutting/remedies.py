@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from itertools import islice
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,9 +117,9 @@ def _candidates_along_lines(result: Flattening, border: IntArray, worst: int) ->
             continue
         dart = min(row[: nearest + 1], row[nearest:][::-1], key=len)
         if len(dart) > 2 and dart[0] in border and not np.isin(dart[1:], border).any():
-            yield _remedy(result, dart, f"a dart along {name}")
+            yield _remedy(result, dart, f"a dart along {name}", {"line": name, "part": _part(points, row, dart)})
         if row[0] in border and row[-1] in border and not np.isin(row[1:-1], border).any():
-            yield _remedy(result, row, f"a seam along {name}")
+            yield _remedy(result, row, f"a seam along {name}", {"line": name})
 
 
 def _candidates_from_border(result: Flattening, border: IntArray, worst: int) -> Iterator[Remedy]:
@@ -134,7 +134,8 @@ def _candidates_from_border(result: Flattening, border: IntArray, worst: int) ->
         # A shortest path may run along the border first.
         last = int(np.flatnonzero(np.isin(path, border))[-1])
         if len(path) - last > 1:
-            yield _remedy(result, path[last:], "a dart from the border")
+            ends = ([round(x, 5) for x in result.surface.vertices[path[at]].tolist()] for at in (last, -1))
+            yield _remedy(result, path[last:], "a dart from the border", dict(zip(("from", "to"), ends, strict=True)))
 
 
 def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
@@ -150,12 +151,21 @@ def _border_feet(points: FloatArray, border: IntArray, worst: int) -> list[int]:
     return feet
 
 
-def _remedy(result: Flattening, path: NDArray[np.integer], words: str) -> Remedy:
+def _part(points: FloatArray, row: IntArray, dart: IntArray) -> list[float]:
+    """Return the shares of a line's length between which a dart lies, from its mouth."""
+    share = polyline_length(points[dart]) / polyline_length(points[row])
+    return [0.0, round(share, 4)] if dart[0] == row[0] else [1.0, round(1.0 - share, 4)]
+
+
+def _remedy(result: Flattening, path: NDArray[np.integer], words: str, table: Mapping[str, Any]) -> Remedy:
     points = result.surface.vertices[path]
     length = polyline_length(points)
     start, end = (f"({', '.join(f'{100 * x:.0f}' for x in point)})" for point in (points[0], points[-1]))
     return Remedy(
-        words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm", path=path.astype(np.int32), length=length
+        words=f"{words}, {100 * length:.1f} cm, from {start} to {end} cm",
+        path=path.astype(np.int32),
+        length=length,
+        table=table,
     )
 
 

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 from warpflat.core.arrays import IntArray
+from warpflat.core.toml_file import tables_as_toml
 from warpflat.model.fit import TOLERATED, WornFit
 from warpflat.model.wear import Wear
 
@@ -35,16 +36,23 @@ class Remedy:
         path: vertices of the uncut surface.
         length: [m].
         outside: share of the cloth beyond the limit once it is made, by trial and unsewn; None if it was not tried.
+        table: that makes it as one of a scene's `[[cuts]]`; None where a scene cannot.
     """
 
     words: str
     path: IntArray
     length: float
     outside: float | None = None
+    table: Mapping[str, Any] | None = None
 
     def as_dict(self) -> dict[str, Any]:
         """Return the remedy as an entry of `would_help` in `metrics.json`."""
-        return {"cut": self.words, "length_m": self.length, "outside_after": self.outside}
+        return {
+            "cut": self.words,
+            "length_m": self.length,
+            "outside_after": self.outside,
+            **({} if self.table is None else {"table": dict(self.table)}),
+        }
 
 
 def wear_measures(
@@ -139,6 +147,9 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         sewn = "outside_unsewn" in wear
         before = wear["outside_unsewn"] if sewn else wear["outside"]
         lines += [f"  {remedy_words(remedy, before, sewn=sewn)}" for remedy in wear["would_help"]]
+        # The best of them, to be pasted into the scene.
+        tables = [remedy["table"] for remedy in wear["would_help"] if "table" in remedy][:1]
+        lines += [f"    {line}" for line in tables_as_toml({"cuts": tables}).splitlines()]
         if not wear["would_help"]:
             lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
     if lines:

@@ -14,12 +14,12 @@ from warpflat.core.polyline import arc_lengths
 from warpflat.mannequin.halves import is_side
 from warpflat.mannequin.layout import Layout
 
-__all__ = ["FormDart", "PlacedDart", "place_darts", "standard_darts"]
+__all__ = ["FormDart", "PlacedDart", "dart_along", "place_darts", "standard_darts", "usual_darts"]
 
 #: Where darts end unless they say otherwise [mm]: before the bust point along the bust line; below the bust's level in the
 #: front; below it in the back, where it stands for the shoulder blades' level; below the waist in skirts. Aldrich, Metric
-#: Pattern Cutting, and the usual 2 to 3 cm from the bust point.
-_TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0}
+#: Pattern Cutting, and the usual 2 to 3 cm from the bust point. Below the shoulder in the back: Joseph-Armstrong's 3 inches.
+_TIPS = {"bust": 25.0, "front": 20.0, "back": 20.0, "front skirt": 100.0, "back skirt": 130.0, "back shoulder": 75.0}
 #: A skirt's second dart lies half-way from the first to the side and is this share as long.
 _SECOND = 0.9
 
@@ -32,10 +32,13 @@ class FormDart:
         name: of the dart; with its mirror image "NAME left" and "NAME right".
         piece: name of the piece that gets it.
         line: the feature line along which it lies.
+        at: the line on which its mouth lies, where the line along which it lies has two ends on the border; None for the side
+            or the waist.
         towards: another line: it lies between the two, at the share `between` of the way. Only for lines that run up and down.
         between: 0 to 1.
         part: shares of the line's length within the piece, from the mouth, 0 or 1, to the tip; None for the default.
-        tip_mm: how far before the bust point, or below the waist in a skirt, it ends [mm]; None for the default.
+        tip_mm: how far before the bust point, or below the waist in a skirt or the shoulder in a back, it ends [mm]; None for
+            the default.
         mirrored: its mirror image is a dart, too, in the same piece or in the mirror image of that.
         mouth_mm: how wide it opens at the border [mm]; None leaves it to the cloth.
         like: name of another dart of the piece that opens as wide; None leaves it to the cloth.
@@ -51,6 +54,17 @@ class FormDart:
     mirrored: bool = True
     mouth_mm: float | None = None
     like: str | None = None
+    at: str | None = None
+
+    @property
+    def place(self) -> tuple[str, str, str | None, str | None]:
+        """Where it lies: no piece has two darts there."""
+        return self.piece, self.line, self.towards, self.at
+
+    @property
+    def parts_piece(self) -> bool:
+        """Whether it is a cut along the whole line, which parts its piece."""
+        return self.part is not None and set(self.part) == {0.0, 1.0}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -247,6 +261,51 @@ def _part_of(vertices: FloatArray, run: list[int], dart: FormDart) -> list[int]:
     return run[: max(1, int(np.abs(arc - last * arc[-1]).argmin())) + 1]
 
 
+def dart_along(
+    layout: Layout, vertices: FloatArray, bricks: Sequence[str], row: IntArray, *, piece: str, name: str
+) -> FormDart | None:
+    """Return the dart, or the cut along a whole line, that slits a row of vertices of a piece; None if no line runs there.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        bricks: of the piece, both sides of the body.
+        row: the mannequin's vertices, from the border.
+        piece, name: for the dart.
+    """
+    cloth, ids = _cloth(layout, bricks), row.tolist()
+    for wanted in (layout.mirror[row].tolist(), ids) if not _lies_left(layout, row) else (ids,):
+        for line in layout.lines:
+            run = _longest_run(layout.lines[line].tolist(), cloth)
+            for end, way in ((0.0, run), (1.0, run[::-1])):
+                if way[: len(wanted)] != wanted:
+                    continue
+                if len(wanted) == len(way):
+                    return FormDart(name=name, piece=piece, line=line, part=(0.0, 1.0))
+                arc = arc_lengths(vertices[way])
+                share = round(float(arc[len(wanted) - 1] / arc[-1]), 3)
+                return FormDart(name=name, piece=piece, line=line, part=(end, abs(end - share)))
+    return None
+
+
+def usual_darts(layout: Layout, vertices: FloatArray, bricks: Mapping[str, Sequence[str]]) -> tuple[FormDart, ...]:
+    """Return every dart that a book knows in the pieces, once a side: those of the block, and from the shoulders.
+
+    Args:
+        layout, vertices: of the form, #V by 3 [m].
+        bricks: by piece, both sides of the body.
+    """
+    found = list(standard_darts(layout, bricks))
+    for piece in bricks:
+        for face in ("front", "back"):
+            dart = FormDart(name="shoulder dart", piece=piece, line=f"princess {face} left", at="shoulder left")
+            try:
+                place_darts(layout, vertices, bricks, [dart])
+            except InputError:
+                continue
+            found.append(dart)
+    return tuple(found)
+
+
 def _bust_mouth(layout: Layout, cloth: _Cloth, line: str) -> list[int] | None:
     """Return the run of the bust line from the left side of a front piece; None if it does not run from there to a bust point."""
     run = _longest_run(layout.lines[line].tolist(), cloth)
@@ -261,24 +320,58 @@ def _bust_mouth(layout: Layout, cloth: _Cloth, line: str) -> list[int] | None:
 def _default_run(
     layout: Layout, vertices: FloatArray, cloth: _Cloth, run: list[int], dart: FormDart
 ) -> tuple[list[int], int | None, float]:
-    """Return a run from the mouth, the vertex that the dart points to (None in a skirt), and the dart's length [m]."""
-    if dart.line == "bust" and (from_side := _bust_mouth(layout, cloth, "bust")) is not None:
-        apex = int(layout.rings[layout.level_row["bust"], layout.to_princess])
-        reach = float(arc_lengths(vertices[from_side[: from_side.index(apex) + 1]])[-1])
-        return from_side, apex, reach - _tip(dart, "bust")
+    """Return a run from the mouth, the vertex that the dart points to (None for a plain length), and the dart's length [m]."""
     waist = set(layout.lines["waist"].tolist())
+    if dart.at is not None:
+        run = _from_line(layout, run, dart, dart.at)
+    elif dart.line == "bust":
+        run = _bust_mouth(layout, cloth, "bust") or run
+    elif run[-1] in waist and run[0] not in waist:
+        run = run[::-1]
     face = "front" if "front" in dart.line else "back"
-    if run[-1] in waist and run[0] not in waist:
+    shoulder = any(line.startswith("shoulder") for line in _lines_at(layout, run[0]))
+    if shoulder and face == "back":
+        return run, None, _tip(dart, "back shoulder")
+    if (point := _point_of(layout, run, dart)) is not None and (dart.line == "bust" or shoulder or run[0] in waist):
+        reach = float(arc_lengths(vertices[run[: run.index(point) + 1]])[-1])
+        return run, point, reach - _tip(dart, "bust" if dart.line == "bust" else face)
+    if run[0] in waist and point is None:
         short = _SECOND if dart.towards is not None else 1.0
-        return run[::-1], None, _tip(dart, f"{face} skirt") * (short if dart.tip_mm is None else 1.0)
-    bust = [v for v in run if v in set(layout.lines["bust"].tolist())]
-    if run[0] in waist and bust:
-        reach = float(arc_lengths(vertices[run[: run.index(bust[0]) + 1]])[-1])
-        return run, bust[0], reach - _tip(dart, face)
+        return run, None, _tip(dart, f"{face} skirt") * (short if dart.tip_mm is None else 1.0)
     raise InputError(
         f"dart {dart.name!r}: no usual dart lies along {dart.line!r} in piece {dart.piece!r}; give its part, "
         "from the mouth to the tip, as part = [0, 0.3]"
     )
+
+
+def _point_of(layout: Layout, run: list[int], dart: FormDart) -> int | None:
+    """Return the vertex inside a run to which darts point: a bust point along the bust line, else that of the bust's level."""
+    row = layout.rings[layout.level_row["bust"]]
+    apexes = {int(row[layout.to_princess]), int(layout.mirror[row[layout.to_princess]])}
+    there = apexes if dart.line == "bust" else set(layout.lines["bust"].tolist())
+    return next((vertex for vertex in run[2:-1] if vertex in there), None)
+
+
+def _from_line(layout: Layout, run: list[int], dart: FormDart, line: str) -> list[int]:
+    """Return a run in the direction from the line on which the mouth of the dart is to lie.
+
+    Raises:
+        InputError: that line is unknown, or the run does not end on it.
+    """
+    if line not in layout.lines:
+        raise InputError(f"dart {dart.name!r}: line {line!r} is unknown: {nearest(line, layout.lines)}")
+    there = set(layout.lines[line].tolist())
+    if not {run[0], run[-1]} & there:
+        ends = sorted({name for end in (run[0], run[-1]) for name in _lines_at(layout, end)} - {dart.line})
+        raise InputError(
+            f"dart {dart.name!r}: line {dart.line!r} does not end at {line!r} in piece {dart.piece!r}; it ends at "
+            f"{', '.join(ends)}"
+        )
+    return run if run[0] in there else run[::-1]
+
+
+def _lines_at(layout: Layout, vertex: int) -> list[str]:
+    return [line for line, ids in layout.lines.items() if vertex in ids]
 
 
 def _tip(dart: FormDart, kind: str) -> float:

@@ -41,11 +41,15 @@ def compare_fabrics(
     Raises:
         InputError: fewer than two fabrics, one given twice or unknown, or the scene is wrong.
     """
+    from warpflat.scene.form_shaping import settle_shape
+
     if len(fabrics) < 2:
         raise InputError(
             f"{len(fabrics)} fabric given to compare; name two or more, such as --fabric denim --fabric jersey"
         )
     dressed = {}
+    # In the scene's own fabric, so that all patterns have the same darts.
+    scene, _ = settle_shape(scene, device=device)
     for name in fabrics:
         one = replace(scene, settings=scene.settings.model_copy(update={"fabric": name}))
         fabric = scene_fabric(one)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 from warpflat.core.arrays import IntArray
-from warpflat.scene.schema import AutoCutTable, CutTable
+from warpflat.scene.cut_tables import AutoCutTable, CutTable
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan

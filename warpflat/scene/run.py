@@ -55,7 +55,7 @@ def run_scene(
         out: folder for the files, made if need be.
         on_progress: called after each step.
         device: Warp device, before the scene's own.
-        cuts: to be made instead of the scene's own (see `warpflat.scene.cuts.cuts_of_entry`).
+        cuts: of a surface, to be made instead of the scene's own (see `warpflat.scene.cuts.cuts_of_entry`).
 
     Raises:
         InputError: the surface, a line, a cut, the fabric or a setting is wrong, `out` cannot be written, or a file there that the scene
@@ -68,9 +68,12 @@ def run_scene(
     with output_folder(out, files_of_run(scene), sources=sources) as folder:
         require_own_metrics(folder)
         if scene.settings.mannequin is not None:
+            from warpflat.scene.form_shaping import settle_shape
             from warpflat.scene.run_garment import run_garment
 
-            return run_garment(scene, folder, on_progress=on_progress, device=device)
+            scene, notes = settle_shape(scene, device=device)
+            result = run_garment(scene, folder, on_progress=on_progress, device=device)
+            return replace(result, notes=(*notes, *result.notes))
         return _run_surface(scene, folder, on_progress=on_progress, device=device, cuts=cuts)
 
 
@@ -269,7 +272,7 @@ def scene_ledger(scene: Scene, *, by: Literal["per_cm", "released"] = "per_cm", 
     from warpflat.scene.cuts import flatten_and_cut
 
     if scene.settings.mannequin is not None:
-        raise InputError(f"{scene.where}: cuts are compared on a [surface], not on the pieces of a form")
+        raise InputError(f"{scene.where}: is a form; warpflat.scene.form_ledger compares its cuts")
     relax = scene_relax_options(scene)
     sequence = scene_cuts(scene, device=device)
     with errors_named(scene.where):

@@ -12,30 +12,43 @@ from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.fabric.library import as_fabric
 from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.pattern_files import PatternOptions, garment_files
-from warpflat.mannequin.darts import FormDart
+from warpflat.mannequin.bricks import select_bricks
+from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.ease import ease_from
-from warpflat.mannequin.forms import FormResult, form_from_mapping, shipped_form
+from warpflat.mannequin.forms import Form, FormResult, form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.drape import write_drape
+from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.pattern_options import pattern_options
-from warpflat.scene.schema import CutTable
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult, review_files
 
-__all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form"]
+__all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
 
 def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, FormResult]:
     """Build the pieces of the scene's form on its mannequin, or on another one; return both.
+
+    Raises:
+        InputError: the body, the form or a brick is wrong.
+    """
+    mannequin, form = scene_recipe(scene, mannequin)
+    with errors_named(f"{scene.where}: {'cuts' if scene.settings.cuts else 'form'}"):
+        return mannequin, mannequin.form(form, half=scene.settings.half)
+
+
+def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mannequin, Form]:
+    """Return the scene's mannequin, or the one that is given, and its form with its cuts, not yet built on it.
 
     Raises:
         InputError: the body, the form or a brick is wrong.
@@ -55,36 +68,10 @@ def scene_form(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Manneq
     if settings.ease is not None:
         form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
     with errors_named(f"{scene.where}: form"):
-        form = shaped_form(mannequin.layout, form, settings.shape)
+        form = shaped_form(mannequin.layout, form, "darts" if settings.shape == "auto" else settings.shape)
     # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
     with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
-        form = replace(form, darts=_with_cuts(form.darts, settings.cuts))
-        return mannequin, mannequin.form(form, half=settings.half)
-
-
-def _with_cuts(darts: Sequence[FormDart], tables: Sequence[CutTable]) -> tuple[FormDart, ...]:
-    """Return a form's darts with those of a scene; one along the same line in the same piece replaces the form's."""
-    asked = [
-        FormDart(
-            name=table.name or f"{table.line}".removesuffix(" left").removesuffix(" right"),
-            piece=table.piece or "",
-            line=table.line or "",
-            towards=table.towards,
-            between=table.between,
-            part=None if table.part is None else (table.part[0], table.part[1]),
-            tip_mm=table.tip_mm,
-            mirrored=table.mirrored,
-            mouth_mm=table.mouth_mm,
-        )
-        for table in tables
-    ]
-    places = {(dart.piece, dart.line, dart.towards): dart for dart in asked}
-    kept = []
-    for dart in darts:
-        other = places.get((dart.piece, dart.line, dart.towards))
-        kept.append(dart if other is None else replace(other, name=dart.name))
-    own = {(dart.piece, dart.line, dart.towards) for dart in darts}
-    return (*kept, *(dart for place, dart in places.items() if place not in own))
+        return mannequin, cut_form(mannequin, form, settings.cuts)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -181,7 +168,6 @@ def run_garment(
 ) -> SceneResult:
     """Run a scene whose pieces are a form on a mannequin; see :func:`warpflat.scene.run.run_scene`."""
     from warpflat.core.atomic_files import expect_files
-    from warpflat.cutting.remedies import advise
 
     plan = plan_garment(scene, device=device)
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
@@ -190,7 +176,7 @@ def run_garment(
     others = _other_sizes(scene)
     garment = _flatten_with_frames(plan, out, on_progress=on_progress)
     report_activity("measuring how it fits")
-    garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
+    garment = replace(garment, pieces=_advised(plan, garment))
     report = on_progress or (lambda progress: None)
     graded = {
         size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
@@ -198,6 +184,27 @@ def run_garment(
     }
     draped = write_drape(scene, garment, out, device=device)
     return _write_garment(plan, garment, graded, out, draped=draped)
+
+
+def _advised(plan: GarmentPlan, garment: Garment) -> dict[str, Flattening]:
+    """Return the pieces with cuts that would help, each with the table of a scene's `[[cuts]]` that makes it, if one can."""
+    from warpflat.cutting.remedies import advise
+
+    layout, recipes = plan.mannequin.layout, scene_recipe(plan.scene, plan.mannequin)[1].pieces
+    found: dict[str, Flattening] = {}
+    for name, piece in garment.pieces.items():
+        advised, cloth = advise(piece), plan.form.pieces[name]
+        bricks = select_bricks(layout, recipes[name].bricks)
+        on_fold = () if cloth.fold is None else cloth.grid_vertices[cloth.edges[cloth.fold]].tolist()
+        remedies = []
+        for remedy in advised.remedies:
+            row = cloth.grid_vertices[remedy.path]
+            words = remedy.words.split(",")[0].removeprefix("a ").removesuffix(" left").removesuffix(" right")
+            dart = dart_along(layout, plan.form.vertices, bricks, row, piece=name, name=words)
+            table = None if dart is None or row[-1] in on_fold else cut_of_dart(dart)
+            remedies.append(replace(remedy, table=table))
+        found[name] = advised.with_remedies(remedies) if remedies else advised
+    return found
 
 
 def _flatten_with_frames(

@@ -23,46 +23,23 @@ from warpflat.core.toml_file import Table
 from warpflat.fabric.fabric import DEFAULT_FABRIC
 from warpflat.fabric.file import FabricTable
 from warpflat.mannequin.table import MannequinTable
+from warpflat.scene.cut_tables import AutoCutTable, CutTable, PlaneTable, Point, PointOrVertex, Vertex
 from warpflat.solver.options import RelaxOptions
 
 __all__ = [
-    "AutoCutTable",
     "BorderTable",
     "ConstraintTable",
-    "CutPlane",
-    "CutTable",
     "FileSurface",
     "LineTable",
     "MarkerTable",
     "OutputTable",
     "PatternTable",
-    "PlaneTable",
-    "Point",
-    "PointOrVertex",
     "SceneTable",
     "SeamTable",
     "ShapeSurface",
-    "Share",
-    "Vertex",
     "kind_of_surface",
     "text_or_table",
 ]
-
-# The square of a much larger coordinate overflows.
-Coordinate = Annotated[float, Field(ge=-1e6, le=1e6)]
-Point = Annotated[list[Coordinate], Field(min_length=3, max_length=3)]
-Vertex = Annotated[int, Field(ge=0)]
-PointOrVertex = Annotated[
-    Annotated[Point, Tag("point")] | Annotated[Vertex, Tag("vertex")],
-    Discriminator(lambda value: "point" if isinstance(value, list) else "vertex"),
-]
-
-
-class PlaneTable(Table):
-    """A plane by a point on it [m] and its normal (any length)."""
-
-    point: Point
-    normal: Point
 
 
 def _as_component(value: Any) -> Any:
@@ -298,8 +275,9 @@ class SceneTable(Table):
     """A form's name, or a table of your own (see `warpflat.form_from_mapping`)."""
     half: bool = False
     """Symmetric pieces as their left half, on the fold."""
-    shape: Literal["none", "darts", "princess"] = "none"
-    """How a form's pieces are shaped: not, by the darts of a pattern book's block, or by seams along the princess lines."""
+    shape: Literal["none", "darts", "princess", "auto"] = "none"
+    """How a form's pieces are shaped: not, by the darts of a pattern book's block, by seams along the princess lines, or by as
+    many of a book's darts as bring the strain within the cloth's limit."""
     ease: str | dict[str, Any] | None = None
     """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
@@ -363,8 +341,8 @@ class SceneTable(Table):
         """Refuse what belongs to a surface."""
         if self.lines or self.datum:
             raise ValueError("lines and datum belong to a [surface]; a form's pieces have their own")
-        if self.auto_cut:
-            raise ValueError('auto_cut belongs to a [surface]; a form has shape = "darts" or "princess"')
+        if self.auto_cut and self.shape == "auto":
+            raise ValueError('give [auto_cut] or shape = "auto"')
         for number, cut in enumerate(self.cuts):
             cut.check_for_form(f"cuts[{number}]")
         for number, seam in enumerate(self.seams):
@@ -383,88 +361,3 @@ class SceneTable(Table):
             raise ValueError(
                 "pattern.sizes are of the tables, as they are: leave out [mannequin.measurements], or pattern.sizes"
             )
-
-
-Share = Annotated[float, Field(ge=0.0, le=1.0)]
-
-
-class CutPlane(PlaneTable):
-    """A plane through a point [m], as given and all through; of several curves the nearest to the point.
-
-    With `towards` only the part from the point, which then lies on the piece, in that direction to the border.
-    """
-
-    towards: Point | None = None
-
-
-class CutTable(Table):
-    """A cut, given in one of three ways. Vertices count those of the file, from 0; points are in metres.
-
-    `line` names a feature line, of which `part` takes a part by shares of its length; `from` and `to` are the ends of the
-    straightest path on the surface, `through` places on its way; `plane` cuts as a ruler lies. The faces that a path
-    between points or along a plane runs through are divided. Tables with one `name` are one cut.
-
-    On a form a cut is a dart in one `piece`, along a `line` of it, from the border to its tip. Lines of a book's darts ("bust",
-    "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
-    the waist in a skirt, the dart ends. `towards` puts it between two lines, `between` at that share of the way. `mouth_mm` is
-    how wide it opens; the energy that this costs is told. It is `mirrored` unless that is false.
-    """
-
-    name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
-    line: str | None = None
-    part: Annotated[list[Share], Field(min_length=2, max_length=2)] | None = None
-    from_: PointOrVertex | None = Field(default=None, alias="from")
-    to: PointOrVertex | None = None
-    through: list[PointOrVertex] = Field(default_factory=list)
-    plane: CutPlane | None = None
-    tip_back: Annotated[float, Field(ge=0.0)] = 0.0
-    """How far the tips of its darts are drawn back, [m]."""
-    piece: str | None = None
-    towards: str | None = None
-    between: Share = 0.5
-    tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
-    mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
-    mirrored: bool = True
-
-    def check_for_form(self, where: str) -> None:
-        """Refuse what a dart in a form does not have."""
-        if self.line is None or self.piece is None:
-            raise ValueError(
-                f"{where}: on a form a dart needs its piece and a line of it, as "
-                'piece = "front_bodice", line = "princess front left"'
-            )
-        if self.tip_back:
-            raise ValueError(f"{where}: tip_back belongs to a [surface]; on a form give tip_mm")
-        if self.part is not None and (self.tip_mm is not None or self.towards is not None):
-            raise ValueError(f"{where}: give part, or tip_mm and towards")
-
-    def check_for_surface(self, where: str) -> None:
-        """Refuse what only a dart in a form has."""
-        given = self.model_fields_set & {"piece", "towards", "between", "tip_mm", "mouth_mm", "mirrored"}
-        if given:
-            raise ValueError(f"{where}: {sorted(given)[0]} belongs to a form's darts; leave it out on a [surface]")
-
-    @model_validator(mode="after")
-    def _one_way(self) -> CutTable:
-        if (self.from_ is None) != (self.to is None):
-            raise ValueError("a path needs both from and to")
-        if sum(way is not None for way in (self.line, self.from_, self.plane)) != 1:
-            raise ValueError("give the cut in one way: line, from and to, or plane")
-        if self.part is not None and self.line is None:
-            raise ValueError("part takes a part of a line; give line")
-        if self.through and self.from_ is None:
-            raise ValueError("through lists places between from and to; give both")
-        return self
-
-
-class AutoCutTable(Table):
-    """Cutting by itself: the best of all candidates, again and again until it is enough (see `warpflat cuts`)."""
-
-    max_cuts: Annotated[int, Field(ge=1, le=20)] = 2
-    """At most so many; a mirrored pair counts as one."""
-    stop_below: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of at most this model energy needs no further cut [J]."""
-    stop_below_strain: Annotated[float, Field(ge=0.0)] = 0.0
-    """A piece of which 98 % is strained by at most this share along warp and weft, as worn, needs no further cut."""
-    by: Literal["released", "per_cm"] = "released"
-    """What makes a cut the best: the energy it releases in all, or per centimetre."""

@@ -1,0 +1,161 @@
+"""Cuts of a scene's form: compared, made by themselves, and edited."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+import tomllib
+
+from warpflat.cli.main import main
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths
+from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart
+from warpflat.scene.form_ledger import form_ledger, with_cut
+from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.load import make_scene
+from warpflat.scene.run import run_scene
+from warpflat.scene.run_garment import plan_garment, scene_form
+
+BODICE = {"form": "bodice", "mannequin": {"size": "EU 38", "resolution_mm": 40}}
+FRONT = {"piece": "front", "line": "princess front left"}
+
+
+def scene(**tables: object):
+    return make_scene({**BODICE, **tables}, name="trial", folder=Path(), where="trial.toml")
+
+
+@pytest.fixture(scope="module")
+def ledger():
+    return form_ledger(scene(), by="released")
+
+
+def test_the_ledger_knows_the_darts_of_a_book_and_what_they_release(ledger):
+    entries = {(entry.cut["piece"], entry.cut["name"]): entry for entry in ledger.entries}
+    bust = entries["front", "bust dart"]
+    assert bust.released > 0.5 * bust.model_energy_before
+    assert bust.outside_after < bust.outside_before
+    assert 0.05 < bust.mouth < 0.11
+
+    assert entries["front", "princess seam"].released > bust.released
+    assert [entry.can_be_sewn for entry in ledger.entries] == sorted(
+        (entry.can_be_sewn for entry in ledger.entries), reverse=True
+    )
+
+
+def test_a_trial_tells_the_energy_of_the_piece_in_the_garment(ledger):
+    entry = next(
+        entry for entry in ledger.entries if entry.cut["name"] == "waist dart" and entry.cut["piece"] == "front"
+    )
+    garment = plan_garment(with_cut(scene(), entry.cut)).flatten()
+    assert garment.sewn.converged
+    # Sewn to the back it stores a little more.
+    alone, sewn = entry.model_energy_after, garment.pieces["front"].stages[-1].model_energy_j
+    assert alone < 1.01 * sewn
+    assert sewn < 1.3 * alone
+
+
+def test_a_whole_line_is_a_seam_that_parts_the_piece_and_takes_over_its_darts():
+    cuts = [{**FRONT, "part": [0, 1]}]
+    form = scene_form(scene(shape="darts", cuts=cuts))[1]
+    assert list(form.pieces) == ["front_centre", "front_side_left", "front_side_right", "back"]
+    assert {dart.piece for dart in form.darts} == {"back"}
+    seam = next(seam for seam in form.seams if seam.name == "princess front left")
+    assert set(seam.pieces) == {"front_side_left", "front_centre"}
+    halves = scene_form(scene(half=True, cuts=cuts))[1]
+    assert list(halves.pieces) == ["front_centre", "front_side_left", "back"]
+
+
+@pytest.mark.parametrize(
+    ("cut", "message"),
+    [
+        ({**FRONT, "at": "shoulder lef"}, "line 'shoulder lef' is unknown"),
+        ({**FRONT, "at": "neck"}, "does not end at 'neck' in piece 'front'; it ends at .*shoulder left"),
+        ({**FRONT, "omit": True}, "the form has none along 'princess front left'"),
+        ({"piece": "front", "line": "hip", "part": [0, 1]}, "'hip' do not part piece 'front'"),
+        ({**FRONT, "part": [0, 1], "mouth_mm": 20}, "is a seam, which has no mouth"),
+    ],
+)
+def test_cuts_that_cannot_be(cut, message):
+    with pytest.raises(InputError, match=message):
+        scene_form(scene(cuts=[cut]))
+
+
+def test_a_shoulder_dart_ends_before_the_bust_point():
+    form = scene_form(scene(cuts=[{**FRONT, "at": "shoulder left", "tip_mm": 30}]))[1]
+    dart = next(dart for dart in form.darts if dart.name.endswith("left"))
+    assert form.vertices[dart.row[0], 1] > form.vertices[dart.row[-1], 1]
+    assert dart.to_point == pytest.approx(0.030, abs=0.0125)
+
+
+def test_darts_are_made_until_the_cloth_keeps_its_limit():
+    front = {"pieces": {"front": {"bricks": ["shoulder-waist/front-*"], "datum": "centre front"}}}
+    shaped, notes = settle_shape(scene(shape="auto", form=front))
+    garment = plan_garment(shaped).flatten()
+    assert garment.pieces["front"].fit.fits
+    made = {(dart.piece, dart.asked.name) for dart in garment.form.darts}
+    assert ("front", "bust dart") in made
+    assert len(made) < 4
+    assert "front.bust dart along bust releases" in notes[0]
+
+
+def test_auto_cut_leaves_pieces_that_have_enough():
+    enough, notes = settle_shape(scene(auto_cut={"stop_below": 10.0}))
+    assert enough.settings.cuts == []
+    assert notes == ("no cut was found that would help",)
+
+
+def test_edits_are_other_tables():
+    darted = scene(shape="darts", cuts=[{**FRONT, "mouth_mm": 40}])
+    rotated = rotate_dart(darted, "front.bust dart", "princess front left", at="shoulder left")
+    assert {d.name for d in scene_form(rotated)[1].darts if d.piece == "front"} == {
+        f"{name} {side}" for name in ("waist dart", "princess front dart") for side in ("left", "right")
+    }
+    split = split_dart(darted, "front.waist dart", "side left")
+    mouths = {dart.name: dart.asked.mouth_mm for dart in scene_form(split)[1].darts if dart.piece == "front"}
+    assert mouths["waist dart left"] == mouths["second waist dart left"] == 20
+    with pytest.raises(InputError, match=r"there is no dart 'front\.dart'"):
+        rotate_dart(darted, "front.dart", "bust")
+
+
+def test_a_dart_turned_into_gathers_lengthens_its_seam():
+    edit = edit_dart(
+        scene(cuts=[{"piece": "front", "line": "bust", "name": "bust dart"}]),
+        "front.bust dart",
+        how="turn",
+        aim="gathers",
+    )
+    data = edit.as_dict()
+    assert data["before"]["model_energy_j"] < data["after"]["model_energy_j"]
+    mouth = data["before"]["mouths_m"]["front.bust dart left"]
+    side = next(seam for seam in edit.after.seams if seam.name == "side left")
+    longer, shorter = max(side.lengths), min(side.lengths)
+    assert longer - shorter == pytest.approx(mouth, rel=0.1)
+    assert tomllib.loads(data["toml"])["seams"][0]["longer"] == "front"
+
+
+def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
+    table = '[form.pieces]\nfront = { bricks = ["shoulder-waist/front-*"], datum = "centre front" }\n'
+    table += '[mannequin]\nsize = "EU 38"\nresolution_mm = 40\n[output]\nframes = 0\npicture = false\n'
+    (tmp_path / "b.toml").write_text(table + "[pattern]\nformats = []\n")
+    assert (
+        main(["cuts", str(tmp_path / "b.toml"), "--out", str(tmp_path / "out"), "--apply", "1", "--by", "released"])
+        == 0
+    )
+    best = json.loads((tmp_path / "out/ledger.json").read_text())["entries"][0]["cut"]
+    assert tomllib.loads((tmp_path / "out/cuts.toml").read_text())["cuts"] == [best]
+    assert "beyond the limit" in capsys.readouterr().out
+
+
+def test_the_advice_of_a_run_can_be_pasted(tmp_path: Path):
+    quiet = {"output": {"frames": 0, "picture": False}, "pattern": {"formats": []}}
+    wear = run_scene(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, **quiet), tmp_path).metrics["pieces"][
+        "front"
+    ]["wear"]
+    best = wear["would_help"][0]
+    assert best["cut"].startswith("a dart along bust, ")
+    assert best["table"]["piece"] == "front"
+    form = scene_form(scene(mannequin={"size": "EU 38", "resolution_mm": 20}, cuts=[best["table"]]))[1]
+    lengths = [arc_lengths(form.vertices[dart.row])[-1] for dart in form.darts]
+    assert lengths == pytest.approx([best["length_m"]] * 2, rel=1e-6)
