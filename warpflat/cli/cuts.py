@@ -28,6 +28,7 @@ def cuts(
     scene: Path,
     out: Path | None,
     quiet: bool,
+    verbose: bool,
     as_json: bool,
     device: str | None,
     apply: int | None,
@@ -74,4 +75,4 @@ def cuts(
         for note in ledger.notes:
             click.echo(f"warpflat: note: {note}", err=True)
         click.echo(f"{ledger_table(ledger)}\n{folder}: ledger.json, ledger.png")
-    return DONE if result is None else report_run(result, folder, quiet=quiet, as_json=as_json)
+    return DONE if result is None else report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
