@@ -140,6 +140,8 @@ class PieceEntry(Entry):
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
     paired: bool
+    title: Text = ""
+    printed_units: Literal["mm", "cm", "in"] = "cm"
     frame: Annotated[list[Row], Field(min_length=2, max_length=2)]
     edges: Annotated[list[EdgeEntry], Field(min_length=1)]
     cut_line: Ring
@@ -171,7 +173,9 @@ class StitchEntry(Entry):
     name: Name
     kind: Literal["seam", "dart"]
     ease: float
-    eased: tuple[float, float] = (0.0, 1.0)
+    eased: Annotated[list[Annotated[float, Field(ge=0, le=1)]], Field(min_length=2, max_length=2)] = Field(
+        default_factory=lambda: [0.0, 1.0]
+    )
     sides: Annotated[list[Annotated[list[SideEntry], Field(min_length=1)]], Field(min_length=2, max_length=2)]
 
 
