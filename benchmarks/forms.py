@@ -81,7 +81,7 @@ def measure(garment: Garment, inside: float) -> str:
 
 def cap_ease_mm(garment: Garment) -> float:
     """Return what the left cap has more than its armhole [mm]."""
-    armhole, cap = np.sum([seam.lengths for seam in garment.seams if seam.name.startswith("armhole left")], axis=0)
+    armhole, cap = np.sum([seam.lengths for seam in garment.seams if seam.name.endswith("armhole left")], axis=0)
     return 1000.0 * float(cap - armhole)
 
 

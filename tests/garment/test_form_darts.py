@@ -124,9 +124,9 @@ def test_the_front_wants_its_darts(body, sewn):
 def test_the_pattern_has_darts_and_whole_seams(sewn):
     pattern, _ = pattern_of_garment({"": sewn}, name="block")
     seams = {seam.name: seam for seam in pattern.seams}
-    assert [side.edge for side in seams["waist"].sides[0]] == ["waist", "waist 2", "waist 3"]
+    assert [side.edge for side in seams["front waist"].sides[0]] == ["waist", "waist 2", "waist 3"]
     assert {dart.name for dart in pattern.piece("front_bodice", "").darts} >= {"bust dart left", "waist dart right"}
-    lengths = [sum(pattern.piece(s.piece, "").edge(s.edge).length for s in side) for side in seams["waist"].sides]
+    lengths = [sum(pattern.piece(s.piece, "").edge(s.edge).length for s in side) for side in seams["front waist"].sides]
     assert lengths[0] == pytest.approx(lengths[1], abs=2e-4)
 
 

@@ -279,7 +279,7 @@ def test_arguments_of_a_wrong_type_are_one_line(block: Garment, wrong: dict[str,
 
 def test_a_sewn_piece_is_not_edited_as_if_it_were_not(block: Garment, mannequin: Mannequin):
     """Its fullness, its folds and the other sides of its seams would be lost without a word."""
-    wish = SeamWish(name="waist", factor=1.5, gathered=True)
+    wish = SeamWish(name="front waist", factor=1.5, gathered=True)
     full = flatten_form(mannequin, block.form, fabric="woven", wishes=[wish]).pieces["front_skirt"]
     line = full.surface.lines["hip"]
     plan = CutPlan(name="hip", paths=(line,))
@@ -302,8 +302,8 @@ def test_a_cut_is_offered_for_what_it_wins_and_not_for_what_sewing_does():
     """What is gathered here strains the back skirt's waist; the same skirt with a tiny dart, unsewn, fits, and so it does without."""
     body = Mannequin.from_size("EU 38", resolution_mm=35.0)
     wishes = [
-        SeamWish(name="waist", factor=1.5, gathered=True),
-        SeamWish(name="waist 2", factor=1.5, gathered=True),
+        SeamWish(name="front waist", factor=1.5, gathered=True),
+        SeamWish(name="back waist", factor=1.5, gathered=True),
         SeamWish(name="shoulder left", factor=1.01),
     ]
     form = body.form("basic_block", half=True)

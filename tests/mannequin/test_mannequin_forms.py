@@ -11,6 +11,7 @@ from warpflat.mannequin.blend import blend_forms
 from warpflat.mannequin.forms import form_from_mapping, form_names
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.profiles import convex_girth
+from warpflat.mannequin.seam_names import name_seams
 
 
 @pytest.fixture(scope="module")
@@ -59,6 +60,33 @@ def test_basic_block(body: Mannequin) -> None:
     # The skirt hangs straight from the hip.
     hip, knee = (convex_girth(whole.vertices[body.layout.lines[k]]) for k in ("hip", "knee"))
     assert knee == pytest.approx(hip, rel=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("lines", "pieces", "heights", "names"),
+    [
+        (["waist", "waist"], [("front_bodice", "front_skirt"), ("back_bodice", "back_skirt")], None, ["front waist", "back waist"]),
+        (["side left", "knee"], [("front", "back"), ("top", "leg")], None, ["side left", "knee"]),
+        (
+            ["armhole left", "armhole left"], [("front", "sleeve_left"), ("back", "sleeve_left")], None,
+            ["front armhole left", "back armhole left"],
+        ),
+        (["side", "side"], [("front", "back"), ("front", "back")], (1.2, 0.7), ["upper side", "lower side"]),
+        (["side", "side", "side"], [("a", "b")] * 3, (1.2, 0.9, 0.7), ["side", "side 2", "side 3"]),
+    ],
+)  # fmt: skip
+def test_seams_of_one_line_are_told_apart_by_their_pieces_then_by_their_place(
+    lines: list[str], pieces: list[tuple[str, str]], heights: tuple[float, ...] | None, names: list[str]
+) -> None:
+    points = None if heights is None else [np.array([[0.1, height, 0.0]]) for height in heights]
+    assert list(name_seams(lines, pieces, points)) == names
+
+
+def test_no_seam_of_a_shipped_form_has_a_number(body: Mannequin) -> None:
+    seams = {name: [seam.name for seam in body.form(name).seams] for name in form_names()}
+    assert [seam for names in seams.values() for seam in names if seam[-1].isdigit()] == []
+    assert {"front waist", "back waist", "bodice side left", "skirt side left"} <= set(seams["basic_block"])
+    assert {"centre shoulder left", "side shoulder left"} <= set(seams["princess_dress"])
 
 
 def test_princess_dress_has_panels_and_shirt_has_sleeves(body: Mannequin) -> None:

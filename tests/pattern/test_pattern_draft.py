@@ -253,7 +253,7 @@ def test_a_wide_dart_is_cut_out_with_allowances_on_its_legs():
     edges = [Edge(name=n, points=corners[i : i + 2], kind=k) for i, (n, k) in enumerate(zip(names, kinds, strict=True))]
     piece = draft_piece(Piece(name="p", edges=edges, darts=[Dart(name="d", left="l", right="r", cut=True)]))
     assert piece.edge("l").width == 0.010
-    assert "Includes seam 10 mm" in [text for text, _ in piece.label.lines]
+    assert "Includes seam 1 cm" in [text for text, _ in piece.label.lines]
     shift = piece.frame[:, 2]
     cut = shapely.Polygon(piece.cut_line - shift)
     assert cut.is_valid
@@ -310,7 +310,7 @@ def test_a_dart_with_room_is_cut_away_and_notched_where_its_allowances_are_apart
         assert shapely.LinearRing(piece.cut_line).distance(shapely.Point(notch.base[0])) < 1e-5
 
 
-@pytest.mark.parametrize(("cut", "said"), [(True, "seam 6/10 mm"), (False, "seam 6 mm")])
+@pytest.mark.parametrize(("cut", "said"), [(True, "seam 0.6/1 cm"), (False, "seam 0.6 cm")])
 def test_the_label_tells_the_allowances_of_a_dart_that_is_cut_away(cut, said):
     corners = np.array([(0, 0), (0.1, 0), (0.15, 0.1), (0.2, 0), (0.3, 0), (0.3, 0.3), (0, 0.3), (0, 0)], dtype=float)
     edges = [

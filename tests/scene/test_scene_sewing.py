@@ -8,7 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from warpflat.cli.tables import run_summary, warnings_of
+from warpflat.cli.summary import notes_line, summary_lines
+from warpflat.cli.tables import energy_words, run_summary, warnings_of
 from warpflat.core.errors import InputError
 from warpflat.scene.load import make_scene
 from warpflat.scene.run import run_scene
@@ -70,6 +71,24 @@ def test_the_pattern_has_the_ease(skirt):
     seam = next(s for s in pattern["seams"] if s["name"] == "side left")
     assert seam["ease"] == pytest.approx(1 / 1.01 - 1)
     assert abs(seam["difference_mm"]) < 0.5
+
+
+def test_the_console_is_a_line_each_and_none_is_wide(skirt):
+    result, _ = skirt
+    lines = summary_lines(result.metrics, result.files, "out")
+    heads = [line.split(":")[0] for line in lines if not line.startswith(" ")]
+    assert heads == ["pieces", "girths [cm] (ease)", "fit", "seams", "files"]
+    assert max(map(len, lines)) <= 100
+    assert "side left -0.99 %" in next(line for line in lines if line.startswith("seams"))
+    assert "-0.0" not in " ".join(lines)
+    guessed = sum("guess" not in note and " cm is " in note for note in result.notes)
+    assert guessed > 5
+    assert notes_line(result.notes).startswith(f"note: {guessed} measurements guessed from others")
+    assert notes_line(("the mesh was mended", *result.notes[:3], "x" * 90)) == (
+        "note: 3 measurements guessed from others; the mesh was mended; 1 more; -v lists them"
+    )
+    assert notes_line(("the mesh was mended",)) == "note: the mesh was mended"
+    assert energy_words(3.07e-20) == "0 mJ"
 
 
 def test_the_console_shows_ease_and_prices(skirt):

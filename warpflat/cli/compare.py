@@ -24,7 +24,7 @@ What comes out, in DIR:
 @click.option(
     "--fabric", "fabrics", multiple=True, metavar="NAME", help="One of those to compare; the first is the base."
 )
-@output_options(folder="out/NAME-compared", printed="compare.json")
+@output_options(folder="out/NAME-compared", printed="compare.json", verbose=False)
 def compare(
     scene: Path, fabrics: tuple[str, ...], out: Path | None, quiet: bool, as_json: bool, device: str | None
 ) -> int:

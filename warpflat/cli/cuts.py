@@ -40,6 +40,7 @@ def cuts(
     scene: Path,
     out: Path | None,
     quiet: bool,
+    verbose: bool,
     as_json: bool,
     device: str | None,
     apply: int | None,
@@ -81,7 +82,7 @@ def cuts(
         click.echo((folder / "ledger.json").read_text(encoding="utf-8"), nl=False)
     elif not (quiet or as_json):
         _print_ledger(ledger, folder)
-    return DONE if result is None else report_run(result, folder, quiet=quiet, as_json=as_json)
+    return DONE if result is None else report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
 
 
 def _compare(

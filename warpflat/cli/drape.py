@@ -19,7 +19,7 @@ _FILES = """\b
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{_FILES}\n\n{EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
 @output_options()
-def drape(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None) -> int:
+def drape(scene: Path, out: Path | None, quiet: bool, verbose: bool, as_json: bool, device: str | None) -> int:
     """Run a scene file and put the sewn garment on its body.
 
     It is as if the scene had a [drape] table; the settings of one that it has hold.
@@ -40,4 +40,4 @@ def drape(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str
         raise InputError(f"{scene}: half: a drape needs the whole garment; leave out half = true")
     table = loaded.settings.drape or DrapeTable()
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
-    return run_and_report(loaded, out, quiet=quiet, as_json=as_json, device=device)
+    return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)

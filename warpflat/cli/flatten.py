@@ -58,7 +58,14 @@ __all__ = ["flatten"]
 @click.option("--no-picture", is_flag=True, help="Write no picture.png.")
 @output_options()
 def flatten(
-    mesh: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None, datum: str | None, **options: Any
+    mesh: Path,
+    out: Path | None,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool,
+    device: str | None,
+    datum: str | None,
+    **options: Any,
 ) -> int:
     """Flatten one mesh: OBJ, PLY, STL, OFF, GLB, glTF or USD.
 
@@ -105,7 +112,7 @@ def flatten(
         tables["datum"] = datum.rstrip("/").rpartition("/")[2]
     scene = make_scene(tables, name=_safe_name(mesh), folder=Path(), where="command line")
     try:
-        return run_and_report(scene, out, quiet=quiet, as_json=as_json, device=device)
+        return run_and_report(scene, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
     except InputError as error:
         raise InputError(str(error).replace('component = "largest"', "--component largest")) from None
 

@@ -38,6 +38,11 @@ What comes out, in DIR:
   pattern.json  everything of the pattern; warpflat export makes the others from it"""
 
 
+_VERBOSE = click.option(
+    "--verbose", "-v", is_flag=True, help="Print the tables of pieces and seams, every note, and all advice on the fit."
+)
+
+
 class ComputingCommand(click.Command):
     """A command that loads the numerical libraries, if there is memory for them."""
 
@@ -52,13 +57,14 @@ class ComputingCommand(click.Command):
 
 
 def output_options(
-    *, folder: str = "out/NAME", printed: str = "metrics.json"
+    *, folder: str = "out/NAME", printed: str = "metrics.json", verbose: bool = True
 ) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
     """Add the options of a command that writes files into a folder and prints one of them on demand.
 
     Args:
         folder: the default one, for the help.
         printed: which file --json prints, for the help.
+        verbose: whether there is more to print.
     """
     options = [
         click.option(
@@ -68,6 +74,7 @@ def output_options(
             help=f"Folder for the files.  [default: {folder}]",
         ),
         click.option("--quiet", "-q", is_flag=True, help="Print nothing but mistakes and warnings."),
+        *([_VERBOSE] if verbose else []),
         click.option("--json", "as_json", is_flag=True, help=f"Print {printed} on standard output, nothing else."),
         click.option("--device", metavar="NAME", help="Warp device, such as cpu or cuda:0.  [default: Warp's choice]"),
     ]

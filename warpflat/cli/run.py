@@ -19,7 +19,7 @@ __all__ = ["report_run", "run", "run_and_report", "start_warp_silently"]
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{EXIT_CODES}")
 @click.argument("scene", type=click.Path(path_type=Path))
 @output_options()
-def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str | None) -> int:
+def run(scene: Path, out: Path | None, quiet: bool, verbose: bool, as_json: bool, device: str | None) -> int:
     """Run a scene file.
 
     A scene is a TOML file that names a surface, its feature lines, a fabric and settings; see the folder scenes.
@@ -31,10 +31,12 @@ def run(scene: Path, out: Path | None, quiet: bool, as_json: bool, device: str |
     """
     from warpflat.scene.load import load_scene
 
-    return run_and_report(load_scene(scene), out, quiet=quiet, as_json=as_json, device=device)
+    return run_and_report(load_scene(scene), out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
 
 
-def run_and_report(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool, device: str | None) -> int:
+def run_and_report(
+    scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
+) -> int:
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.scene.run import run_scene
 
@@ -42,7 +44,7 @@ def run_and_report(scene: Scene, out: Path | None, *, quiet: bool, as_json: bool
     folder = out if out is not None else Path("out") / scene.name
     with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
         result = run_scene(scene, folder, on_progress=bar, device=device)
-    return report_run(result, folder, quiet=quiet, as_json=as_json)
+    return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
 
 
 def start_warp_silently() -> None:
@@ -64,20 +66,24 @@ def start_warp_silently() -> None:
             click.echo(line, err=True)
 
 
-def report_run(result: SceneResult, folder: Path, *, quiet: bool, as_json: bool) -> int:
+def report_run(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
     """Print the result of a run, and return the exit code."""
+    from warpflat.cli.summary import notes_line, summary_lines
     from warpflat.cli.tables import drape_lines, run_summary, warnings_of
     from warpflat.flattening.fit_report import fit_lines
 
     warnings = warnings_of(result.metrics)
     if not (quiet or as_json):
-        for note in result.notes:
-            if note not in warnings:
-                click.echo(f"warpflat: note: {note}", err=True)
+        notes = [note for note in result.notes if note not in warnings]
+        for line in [f"note: {note}" for note in notes] if verbose else filter(None, [notes_line(notes)]):
+            click.echo(f"warpflat: {line}", err=True)
     for warning in warnings:
         click.echo(f"warpflat: {warning}", err=True)
     if as_json:
         click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet and not verbose:
+        for line in summary_lines(result.metrics, result.files, str(folder)):
+            click.echo(line)
     elif not quiet:
         click.echo(run_summary(result.metrics, result.files, str(folder)))
         for line in (*fit_lines(result.metrics), *drape_lines(result.metrics)):

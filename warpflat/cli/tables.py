@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 __all__ = [
     "drape_lines",
     "edit_table",
+    "energy_words",
     "fabric_data",
     "fabric_sheet",
     "fabric_table",
@@ -44,7 +45,7 @@ _UNITS = {
 
 
 def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> str:
-    """Return the table at the end of a run, with the names of its files.
+    """Return the tables at the end of a run, with the names of its files; :mod:`warpflat.cli.summary` has the short report.
 
     Args:
         metrics: as `metrics.json`.
@@ -60,7 +61,7 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
                 f"{piece['vertices']:,}",
                 f"{100 * piece['length_error']:.3g} %",
                 f"{100 * piece['area_error']:.3g} %",
-                f"{1e3 * piece['strain_energy_j']:.4g} mJ",
+                energy_words(piece["strain_energy_j"]),
                 f"{piece['flipped_faces']:,}",
                 "yes" if _converged(piece) else "NO",
             )
@@ -108,11 +109,13 @@ def _constraint_table(constraints: Iterable[Mapping[str, Any]]) -> str:
     return _aligned(("constraint", "amiss", "price"), rows)
 
 
+def energy_words(joules: float, digits: int = 4) -> str:
+    """Return an energy in words; what is below a microjoule is rounding."""
+    return f"{1e3 * joules:.{digits}g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
+
+
 def _price(joules: float | None) -> str:
-    """Return a price in words; what is below a microjoule is rounding."""
-    if joules is None:
-        return ""
-    return f"{1e3 * joules:.3g} mJ" if abs(joules) >= 1e-6 else "0 mJ"
+    return "" if joules is None else energy_words(joules, 3)
 
 
 def _rounded(value: float, digits: int) -> float:
@@ -387,7 +390,7 @@ def _remainder_words(stage: Mapping[str, Any]) -> str:
     """Return how far from rest a stage has ended: its residual, or its strain energy where crushed faces make forces infinite."""
     residual = stage["residual"]
     if residual is None or not math.isfinite(residual):
-        return f"strain energy {1e3 * stage['strain_energy_j']:.3g} mJ"
+        return f"strain energy {energy_words(stage['strain_energy_j'], 3)}"
     return f"residual {residual:.1e}"
 
 

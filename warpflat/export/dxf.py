@@ -80,10 +80,11 @@ def write_dxf(
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
-    shown_names = titles([piece.name for piece in next(iter(garment.pieces.values()))], _is_written)
+    names = {piece.name: piece.piece.title or piece.name for piece in next(iter(garment.pieces.values()))}
+    written = titles(list(dict.fromkeys(names.values())), _is_written)
     for placed in lay_out(groups, width=1.5).placed:
         for piece in placed.pieces:
-            title = shown_names[piece.name]
+            title = written[names[piece.name]]
             name = block_name(piece, taken, title)
             block = document.blocks.new(name, base_point=(0, 0))
             _write_piece(block, piece, title, scale, validation=dialect == "astm")

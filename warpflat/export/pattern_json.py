@@ -92,6 +92,8 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
         "fabric": piece.piece.fabric,
         "quantity": piece.piece.quantity,
         "paired": piece.piece.paired,
+        "title": piece.piece.title,
+        "printed_units": piece.piece.units,
         "on_fold": piece.piece.on_fold,
         "frame": piece.frame.tolist(),
         "edges": [_edge(edge) for edge in piece.edges],

@@ -149,6 +149,8 @@ class PieceEntry(Entry):
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
     paired: bool
+    title: Text = ""
+    printed_units: Literal["mm", "cm", "in"] = "cm"
     frame: Annotated[list[Row], Field(min_length=2, max_length=2)]
     edges: Annotated[list[EdgeEntry], Field(min_length=1)]
     cut_line: Ring

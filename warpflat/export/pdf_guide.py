@@ -99,7 +99,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     _steps(page, whole, size)
     _seams(page, whole, size, units)
     notes = dict.fromkeys(
-        f"{piece.name.replace('_', ' ')}: {note}." for piece in printed.pieces[size] for note in piece.notes
+        f"{piece.piece.printed_name}: {note}." for piece in printed.pieces[size] for note in piece.notes
     )
     if notes:
         page.heading("Notes", 3 * LINE)

@@ -138,6 +138,8 @@ def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         fabric=data.fabric,
         quantity=data.quantity,
         paired=data.paired,
+        title=data.title,
+        units=data.printed_units,
         edges=[_edge(edge, frame) for edge in data.edges],
         darts=darts,
         internal_lines={key: _to_mesh(line, frame) for key, line in internal_lines.items()},

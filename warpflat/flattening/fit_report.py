@@ -16,6 +16,7 @@ __all__ = [
     "Remedy",
     "fit_lines",
     "garment_wear",
+    "no_cut_words",
     "pressure_words",
     "remedy_words",
     "strain_words",
@@ -106,7 +107,13 @@ def remedy_words(remedy: Mapping[str, Any], outside: float | None = None, *, sew
     return f"would help: {remedy['cut']}: {before}{100 * after:.1f} % beyond the limit{unsewn}"
 
 
-def _no_cut_words(outside: float, *, sewn: bool) -> str:
+def no_cut_words(outside: float, *, sewn: bool) -> str:
+    """Return what helps a piece that no cut helps.
+
+    Args:
+        outside: share of its cloth beyond the limit.
+        sewn: whether the piece is sewn; the share is that of the unsewn piece.
+    """
     if sewn and outside <= TOLERATED:
         return "unsewn it fits: its seams, folds and constraints strain it; ask less of them, or take another fabric"
     return "would help: another fabric, or another stretch; no single dart does"
@@ -151,7 +158,7 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         tables = [remedy["table"] for remedy in wear["would_help"] if "table" in remedy][:1]
         lines += [f"    {line}" for line in tables_as_toml({"cuts": tables}).splitlines()]
         if not wear["would_help"]:
-            lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
+            lines.append(f"  {no_cut_words(before, sewn=sewn)}")
     if lines:
         lines.append(f"ranges: {RANGES}")
     if "wear" in metrics:

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +24,7 @@ __all__ = [
     "FORMATS",
     "PatternOptions",
     "WrittenPattern",
+    "check_names",
     "export_patterns",
     "garment_files",
     "surface_files",
@@ -45,6 +46,8 @@ class PatternOptions:
         rules: kinds and allowances of edges.
         cloth: what the marker is laid on; None makes no marker.
         marker_seconds: time for the nesting.
+        units: of lengths in printed words, "mm", "cm" or "in".
+        names: by piece what is printed instead of its name.
     """
 
     formats: Sequence[str] = FORMATS
@@ -54,6 +57,8 @@ class PatternOptions:
     rules: EdgeRules = field(default_factory=EdgeRules)
     cloth: Cloth | None = None
     marker_seconds: int = 5
+    units: str = "cm"
+    names: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -92,11 +97,12 @@ def garment_files(
         sample_size: the one that the files show first.
 
     Raises:
-        InputError: the folder cannot be written.
+        InputError: a printed name is for no piece, or the folder cannot be written.
     """
     from warpflat.garment.to_pattern import pattern_of_garment
 
     options = options or PatternOptions()
+    check_names(options.names, next(iter(garments.values())).pieces)
     return _write_pattern(
         lambda: pattern_of_garment(garments, name=name, rules=options.rules, sample_size=sample_size),
         folder, name, options,
@@ -191,7 +197,7 @@ def _write_pattern(
     report_activity("drafting the pattern")
     try:
         pattern, notes = make()
-        drafted, remarks = _draft(pattern, options.tolerance)
+        drafted, remarks = _draft(_in_words(pattern, options), options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
         return WrittenPattern(notes=(f"no pattern was drawn: {why}",), metrics={"pattern": {"not_drawn": why}})
@@ -213,6 +219,27 @@ def _write_pattern(
             notes = (*notes, *remarks)
             metrics["marker"] = plan
     return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
+
+
+def check_names(names: Mapping[str, str], pieces: Iterable[str]) -> None:
+    """Check that printed names are for pieces that there are.
+
+    Raises:
+        InputError: there is no such piece; gives the nearest.
+    """
+    known = list(pieces)
+    for name in names:
+        if name not in known:
+            raise InputError(f"names: there is no piece {name!r}; {nearest(name, known)}")
+
+
+def _in_words(pattern: Pattern, options: PatternOptions) -> Pattern:
+    """Return the pattern with the printed names and units that were asked for."""
+    pieces = {
+        size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in of_size)
+        for size, of_size in pattern.pieces.items()
+    }
+    return replace(pattern, pieces=pieces)
 
 
 def _quality(drafted: DraftedGarment) -> dict[str, Any]:

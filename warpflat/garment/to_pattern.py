@@ -26,6 +26,7 @@ from warpflat.garment.form_plan import (
     plan_form,
 )
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
+from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
 from warpflat.pattern.pieces import FOLD_STRAIGHT, Dart, Edge, Garment, Piece, Seam, SeamSide
@@ -115,9 +116,10 @@ def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, Flat
 
 def _with_opened_folds(seams: tuple[Seam, ...], opened: Mapping[str, str]) -> tuple[Seam, ...]:
     """Add a seam in the centre of each piece that is cut twice instead of on the fold."""
-    for piece, edge in opened.items():
+    names = name_seams(list(opened.values()), [(piece, piece) for piece in opened])
+    for name, (piece, edge) in zip(names, opened.items(), strict=True):
         side = (SeamSide(piece=piece, edge=edge),)
-        seams = (*seams, Seam(name=find_unused_name(edge, {seam.name for seam in seams}), sides=(side, side)))
+        seams = (*seams, Seam(name=find_unused_name(name, {seam.name for seam in seams}), sides=(side, side)))
     return seams
 
 

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from warpflat.core.arrays import IntArray
-from warpflat.core.text import find_unused_name
 from warpflat.mannequin.pieces import FormPiece
+from warpflat.mannequin.seam_names import name_seams
 
 __all__ = ["FormSeam", "SeamRun", "find_seams"]
 
@@ -34,7 +37,7 @@ class FormSeam:
     """Two edges (or parts of edges) that are sewn together: the same curve in space.
 
     Attributes:
-        name: after the feature line.
+        name: after the feature line, and where others are called so, the pieces: see :func:`warpflat.mannequin.seam_names.name_seams`.
         pieces: names of the two pieces; the same twice where one piece is sewn to itself.
         edges: names of the two whole edges, as they are called without darts.
         runs: the stretches of the seam in their order; one, unless darts interrupt it.
@@ -55,14 +58,17 @@ def find_seams(pieces: Mapping[str, FormPiece]) -> tuple[FormSeam, ...]:
     for names, run in _runs(pieces):
         whole = [pieces[name].parts.get(edge, edge) for name, edge in zip(names, run.edges, strict=True)]
         found.setdefault((names[0], names[1], whole[0], whole[1]), []).append(run)
-    seams: list[FormSeam] = []
-    taken: set[str] = set()
-    for (first, second, edge, other), runs in found.items():
-        for chain in _chains(pieces[first], runs):
-            name = find_unused_name(edge, taken)
-            taken.add(name)
-            seams.append(FormSeam(name=name, pieces=(first, second), edges=(edge, other), runs=tuple(chain)))
-    return tuple(seams)
+    rows = [(sides, tuple(chain)) for sides, runs in found.items() for chain in _chains(pieces[sides[0]], runs)]
+    called = name_seams(
+        [re.sub(r" \d+$", "", edge) for (_, _, edge, _), _ in rows],
+        [(first, second) for (first, second, _, _), _ in rows],
+        [pieces[first].surface.vertices[np.concatenate([run.vertices[0] for run in chain])]
+         for (first, _, _, _), chain in rows],
+    )  # fmt: skip
+    return tuple(
+        FormSeam(name=name, pieces=(first, second), edges=(edge, other), runs=chain)
+        for name, ((first, second, edge, other), chain) in zip(called, rows, strict=True)
+    )
 
 
 def _chains(piece: FormPiece, runs: Sequence[SeamRun]) -> list[list[SeamRun]]:

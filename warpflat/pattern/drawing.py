@@ -295,7 +295,15 @@ def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, Float
             lines.append((first_legs[edge.name], edge.line, True))
         elif borders and edge.kind != "fold" and edge.name not in second_legs:
             lines.append((edge.name, edge.line, True))
-    return lines + [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
+    called = {name for name, _, _ in lines}
+    return [(_without_number(name, called), line, inwards) for name, line, inwards in lines]
+
+
+def _without_number(name: str, called: set[str]) -> str:
+    """Return what stands beside a line: "waist" at "waist 2" too, a further stretch of the line "waist"."""
+    line, _, number = name.rpartition(" ")
+    return line if number.isdigit() and line in called else name
 
 
 def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:

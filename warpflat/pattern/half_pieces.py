@@ -118,6 +118,8 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         darts=darts,
         internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
         paired=piece.piece.paired,
+        title=piece.piece.title,
+        units=piece.piece.units,
     )
     notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
     notches = tuple(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base)) for n in notches)

@@ -11,6 +11,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.text import size_words
 from warpflat.pattern.lettering import Words, text_width, wrap_text
+from warpflat.pattern.measures import length_words
 from warpflat.pattern.pieces import Piece
 
 if TYPE_CHECKING:
@@ -93,7 +94,7 @@ class Label:
 
 def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
-    lines = [piece.name.replace("_", " ").upper()]
+    lines = [piece.printed_name.upper()]
     if piece.size:
         words = size_words(piece.size)
         lines.append(words[0].upper() + words[1:])
@@ -120,9 +121,11 @@ def _allowance_words(piece: Piece) -> str:
     words = []
     for kind in ("seam", "hem"):
         own = [e for e in piece.edges if e.kind == kind or (kind == "seam" and e.kind == "dart" and e.width > 0)]
-        values = sorted({round(e.width * 1000, 1) for e in own})
+        values = [length_words(width, piece.units) for width in sorted({round(e.width, 4) for e in own})]
         if values:
-            words.append(f"{kind} {'/'.join(f'{v:g}' for v in values)} mm")
+            # The unit once: "6/10 mm".
+            numbers = [value.removesuffix(f" {piece.units}") for value in values]
+            words.append(f"{kind} {'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}")
     return ", ".join(words)
 
 

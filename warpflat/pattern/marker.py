@@ -313,7 +313,7 @@ def _named(copy: Copy) -> Copy:
     import shapely
 
     piece = copy.piece
-    rows = [(piece.name.replace("_", " "), NAME)]
+    rows = [(piece.piece.printed_name, NAME)]
     rows += [(size_words(piece.size), MORE)] if piece.size else []
     rows += [("mirrored", MORE)] if copy.mirrored else []
     lines = [*copy.fold_lines, copy.grain, *copy.notches]

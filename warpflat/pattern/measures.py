@@ -1,4 +1,4 @@
-"""Lengths in words, in centimetres or inches, as they stand on patterns."""
+"""Lengths in words, in millimetres, centimetres or inches, as they stand on patterns."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from math import ceil
 __all__ = ["UNITS", "cloth_words", "length_words"]
 
 #: Units of a pattern's words.
-UNITS = ("cm", "in")
+UNITS = ("mm", "cm", "in")
 INCH = 0.0254
 YARD = 0.9144
 #: A length is written as a fraction of an inch if that is as near as this [m].
@@ -15,9 +15,12 @@ FRACTION = 0.0002
 
 
 def length_words(length: float, units: str = "cm") -> str:
-    """Return a length [m] in words: "1 cm", "35.5 cm", "3/8 in", "13.98 in"."""
+    """Return a length [m] in words: "10 mm", "1 cm", "35.5 cm", "3/8 in", "13.98 in"."""
+    if units == "mm":
+        return f"{round(1000 * length, 1):g} mm"
     if units == "cm":
-        return f"{round(100 * length, 1):g} cm"
+        # Allowances are given to half a millimetre.
+        return f"{round(100 * length, 2 if length < 0.1 else 1):g} cm"
     whole, sixteenths = divmod(round(length / INCH * 16), 16)
     if abs((whole + sixteenths / 16) * INCH - length) > FRACTION:
         return f"{length / INCH:.2f} in"
@@ -26,7 +29,7 @@ def length_words(length: float, units: str = "cm") -> str:
 
 def cloth_words(length: float, units: str = "cm", *, of_width: bool = False) -> str:
     """Return a length of cloth [m] as it is bought: up to the next 5 cm or eighth of a yard; a width is rounded."""
-    if units == "cm":
+    if units != "in":
         return f"{round(100 * length)} cm" if of_width else f"{5 * ceil(length / 0.05 - 1e-9) / 100:.2f} m"
     if of_width:
         return f"{round(length / INCH)} in"

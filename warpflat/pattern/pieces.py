@@ -15,6 +15,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.file_names import check_label
 from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
+from warpflat.pattern.measures import UNITS
 from warpflat.pattern.seam_difference import eased_length
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
@@ -161,6 +162,8 @@ class Piece:
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         paired: False where all copies are cut the same way up, not left and right.
+        title: what is printed instead of the name, in any language; the name with spaces if not given.
+        units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
     """
 
     name: str
@@ -173,10 +176,16 @@ class Piece:
     grain: FloatArray | None = None
     holes: Sequence[Hole] = ()
     paired: bool = True
+    title: str = ""
+    units: str = "cm"
 
     def __post_init__(self) -> None:
         where = f"piece {self.name!r}" + (f" {size_words(self.size)}" if self.size else "")
         check_label(self.name, "a piece, to which files and seams refer")
+        if self.title:
+            check_label(self.title, "a piece's printed name")
+        if self.units not in UNITS:
+            raise InputError(f"{where}: unknown units {self.units!r}; {nearest(self.units, UNITS)}")
         if self.quantity < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
@@ -193,6 +202,11 @@ class Piece:
         _check_outline(self, where)
         _check_darts(self, where)
         _check_holes(self, where)
+
+    @property
+    def printed_name(self) -> str:
+        """What stands on paper."""
+        return self.title or self.name.replace("_", " ")
 
     @property
     def on_fold(self) -> bool:
@@ -284,14 +298,12 @@ class Garment:
         pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
-        units: of lengths in the pattern's words, "cm" or "in".
     """
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
-    units: str = "cm"
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):
@@ -336,6 +348,11 @@ class Garment:
     def sizes(self) -> tuple[str, ...]:
         """Sizes in their order."""
         return tuple(self.pieces)
+
+    @property
+    def units(self) -> str:
+        """Units of lengths in printed words: those of its pieces."""
+        return next(iter(self.pieces.values()))[0].units
 
     @property
     def sample(self) -> str:

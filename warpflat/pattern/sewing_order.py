@@ -53,10 +53,12 @@ class SewnSeam:
 def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
     """Return what each piece is called: one that is cut in pairs has no side."""
     titles = {
-        piece.name: without_side(piece.name) if _in_pairs(piece) else piece.name.replace("_", " ") for piece in pieces
+        piece.name: without_side(piece.name) if _in_pairs(piece) and not piece.title else piece.printed_name
+        for piece in pieces
     }
     plain = list(titles.values())
-    return {name: title if plain.count(title) == 1 else name.replace("_", " ") for name, title in titles.items()}
+    names = {piece.name: piece.printed_name for piece in pieces}
+    return {name: title if plain.count(title) == 1 else names[name] for name, title in titles.items()}
 
 
 def _in_pairs(piece: Piece) -> bool:

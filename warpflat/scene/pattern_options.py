@@ -36,5 +36,7 @@ def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternO
             allowances={edge: width / 1000 for edge, width in table.allowances_mm.items()},
         ),
         cloth=cloth,
+        units=table.units,
+        names=table.names,
         marker_seconds=5 if marker is None else marker.seconds,
     )

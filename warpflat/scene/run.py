@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.ledger import Ledger
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
-    from warpflat.garment.edge_rules import EdgeRules
+    from warpflat.garment.pattern_files import PatternOptions
     from warpflat.garment.sew_surface import SewnSurface
     from warpflat.scene.frames import FrameRecorder
 
@@ -98,7 +98,7 @@ def _run_surface(
         drawing = pattern_options(settings.pattern, settings.marker)
         seams = scene_surface_seams(settings.seams, scene.name)
     sequence = cuts or scene_cuts(scene, device=device)
-    _check_edges(scene, sequence, drawing.rules)
+    _check_edges(scene, sequence, drawing)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
     with Film(folder, settings.output, [sequence.surface]) as film:
@@ -191,16 +191,18 @@ def flatten_scene(
     return sewn.result, sewn
 
 
-def _check_edges(scene: Scene, sequence: CutSequence, rules: EdgeRules) -> None:
-    """Check that the pattern's kinds and allowances name edges, whichever of the automatic cuts are made.
+def _check_edges(scene: Scene, sequence: CutSequence, drawing: PatternOptions) -> None:
+    """Check that the pattern's kinds and allowances name edges, and its names pieces, whichever of the automatic cuts are made.
 
     Raises:
         InputError: a name that no piece can have, or a cut that cannot be made.
     """
     from warpflat.cutting.separate_pieces import cut_surfaces
+    from warpflat.garment.pattern_files import check_names
     from warpflat.garment.surface_to_pattern import check_edge_names
 
-    if not (rules.kinds or rules.allowances):
+    rules = drawing.rules
+    if not (rules.kinds or rules.allowances or drawing.names):
         return
     with errors_named(scene.where):
         surfaces = [
@@ -208,6 +210,7 @@ def _check_edges(scene: Scene, sequence: CutSequence, rules: EdgeRules) -> None:
         ]
     with errors_named(f"{scene.where}: pattern"):
         check_edge_names(surfaces, rules, cuts=[plan.name for plan in sequence.plans])
+        check_names(drawing.names, {surface.name: None for surface in surfaces})
 
 
 def _flatten(

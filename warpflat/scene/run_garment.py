@@ -17,7 +17,7 @@ from warpflat.garment.constraints import Constraint
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
-from warpflat.garment.pattern_files import PatternOptions, garment_files
+from warpflat.garment.pattern_files import PatternOptions, check_names, garment_files
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.ease import ease_from
@@ -129,6 +129,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
         plan = plan_form(form, drawing.rules)
+        check_names(drawing.names, form.pieces)
     with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)

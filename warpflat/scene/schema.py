@@ -222,6 +222,10 @@ class PatternTable(Table):
     """What an edge is, by its name: "front.neck", or "neck" for every piece that has one."""
     allowances_mm: dict[str, Annotated[float, Field(ge=0, le=200)]] = Field(default_factory=dict)
     """Allowances by edge, named as in `kinds` [mm]."""
+    units: Literal["mm", "cm", "in"] = "cm"
+    """Units of lengths in printed words."""
+    names: dict[str, Annotated[str, Field(min_length=1, max_length=60)]] = Field(default_factory=dict)
+    """What is printed instead of a piece's name: front_bodice = "Vorderteil"."""
     tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
     """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
     sizes: list[str] = Field(default_factory=list)

@@ -1,0 +1,164 @@
+"""The short report of a run: a line each for pieces, girths, fit, seams, drape and files; `-v` prints the tables instead."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from warpflat.cli.tables import energy_words
+from warpflat.core.text import format_count
+from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words
+
+__all__ = ["WIDTH", "notes_line", "summary_lines"]
+
+#: Letters in a line, at most.
+WIDTH = 100
+# What a reader opens first.
+_OPENED_FIRST = ("review.html", "pattern.pdf", "picture.png", "metrics.json")
+# Girths that every pattern is judged by, whether or not their ease was given.
+_MAIN_GIRTHS = ("bust", "waist", "hip")
+# A measurement that was completed from others.
+_COMPLETED = re.compile(r"\w+ = [\d.]+ c?m (?!instead of )")
+
+
+def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -> list[str]:
+    """Return the lines at the end of a run, none longer than `WIDTH` unless the folder's name is.
+
+    Args:
+        metrics: as `metrics.json`.
+        files: their names.
+        folder: where they lie.
+    """
+    lines = [_pieces_line(metrics["pieces"])]
+    if girths := metrics.get("girths"):
+        lines.append(_girths_line(girths))
+    lines += _fit_lines(metrics["pieces"])
+    if metrics.get("seams") or metrics.get("constraints"):
+        lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
+    if "drape" in metrics:
+        lines.append(_drape_line(metrics["drape"]))
+    ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
+    return [*lines, _listed(f"files: {folder}: ", ordered)]
+
+
+def notes_line(notes: Sequence[str]) -> str:
+    """Return notes as one line: completed measurements are counted, and as many others follow as fit; nothing without any."""
+    guessed = [note for note in notes if _COMPLETED.match(note)]
+    parts = [f"{format_count(len(guessed), 'measurement')} guessed from others"] if guessed else []
+    parts += [note for note in notes if note not in guessed]
+    for count in range(len(parts), 0, -1):
+        more = [f"{len(parts) - count} more"] if count < len(parts) else []
+        line = "; ".join([*parts[:count], *more, *(["-v lists them"] if more or guessed else [])])
+        if len(line) <= WIDTH - len("warpflat: note: "):
+            return f"note: {line}"
+    rest = f"; {len(parts) - 1} more" if len(parts) > 1 else ""
+    return f"note: {parts[0]}{rest}" + ("; -v lists them" if rest else "") if parts else ""
+
+
+def _pieces_line(pieces: Mapping[str, Mapping[str, Any]]) -> str:
+    unfinished = [name for name, piece in pieces.items() if not piece["stages"][-1]["converged"]]
+    flips = sum(piece["flipped_faces"] for piece in pieces.values())
+    parts = [
+        f"{sum(piece['vertices'] for piece in pieces.values()):,} vertices",
+        "converged" if not unfinished else f"NOT converged: {_some(unfinished)}",
+        *([format_count(flips, "flipped face")] if flips else []),
+        f"length within {100 * max(piece['length_error'] for piece in pieces.values()):.3g} %",
+        f"area within {100 * max(piece['area_error'] for piece in pieces.values()):.3g} %",
+        f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
+    ]
+    return _clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")
+
+
+def _girths_line(girths: Mapping[str, Mapping[str, float]]) -> str:
+    """Return the girths of the pattern, each with the ease that it has, and the one wanted where that is another."""
+    parts: dict[str, str] = {}
+    for level, girth in girths.items():
+        got, wanted = (f"{100 * girth.get(key, girth['ease_m']):+.1f}" for key in ("ease_m", "ease_wanted_m"))
+        of = "" if got == wanted else f" of {wanted}"
+        parts[level] = f"{level} {100 * girth['pattern_m']:.1f} ({got}{of})"
+    first = [level for level in parts if level in _MAIN_GIRTHS]
+    then = [level for level in parts if level not in first and "ease_wanted_m" in girths[level]]
+    rest = [level for level in parts if level not in (*first, *then)]
+    return _listed("girths [cm] (ease): ", [parts[level] for level in (*first, *then, *rest)])
+
+
+def _fit_lines(pieces: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return whether all pieces fit, with their ranges or the worst place, and the best advice where one does not."""
+    worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
+    if not worn:
+        return []
+    all_of_it = garment_wear(worn)
+    beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
+    if all_of_it["fits"]:
+        return [_clipped(f"fit: yes; {beyond}; {', '.join(_ranges([piece['wear'] for piece in worn.values()]))}")]
+    worst = max(
+        (name for name in worn if not worn[name]["wear"]["fits"]),
+        key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"],
+    )
+    wear = worn[worst]["wear"]
+    sewn = "outside_unsewn" in wear
+    before = wear["outside_unsewn"] if sewn else wear["outside"]
+    # Of cuts that were tried the one that leaves least; those that were not are in the order of their promise.
+    best = min(
+        wear["would_help"], key=lambda r: 1.0 if r["outside_after"] is None else r["outside_after"], default=None
+    )
+    advice = no_cut_words(before, sewn=sewn) if best is None else remedy_words(best, before, sewn=sewn)
+    place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
+    unfit = [name for name in worn if not worn[name]["wear"]["fits"]]
+    return [_clipped(f"fit: no: {_some(unfit)}; {beyond}; {worst} {place}"), _clipped(f"  {advice}")]
+
+
+def _ranges(worn: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Return the strains along both threads, 5 to 95 % of each piece's cloth, and the highest pressure."""
+    found = []
+    for thread in ("warp", "weft"):
+        low = 100 * min(wear[f"strain_{thread}"]["p05"] for wear in worn)
+        high = 100 * max(wear[f"strain_{thread}"]["p95"] for wear in worn)
+        found.append(f"{thread} {round(low, 1) + 0.0:+.1f} to {round(high, 1) + 0.0:+.1f} %")
+    highest = max(wear["pressure"]["max"] for wear in worn)
+    return [*found, f"at most {highest:,.0f} Pa"] if highest >= 1.0 else found
+
+
+def _seams_line(seams: Sequence[Mapping[str, Any]], constraints: Sequence[Mapping[str, Any]]) -> str:
+    parts = []
+    if seams:
+        parts.append(f"{len(seams)}, sides equal within {_within(max(abs(s['difference_mm']) for s in seams))}")
+    if eased := [f"{seam['name']} {100 * seam['ease']:+.3g} %" for seam in seams if seam["ease"]]:
+        parts.append(f"eased: {_some(eased)}")
+    if constraints:
+        amiss = _within(max(held["amiss_mm"] for held in constraints))
+        parts.append(f"{format_count(len(constraints), 'constraint')} within {amiss}")
+    return _clipped(f"seams: {'; '.join(parts)}")
+
+
+def _within(millimetres: float) -> str:
+    return f"{max(millimetres, 0.01):.2f} mm"
+
+
+def _drape_line(drape: Mapping[str, Any]) -> str:
+    mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
+    parts = [f"worn {mean:.1f} mm from the designed surface", f"misfit {1e3 * misfit['mean']:.1f} mm"]
+    parts.append(f"at most {1e3 * misfit['max']:.1f} mm")
+    places = [place["words"] for place in drape["places"][:1]]
+    return _clipped(f"drape: {'; '.join([', '.join(parts), *places])}")
+
+
+def _some(names: Sequence[str]) -> str:
+    """Return up to three names, and how many more there are."""
+    more = f" and {len(names) - 3} more" if len(names) > 3 else ""
+    return ", ".join(names[:3]) + more
+
+
+def _listed(head: str, parts: Sequence[str]) -> str:
+    """Return as many parts as fit into a line, at least one, and how many more there are."""
+    for count in range(len(parts), 1, -1):
+        more = "" if count == len(parts) else f", {len(parts) - count} more"
+        if len(line := f"{head}{', '.join(parts[:count])}{more}") <= WIDTH:
+            return line
+    return f"{head}{parts[0]}" + (f", {len(parts) - 1} more" if len(parts) > 1 else "")
+
+
+def _clipped(line: str) -> str:
+    """Return a line, a long one cut after a word that leaves room for dots."""
+    return line if len(line) <= WIDTH else line[: WIDTH - 3].rpartition(" ")[0].rstrip(",;(") + " ..."

@@ -1,0 +1,75 @@
+"""Names of seams, as sewers tell them apart: by the pieces that they join."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.text import find_unused_name
+
+__all__ = ["name_seams"]
+
+#: What lies towards an axis of the mannequin's space, and against it: up, to the body's left, to its front.
+_POSITIONS = {1: ("upper", "lower"), 0: ("left", "right"), 2: ("front", "back")}
+
+
+def name_seams(
+    lines: Sequence[str], pieces: Sequence[tuple[str, str]], points: Sequence[FloatArray] | None = None
+) -> tuple[str, ...]:
+    """Return a name for each seam: that of its line, and before it what tells it from others along lines of that name.
+
+    That is what the names of its two pieces have in common: "bodice side left" joins front_bodice and back_bodice. Else
+    it is what they have and the others have not: "front armhole left" joins front and sleeve_left. Else, of two, it is
+    where the seam lies: "upper side left". A number is the last resort.
+
+    Args:
+        lines: name of the feature line of each seam.
+        pieces: names of its two pieces.
+        points: of each seam in space, #P by 3 [m]; None leaves positions out.
+    """
+    names = list(lines)
+    for line in dict.fromkeys(lines):
+        group = [number for number, name in enumerate(lines) if name == line]
+        words = [_words(pieces[number], line) for number in group]
+        ways = [_shared_words(words), _own_words(words)]
+        if points is not None:
+            ways.append(_positions([np.mean(points[number], axis=0) for number in group]))
+        told = next((way for way in ways if all(way) and len(set(way)) == len(group)), None)
+        if told is not None and len(group) > 1:
+            for number, word in zip(group, told, strict=True):
+                names[number] = f"{word} {line}"
+    taken: list[str] = []
+    for name in names:
+        taken.append(find_unused_name(name, taken))
+    return tuple(taken)
+
+
+def _words(pieces: tuple[str, str], line: str) -> tuple[list[str], list[str]]:
+    """Return the words of the two pieces' names that the line's name does not have."""
+    known = line.split(" ")
+    first, second = ([word for word in name.replace("_", " ").split(" ") if word not in known] for name in pieces)
+    return first, second
+
+
+def _shared_words(words: Sequence[tuple[list[str], list[str]]]) -> list[str]:
+    """Return for each seam the words that both of its pieces have."""
+    return [" ".join(word for word in first if word in second) for first, second in words]
+
+
+def _own_words(words: Sequence[tuple[list[str], list[str]]]) -> list[str]:
+    """Return for each seam the words of its pieces that not all of the seams have."""
+    rows = [list(dict.fromkeys([*first, *second])) for first, second in words]
+    common = set.intersection(*map(set, rows))
+    return [" ".join(word for word in row if word not in common) for row in rows]
+
+
+def _positions(centres: Sequence[FloatArray]) -> list[str]:
+    """Return where each of two seams lies against the other; nothing for one or for more."""
+    if len(centres) != 2:
+        return []
+    apart = centres[0] - centres[1]
+    axis = max(_POSITIONS, key=lambda axis: abs(apart[axis]))
+    towards, against = _POSITIONS[axis]
+    return [towards, against] if apart[axis] > 0 else [against, towards]
