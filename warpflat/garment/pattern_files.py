@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -185,6 +185,7 @@ def _write_pattern(
     from shapely.errors import ShapelyError
 
     from warpflat.core.atomic_files import output_folder
+    from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
@@ -200,7 +201,15 @@ def _write_pattern(
         *notes,
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
-    metrics: dict[str, Any] = {"pattern": _quality(drafted)}
+    walked = walk_seams(drafted)
+    metrics: dict[str, Any] = {
+        "pattern": _quality(drafted),
+        "corners": [asdict(corner) for corner in drafted.corners],
+        "walked": [
+            {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
+            for seam in walked
+        ],
+    }
     with output_folder(to) as folder:
         files = [
             _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
