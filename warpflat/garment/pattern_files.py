@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warpflat.pattern.drafted import DraftedGarment
     from warpflat.pattern.marker import Cloth
     from warpflat.pattern.pieces import Garment as Pattern
+    from warpflat.pattern.walked import WalkedSeam
     from warpflat.surface.border_seams import NamedSeam
 
 __all__ = [
@@ -64,11 +65,13 @@ class WrittenPattern:
         files: their names.
         notes: what the maker should know, one sentence each.
         metrics: entries of `metrics.json`.
+        walked: the seams of the pattern, for their picture.
     """
 
     files: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     metrics: Mapping[str, Any] = field(default_factory=dict)
+    walked: tuple[WalkedSeam, ...] = ()
 
 
 def garment_files(
@@ -221,7 +224,7 @@ def _write_pattern(
             files += marked
             notes = (*notes, *remarks)
             metrics["marker"] = plan
-    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
+    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
 
 
 def _quality(drafted: DraftedGarment) -> dict[str, Any]:

@@ -49,7 +49,11 @@ ALONG_GRAIN = np.radians(1.0)
 
 
 def draft_garment(
-    garment: Garment, *, tolerance: float | None = None, sizes: Sequence[str] | None = None
+    garment: Garment,
+    *,
+    tolerance: float | None = None,
+    sizes: Sequence[str] | None = None,
+    true: bool = True,
 ) -> DraftedGarment:
     """Draft every piece of a garment and match the notches of its seams.
 
@@ -58,6 +62,7 @@ def draft_garment(
         tolerance: how far [m] a fitted curve may lie from the points of an edge, but where its corners are trued; None
             takes 0.1 mm, and more where a border is so ragged that its curve would be all wiggles.
         sizes: only these; None drafts all.
+        true: whether edges are made to run on smoothly across seams (see :func:`warpflat.pattern.truing.true_corners`).
 
     Raises:
         InputError: an unknown size, or a half piece that reaches across its fold.
@@ -69,7 +74,7 @@ def draft_garment(
     reports: list[SeamReport] = []
     corners: list[CornerReport] = []
     for size in chosen:
-        edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance)
+        edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
         corners += trued
         pieces = {
             piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
@@ -83,8 +88,8 @@ def draft_garment(
 
 
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
-    """Draft one piece on its own, without the notches that its seams would give it."""
-    return _draft(piece, garment, _fitted_edges([piece], (), tolerance)[0][piece.name], tolerance)
+    """Draft one piece on its own, without the notches and the trued corners that its seams would give it."""
+    return _draft(piece, garment, _fitted_edges([piece], (), tolerance, true=False)[0][piece.name], tolerance)
 
 
 def draft_half(
@@ -248,15 +253,16 @@ def _moved(points: FloatArray, frame: FloatArray) -> FloatArray:
 
 
 def _fitted_edges(
-    pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None
+    pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None, *, true: bool
 ) -> tuple[dict[str, tuple[DraftedEdge, ...]], list[CornerReport]]:
-    """Return the edges of all pieces as curves with trued corners, by piece, and a report on each corner."""
+    """Return the edges of all pieces as curves with trued corners, by piece, and a report on each."""
     lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
-    trued, corners = true_corners(pieces, seams, {key: curve for key, (curve, _) in fitted.items()})
+    curves = {key: curve for key, (curve, _) in fitted.items()}
+    trued, corners = true_corners(pieces, seams, curves) if true else (curves, [])
     edges = {}
     for piece in pieces:
         keys = [(piece.name, edge.name) for edge in piece.edges]
