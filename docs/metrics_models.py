@@ -179,13 +179,34 @@ class Piece(Entry):
     darts: list[FormDart] | None = None
 
 
+class WearerLevel(Entry):
+    """How the cloth is around the body at one level."""
+
+    ease_m: float
+    """By how much the cloth is larger than the body."""
+    strain: float
+    """By how much it is stretched around the body; 0 where it is larger."""
+
+
+class WearerFit(Entry):
+    """How a garment fits the body itself, whatever form its pattern was made on."""
+
+    fits: bool
+    """No level is stretched beyond the limit of the cloth."""
+    levels: dict[str, WearerLevel]
+
+
 class GarmentWear(Entry):
     """How the whole garment fits."""
 
     fits: bool
+    """On the form, ease included."""
     outside: float
     where_not: list[str]
     would_help: list[Remedy]
+    against: Literal["form"] | None = None
+    """On what strains and pressures of the pieces are measured."""
+    wearer: WearerFit | None = None
 
 
 class Level(Entry):

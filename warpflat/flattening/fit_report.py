@@ -153,11 +153,30 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if not wear["would_help"]:
             lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
     if lines:
-        lines.append(f"ranges: {RANGES}")
+        against = metrics.get("wear", {}).get("against")
+        lines.append(
+            f"ranges: {RANGES}" + ("" if against is None else f"; strain and pressure are against the {against}")
+        )
     if "wear" in metrics:
         unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
         verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
         lines.append(
             f"garment: fits: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
+        if wearer := metrics["wear"].get("wearer"):
+            lines.append(_wearer_words(wearer))
     return lines
+
+
+def _wearer_words(wearer: Mapping[str, Any]) -> str:
+    """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller."""
+    loose = [
+        f"{name} {100 * level['ease_m']:+.1f} cm" for name, level in wearer["levels"].items() if level["strain"] == 0.0
+    ]
+    tight = [
+        f"{name} {100 * level['ease_m']:+.1f} cm ({100 * level['strain']:.1f} %)"
+        for name, level in wearer["levels"].items()
+        if level["strain"] > 0.0
+    ]
+    parts = [f"{words} at {', '.join(row)}" for words, row in (("ease", loose), ("stretched", tight)) if row]
+    return f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({'; '.join(parts)})"
