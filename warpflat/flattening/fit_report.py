@@ -132,11 +132,13 @@ def pressure_words(wear: Mapping[str, Any]) -> str:
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """Return the console's lines on the fit: one per piece, and one for each place and remedy where a piece does not fit."""
     lines = []
+    against = metrics.get("wear", {}).get("against")
+    word = "fits" if against is None else f"lies on the {against}"
     for name, piece in metrics["pieces"].items():
         wear = piece.get("wear")
         if wear is None:
             continue
-        verdict = f"{name}: fits: {'yes' if wear['fits'] else 'no'}"
+        verdict = f"{name}: {word}: {'yes' if wear['fits'] else 'no'}"
         ranges = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
         if pressure := pressure_words(wear):
             ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
@@ -153,7 +155,6 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if not wear["would_help"]:
             lines.append(f"  {_no_cut_words(before, sewn=sewn)}")
     if lines:
-        against = metrics.get("wear", {}).get("against")
         lines.append(
             f"ranges: {RANGES}" + ("" if against is None else f"; strain and pressure are against the {against}")
         )
@@ -161,7 +162,7 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
         verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
         lines.append(
-            f"garment: fits: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
+            f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
         if wearer := metrics["wear"].get("wearer"):
             lines.append(_wearer_words(wearer))
