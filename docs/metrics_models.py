@@ -179,13 +179,34 @@ class Piece(Entry):
     darts: list[FormDart] | None = None
 
 
+class WearerLevel(Entry):
+    """How the cloth is around the body at one level."""
+
+    ease_m: float
+    """By how much the cloth is larger than the body."""
+    strain: float
+    """By how much it is stretched around the body; 0 where it is larger."""
+
+
+class WearerFit(Entry):
+    """How a garment fits the body itself, whatever form its pattern was made on."""
+
+    fits: bool
+    """No level is stretched beyond the limit of the cloth."""
+    levels: dict[str, WearerLevel]
+
+
 class GarmentWear(Entry):
     """How the whole garment fits."""
 
     fits: bool
+    """On the form, ease included."""
     outside: float
     where_not: list[str]
     would_help: list[Remedy]
+    against: Literal["form"] | None = None
+    """On what strains and pressures of the pieces are measured."""
+    wearer: WearerFit | None = None
 
 
 class Level(Entry):
@@ -263,6 +284,34 @@ class Drawing(Entry):
     seams_that_differ: list[str] | None = None
     not_drawn: str | None = None
     """Why no pattern was drawn."""
+
+
+class Corner(Entry):
+    """A place where an edge runs on across a seam or a dart, or meets a fold."""
+
+    place: str
+    """The seam, dart or fold, and the edges that run on."""
+    size: str
+    wanted_deg: float
+    """180 across a seam or dart, 90 at a fold."""
+    before_deg: float
+    """What the pieces' angles made together before truing."""
+    after_deg: float
+    move_mm: float
+    """The largest move of the edges that meet there."""
+
+
+class WalkedSeam(Entry):
+    """The two sides of a seam laid upon each other as near as they come, darts closed."""
+
+    name: str
+    size: str
+    distance_mm: float
+    """Largest distance of two places that are sewn together."""
+    difference_mm: float
+    """By how much the second side is too long for its ease."""
+    notch_mm: float | None
+    """Largest distance along the seam from a notch to what it meets."""
 
 
 class Marker(Entry):
@@ -353,6 +402,8 @@ class Metrics(Entry):
     sizes: dict[str, dict[str, Any]] | None = None
     """Summaries of graded sizes."""
     pattern: Drawing | None = None
+    corners: list[Corner] | None = None
+    walked: list[WalkedSeam] | None = None
     marker: Marker | None = None
     drape: Drape | None = None
     files: dict[str, dict[str, str]] | None = None

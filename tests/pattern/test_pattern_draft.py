@@ -115,7 +115,7 @@ def test_the_back_is_double_the_front_is_single(dress):
 
 
 def test_curves_keep_corners_and_stay_within_a_tenth_of_a_millimetre(dress):
-    for piece in dress.pieces["38"]:
+    for piece in draft_garment(dress.garment, sizes=("38",), true=False).pieces["38"]:
         for edge in piece.edges:
             points = edge.edge.points @ piece.frame[:, :2].T + piece.frame[:, 2]
             assert np.abs(edge.line[[0, -1]] - points[[0, -1]]).max() < 1e-12

@@ -139,11 +139,13 @@ def pressure_words(wear: Mapping[str, Any]) -> str:
 def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """Return the console's lines on the fit: one per piece, and one for each place and remedy where a piece does not fit."""
     lines = []
+    against = metrics.get("wear", {}).get("against")
+    word = "fits" if against is None else f"lies on the {against}"
     for name, piece in metrics["pieces"].items():
         wear = piece.get("wear")
         if wear is None:
             continue
-        verdict = f"{name}: fits: {'yes' if wear['fits'] else 'no'}"
+        verdict = f"{name}: {word}: {'yes' if wear['fits'] else 'no'}"
         ranges = f"{', '.join(strain_words(wear))}, limit {100 * wear['strain_limit']:.3g} %"
         if pressure := pressure_words(wear):
             ranges += f"; {pressure}, median {wear['pressure']['p50']:.0f}"
@@ -160,11 +162,29 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
         if not wear["would_help"]:
             lines.append(f"  {no_cut_words(before, sewn=sewn)}")
     if lines:
-        lines.append(f"ranges: {RANGES}")
+        lines.append(
+            f"ranges: {RANGES}" + ("" if against is None else f"; strain and pressure are against the {against}")
+        )
     if "wear" in metrics:
         unfit = [name for name, piece in metrics["pieces"].items() if not piece["wear"]["fits"]]
         verdict = f"no: {', '.join(unfit)}" if unfit else "yes"
         lines.append(
-            f"garment: fits: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
+            f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
+        if wearer := metrics["wear"].get("wearer"):
+            lines.append(_wearer_words(wearer))
     return lines
+
+
+def _wearer_words(wearer: Mapping[str, Any]) -> str:
+    """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller."""
+    loose = [
+        f"{name} {100 * level['ease_m']:+.1f} cm" for name, level in wearer["levels"].items() if level["strain"] == 0.0
+    ]
+    tight = [
+        f"{name} {100 * level['ease_m']:+.1f} cm ({100 * level['strain']:.1f} %)"
+        for name, level in wearer["levels"].items()
+        if level["strain"] > 0.0
+    ]
+    parts = [f"{words} at {', '.join(row)}" for words, row in (("ease", loose), ("stretched", tight)) if row]
+    return f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({'; '.join(parts)})"

@@ -21,7 +21,7 @@ from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Str
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
-from warpflat.garment.girths import girth_constraints, pattern_girths
+from warpflat.garment.girths import girth_constraints, pattern_girths, wearer_fit
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.forms import FormResult
@@ -125,14 +125,17 @@ class Garment:
         """Return the content of `metrics.json`."""
         first = next(iter(self.pieces.values()))
         pieces = {name: self._measure(name) for name in self.pieces}
+        girths = pattern_girths(
+            self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
+        )
+        limit = min(piece.fabric.strain_limit for piece in self.pieces.values())
+        wearer = {"against": "form", "wearer": wearer_fit(girths, limit)} if girths else {}
         more = {
-            "wear": garment_wear(pieces),
+            "wear": {**garment_wear(pieces), **wearer},
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
-            "girths": pattern_girths(
-                self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
-            ),
+            "girths": girths,
             **({} if self.sewn is None else self._sewing()),
         }
         return run_metrics(pieces, first.network.device, more)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Mapping
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["girth_constraints", "pattern_girths"]
+__all__ = ["girth_constraints", "pattern_girths", "wearer_fit"]
 
 
 def girth_constraints(form: FormResult) -> list[KeptGirth]:
@@ -74,6 +74,23 @@ def pattern_girths(
         if level in form.ease:
             found[level]["ease_wanted_m"] = 0.01 * form.ease[level]
     return found
+
+
+def wearer_fit(girths: Mapping[str, Mapping[str, float]], limit: float) -> dict[str, Any]:
+    """Return how a garment fits the body itself, level by level: the entry `wearer` of `wear` in `metrics.json`.
+
+    Where the cloth is larger than the body it hangs, with ease and without strain. Where it is smaller it touches, and is
+    stretched to the body's girth.
+
+    Args:
+        girths: the entry `girths`.
+        limit: the least strain limit of its cloths.
+    """
+    levels = {
+        level: {"ease_m": girth["ease_m"], "strain": max(0.0, girth["body_m"] / girth["pattern_m"] - 1.0)}
+        for level, girth in girths.items()
+    }
+    return {"fits": all(level["strain"] <= limit for level in levels.values()), "levels": levels}
 
 
 def _edge_lengths(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from warpflat.pattern.drafted import DraftedGarment
     from warpflat.pattern.marker import Cloth
     from warpflat.pattern.pieces import Garment as Pattern
+    from warpflat.pattern.walked import WalkedSeam
     from warpflat.surface.border_seams import NamedSeam
 
 __all__ = [
@@ -69,11 +70,13 @@ class WrittenPattern:
         files: their names.
         notes: what the maker should know, one sentence each.
         metrics: entries of `metrics.json`.
+        walked: the seams of the pattern, for their picture.
     """
 
     files: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
     metrics: Mapping[str, Any] = field(default_factory=dict)
+    walked: tuple[WalkedSeam, ...] = ()
 
 
 def garment_files(
@@ -191,6 +194,7 @@ def _write_pattern(
     from shapely.errors import ShapelyError
 
     from warpflat.core.atomic_files import output_folder
+    from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
         return WrittenPattern()
@@ -206,7 +210,15 @@ def _write_pattern(
         *notes,
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
-    metrics: dict[str, Any] = {"pattern": _quality(drafted)}
+    walked = walk_seams(drafted)
+    metrics: dict[str, Any] = {
+        "pattern": _quality(drafted),
+        "corners": [asdict(corner) for corner in drafted.corners],
+        "walked": [
+            {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
+            for seam in walked
+        ],
+    }
     with output_folder(to) as folder:
         files = [
             _write(drafted, folder, kind, name=name, dialect=options.dialect, paper=options.paper)
@@ -218,7 +230,7 @@ def _write_pattern(
             files += marked
             notes = (*notes, *remarks)
             metrics["marker"] = plan
-    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics)
+    return WrittenPattern(files=tuple(files), notes=tuple(dict.fromkeys(notes)), metrics=metrics, walked=walked)
 
 
 def check_names(names: Mapping[str, str], pieces: Iterable[str]) -> None:

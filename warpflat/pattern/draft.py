@@ -39,6 +39,7 @@ from warpflat.pattern.notches import cut_darts, dart_notches, seam_notches, seam
 from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
+from warpflat.pattern.truing import CornerReport, true_corners
 
 __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 
@@ -48,15 +49,20 @@ ALONG_GRAIN = np.radians(1.0)
 
 
 def draft_garment(
-    garment: Garment, *, tolerance: float | None = None, sizes: Sequence[str] | None = None
+    garment: Garment,
+    *,
+    tolerance: float | None = None,
+    sizes: Sequence[str] | None = None,
+    true: bool = True,
 ) -> DraftedGarment:
     """Draft every piece of a garment and match the notches of its seams.
 
     Args:
         garment: flat pieces and seams.
-        tolerance: how far [m] a fitted curve may lie from the points of an edge; None takes 0.1 mm, and more where
-            a border is so ragged that its curve would be all wiggles.
+        tolerance: how far [m] a fitted curve may lie from the points of an edge, but where its corners are trued; None
+            takes 0.1 mm, and more where a border is so ragged that its curve would be all wiggles.
         sizes: only these; None drafts all.
+        true: whether edges are made to run on smoothly across seams (see :func:`warpflat.pattern.truing.true_corners`).
 
     Raises:
         InputError: an unknown size, or a half piece that reaches across its fold.
@@ -66,8 +72,10 @@ def draft_garment(
         garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
     drafted: dict[str, tuple[DraftedPiece, ...]] = {}
     reports: list[SeamReport] = []
+    corners: list[CornerReport] = []
     for size in chosen:
-        edges = _fitted_edges(garment.pieces[size], garment.seams, tolerance)
+        edges, trued = _fitted_edges(garment.pieces[size], garment.seams, tolerance, true=true)
+        corners += trued
         pieces = {
             piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
         }
@@ -76,12 +84,12 @@ def draft_garment(
             replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
         )
         reports += seam_reports(garment.seams, pieces, size)
-    return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports))
+    return DraftedGarment(garment=garment, pieces=drafted, seams=tuple(reports), corners=tuple(corners))
 
 
 def draft_piece(piece: Piece, *, garment: str = "", tolerance: float | None = None) -> DraftedPiece:
-    """Draft one piece on its own, without the notches that its seams would give it."""
-    return _draft(piece, garment, _fitted_edges([piece], (), tolerance)[piece.name], tolerance)
+    """Draft one piece on its own, without the notches and the trued corners that its seams would give it."""
+    return _draft(piece, garment, _fitted_edges([piece], (), tolerance, true=False)[0][piece.name], tolerance)
 
 
 def draft_half(
@@ -245,24 +253,28 @@ def _moved(points: FloatArray, frame: FloatArray) -> FloatArray:
 
 
 def _fitted_edges(
-    pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None
-) -> dict[str, tuple[DraftedEdge, ...]]:
-    """Return the edges of all pieces as curves, by piece."""
+    pieces: Sequence[Piece], seams: Sequence[Seam], tolerance: float | None, *, true: bool
+) -> tuple[dict[str, tuple[DraftedEdge, ...]], list[CornerReport]]:
+    """Return the edges of all pieces as curves with trued corners, by piece, and a report on each."""
     lines: dict[tuple[str, str], FloatArray] = {}
     for piece in pieces:
         frame = _frame(piece)
         lines |= {(piece.name, edge.name): _moved(edge.points, frame) for edge in piece.edges}
     fitted = fit_edges(pieces, lines, seams, tolerance)
-    return {
-        piece.name: tuple(
-            _drafted_edge(edge, *fitted[piece.name, edge.name], lines[piece.name, edge.name]) for edge in piece.edges
+    curves = {key: curve for key, (curve, _) in fitted.items()}
+    trued, corners = true_corners(pieces, seams, curves) if true else (curves, [])
+    edges = {}
+    for piece in pieces:
+        keys = [(piece.name, edge.name) for edge in piece.edges]
+        edges[piece.name] = tuple(
+            _drafted_edge(edge, trued[key], fitted[key], lines[key])
+            for edge, key in zip(piece.edges, keys, strict=True)
         )
-        for piece in pieces
-    }
+    return edges, corners
 
 
-def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: FloatArray) -> DraftedEdge:
-    """Return an edge with its curve, and the places of its points along that."""
+def _drafted_edge(edge: Edge, curve: Curve, fitted: tuple[Curve, float], points: FloatArray) -> DraftedEdge:
+    """Return an edge with its trued curve, and the places of its points along that; its fit is that before truing."""
     import shapely
 
     line, marks = curve.sample(), shapely.points(points)
@@ -270,9 +282,10 @@ def _drafted_edge(edge: Edge, curve: Curve, tolerance: float, points: FloatArray
     # Places rise along the line: where a border nearly touches itself, the nearest place may be on its other part.
     places = np.maximum.accumulate(shapely.line_locate_point(drawn, marks))
     places[[0, -1]] = 0.0, drawn.length
-    fit_error = float(shapely.distance(drawn, marks).max())
+    untrued = drawn if curve is fitted[0] else shapely.LineString(fitted[0].sample())
+    fit_error = float(shapely.distance(untrued, marks).max())
     return DraftedEdge(
-        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=tolerance
+        edge=edge, curve=curve, line=line, width=edge.width, places=places, fit_error=fit_error, tolerance=fitted[1]
     )
 
 

@@ -13,6 +13,7 @@ from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece
 from warpflat.pattern.seam_difference import LOCAL_TOLERANCE, SEAM_TOLERANCE
+from warpflat.pattern.truing import CornerReport
 
 __all__ = [
     "DraftedCutout",
@@ -36,7 +37,7 @@ class DraftedEdge:
         line: #P by 2 [m], its fine samples; neighbouring edges share their corners bit for bit.
         width: its allowance [m].
         places: the length [m] along the line of each point of the edge as it came in (each vertex of its mesh).
-        fit_error: largest distance [m] of the curve from these points.
+        fit_error: largest distance [m] of the curve from these points, before its corners were trued.
         tolerance: the distance [m] that was allowed, besides what equal length takes.
     """
 
@@ -170,11 +171,13 @@ class DraftedGarment:
         garment: as it came in.
         pieces: by size.
         seams: how well the two sides of every seam agree.
+        corners: where edges run on across seams, darts and folds, before and after truing.
     """
 
     garment: Garment
     pieces: Mapping[str, tuple[DraftedPiece, ...]]
     seams: tuple[SeamReport, ...]
+    corners: tuple[CornerReport, ...] = ()
 
     @property
     def name(self) -> str:

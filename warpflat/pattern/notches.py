@@ -14,7 +14,7 @@ from warpflat.pattern.pieces import Piece, Seam, SeamSide
 from warpflat.pattern.seam_difference import eased_length, worst_difference
 from warpflat.pattern.sides import Wedge
 
-__all__ = ["cut_darts", "dart_notches", "seam_notches", "seam_reports"]
+__all__ = ["SeamLine", "cut_darts", "dart_notches", "seam_notches", "seam_reports"]
 
 
 #: Notches are cut this deep [m], and never deeper than this share of the allowance.
@@ -35,7 +35,7 @@ def seam_reports(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece], size
     """Measure both sides of every seam along the fitted sewing lines."""
     reports = []
     for seam in seams:
-        lines = [_SeamLine(side, pieces) for side in seam.sides]
+        lines = [SeamLine(side, pieces) for side in seam.sides]
         first, second = (line.length for line in lines)
         reports.append(
             SeamReport(
@@ -64,7 +64,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     """
     notches: dict[str, list[Notch]] = {}
     for seam in seams:
-        first, second = (_SeamLine(side, pieces) for side in seam.sides)
+        first, second = (SeamLine(side, pieces) for side in seam.sides)
         # A piece that is sewn to its own mirror image has one edge for both sides.
         lines = (first,) if seam.sides[0] == seam.sides[1] else (first, second)
         for fraction in _fractions(seam, first, second):
@@ -80,7 +80,7 @@ def seam_notches(seams: Sequence[Seam], pieces: Mapping[str, DraftedPiece]) -> d
     return notches
 
 
-def _notch_pair(seam: Seam, lines: Sequence[_SeamLine], fraction: float) -> list[tuple[str, Notch]]:
+def _notch_pair(seam: Seam, lines: Sequence[SeamLine], fraction: float) -> list[tuple[str, Notch]]:
     """Return the notches of both sides at a fraction of the seam's length, by piece; none if they cannot be cut."""
     for share in SHARES_FROM_START:
         at = share * fraction
@@ -104,7 +104,7 @@ def _opposite(seam: Seam, share: float, *, forward: bool) -> float:
     return float(np.interp(share, *((shares, reached) if forward else (reached, shares))))
 
 
-def _fractions(seam: Seam, first: _SeamLine, second: _SeamLine) -> list[float]:
+def _fractions(seam: Seam, first: SeamLine, second: SeamLine) -> list[float]:
     """Return the fractions of a seam's length at which it is notched."""
     if seam.notches is not None:
         return list(seam.notches)
@@ -169,7 +169,7 @@ def _point_on_cut_line(at: FloatArray, inwards: FloatArray, width: float, cut_li
     return np.asarray(hits[np.linalg.norm(hits - at, axis=1).argmin()])
 
 
-def _local_difference(one: _SeamLine, other: _SeamLine, seam: Seam) -> float | None:
+def _local_difference(one: SeamLine, other: SeamLine, seam: Seam) -> float | None:
     """Return the worst difference [mm] over `STRETCH`; None where edges come from no mesh."""
     if any(edge.edge.vertices is None for edge in (*one.edges, *other.edges)):
         return None
@@ -177,7 +177,7 @@ def _local_difference(one: _SeamLine, other: _SeamLine, seam: Seam) -> float | N
     return None if worst is None else 1000 * worst
 
 
-class _SeamLine:
+class SeamLine:
     """One side of a seam as one long line, in the seam's direction."""
 
     def __init__(self, side: Sequence[SeamSide], pieces: Mapping[str, DraftedPiece]) -> None:
@@ -222,10 +222,10 @@ class _SeamLine:
         index = self.index(length)
         piece, edge = self.pieces[index], self.edges[index]
         local = length - self.joints[index]
-        at, direction = self._frame(index, local)
+        at, direction = self.frame(index, local)
         offsets = (-DOUBLE_SPACING / 2, DOUBLE_SPACING / 2) if double else (0.0,)
         found = [
-            _point_on_cut_line(*self._frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets
+            _point_on_cut_line(*self.frame(index, local + offset), edge.width, piece.cut_line) for offset in offsets
         ]
         base = tuple(point for point in found if point is not None)
         if len(base) < len(offsets):
@@ -233,7 +233,7 @@ class _SeamLine:
         depth = min(DEPTH, MOST_OF_ALLOWANCE * edge.width) if edge.width > 0 else RAW_DEPTH
         return Notch(seam=seam, edge=edge.name, length=length, at=at, base=base, direction=direction, depth=depth)
 
-    def _frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
+    def frame(self, index: int, length: float) -> tuple[FloatArray, FloatArray]:
         """Return the point on the sewing line at a length [m], and the unit normal into the piece."""
         line, arc = self.lines[index], self.arcs[index]
         length = float(np.clip(length, 0.0, arc[-1]))

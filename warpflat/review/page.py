@@ -22,7 +22,7 @@ __all__ = ["read_run", "review_folder", "write_review"]
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
 # Pictures come in this order, and others after them.
-_FIRST = ("picture.png", "drape.png", "wear.png")
+_FIRST = ("picture.png", "drape.png", "wear.png", "walked.png")
 _QUALITY = 88
 
 

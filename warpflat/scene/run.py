@@ -139,6 +139,7 @@ def files_of_run(scene: Scene) -> list[str]:
         "review.html": output.picture and output.review,
         "wear.png": worn and garment,
         f"{name}.wear.png": worn and not garment,
+        "walked.png": output.picture and garment and bool(formats or settings.marker is not None),
         **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},
         **{f"pattern.{ending}": ending in formats for ending in ("pdf", "json")},
         f"{name}.marker.svg": settings.marker is not None,

@@ -266,7 +266,13 @@ def _write_garment(
         sample_size=own,
     )
     measured = {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics}
-    files += [*pattern.files, *review_files(scene, measured, out, (*files, *pattern.files))]
+    files += pattern.files
+    if settings.output.picture and pattern.walked:
+        from warpflat.export.picture_walked import write_walked_picture
+
+        files.append("walked.png")
+        write_walked_picture(out / files[-1], pattern.walked, title=scene.name)
+    files += [*review_files(scene, measured, out, tuple(files))]
     metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
     notes = (*garment.notes, *pattern.notes, *name_notes, *manifest_notes)
