@@ -22,6 +22,7 @@ from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
+from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.forms import FormResult
@@ -94,6 +95,18 @@ class Garment:
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 
+    @property
+    def rings(self) -> list[GarmentRing]:
+        """Every closed way around the garment, and what must pass through it."""
+        first, positions = (
+            next(iter(self.pieces.values())),
+            {name: flat.positions for name, flat in self.pieces.items()},
+        )
+        return measure_rings(
+            self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
+            girths=pattern_girths(self.mannequin, self.form, positions),
+        )  # fmt: skip
+
     def _measured(self, number: int, cost: float | None) -> SeamLengths:
         seam = self.form.seams[number]
         first, second = (self.pieces[piece] for piece in seam.pieces)
@@ -125,14 +138,14 @@ class Garment:
         """Return the content of `metrics.json`."""
         first = next(iter(self.pieces.values()))
         pieces = {name: self._measure(name) for name in self.pieces}
+        positions = {name: piece.positions for name, piece in self.pieces.items()}
         more = {
             "wear": garment_wear(pieces),
             "mannequin": self.mannequin.metrics(),
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
-            "girths": pattern_girths(
-                self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
-            ),
+            "girths": pattern_girths(self.mannequin, self.form, positions),
+            "rings": [ring.as_dict() for ring in self.rings],
             **({} if self.sewn is None else self._sewing()),
         }
         return run_metrics(pieces, first.network.device, more)
