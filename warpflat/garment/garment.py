@@ -22,6 +22,7 @@ from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
+from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
@@ -47,6 +48,7 @@ class Garment:
         pieces: the flat pieces by name, in the form's order.
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
         wished: the ease of its seams; None if it was not sewn.
+        openings: along its seams.
     """
 
     name: str
@@ -55,6 +57,7 @@ class Garment:
     pieces: Mapping[str, Flattening]
     sewn: Sewn | None = None
     wished: SeamRatios | None = None
+    openings: Sequence[Opening] = ()
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -105,6 +108,7 @@ class Garment:
         return measure_rings(
             self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
             girths=pattern_girths(self.mannequin, self.form, positions),
+            opened=opened_rings(self.mannequin, self.form, positions, self.openings),
         )  # fmt: skip
 
     def _measured(self, number: int, cost: float | None) -> SeamLengths:
