@@ -54,6 +54,7 @@ HEADINGS = {
     "PatternTable": "`[pattern]`",
     "MarkerTable": "`[marker]`",
     "OpeningTable": "`[[openings]]`",
+    "FinishingTable": "`[[finishing]]`",
     "FabricTable": "`[fabric]`",
     "ValueTable": "A fabric's value as a table",
     "CurveTable": "`[fabric.curve_warp]`, `[fabric.curve_weft]`",

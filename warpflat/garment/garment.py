@@ -20,6 +20,7 @@ from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
+from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.openings import Opening, opened_rings
@@ -49,6 +50,7 @@ class Garment:
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
         wished: the ease of its seams; None if it was not sewn.
         openings: along its seams.
+        finishing: of its free edges, in the pattern.
     """
 
     name: str
@@ -58,6 +60,7 @@ class Garment:
     sewn: Sewn | None = None
     wished: SeamRatios | None = None
     openings: Sequence[Opening] = ()
+    finishing: Sequence[Finishing] = ()
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())

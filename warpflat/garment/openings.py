@@ -54,6 +54,11 @@ class Opening:
         return self.kind != "zip"
 
     @property
+    def opens_the_top(self) -> bool:
+        """Whether it runs out into the upper edge."""
+        return not self.from_below and self.start == 0.0
+
+    @property
     def title(self) -> str:
         """Return what is written on the pieces."""
         words = f"{self.style} zip" if self.kind == "zip" else self.kind

@@ -18,6 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
@@ -104,7 +105,11 @@ def pattern_of_garment(
         ]
         for size, garment in garments.items()
     }
-    return mark_openings(pattern, sample.openings, placed), notes
+    pattern = mark_openings(pattern, sample.openings, placed)
+    zips = [
+        row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
+    ]
+    return finish_edges(pattern, sample.finishing, gaps=zips), notes
 
 
 def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:

@@ -30,6 +30,7 @@ __all__ = [
     "BorderTable",
     "ConstraintTable",
     "FileSurface",
+    "FinishingTable",
     "LineTable",
     "MarkerTable",
     "OpeningTable",
@@ -251,6 +252,24 @@ class OpeningTable(Table):
         return self
 
 
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form: a facing of each piece, or one straight strip along the whole edge."""
+
+    kind: Literal["facing", "band", "waistband", "binding"]
+    edge: Annotated[str, Field(min_length=1, max_length=100)]
+    width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
+    overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> FinishingTable:
+        if self.kind != "band" and self.share != 1.0:
+            raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
+        if self.kind != "waistband" and self.overlap_mm:
+            raise ValueError("overlap_mm belongs to a waistband; leave it out")
+        return self
+
+
 class MarkerTable(Table):
     """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
 
@@ -321,6 +340,7 @@ class SceneTable(Table):
     pattern: PatternTable = Field(default_factory=PatternTable)
     marker: MarkerTable | None = None
     openings: list[OpeningTable] = Field(default_factory=list)
+    finishing: list[FinishingTable] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _consistent(self) -> SceneTable:
@@ -345,8 +365,9 @@ class SceneTable(Table):
         """Refuse what belongs to the form on a mannequin."""
         if self.shape != "none":
             raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
-        if self.openings:
-            raise ValueError("openings belong to a form's seams; on a [surface] leave them out")
+        for key in ("openings", "finishing"):
+            if getattr(self, key):
+                raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
             raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
         for number, cut in enumerate(self.cuts):
