@@ -62,7 +62,8 @@ def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment
     # Every seam of a facing meets the pieces with a notch on both sides.
     for seam in ("front neck facing", "back left neck facing"):
         notched = [piece.name for piece in drafted.pieces[""] for notch in piece.notches if notch.seam == seam]
-        assert len(notched) % 2 == 0 and len(set(notched)) == 2
+        assert len(notched) % 2 == 0
+        assert len(set(notched)) == 2
 
 
 def test_band_of_a_closed_neck_is_a_ring(half: Garment):
@@ -76,6 +77,15 @@ def test_band_of_a_closed_neck_is_a_ring(half: Garment):
     assert len(seams["neck band"].sides[1]) == 4
     assert "neck band ends" in seams
     assert all(report.matches for report in draft_garment(pattern).seams)
+
+
+def test_zip_at_one_side_of_a_half_opens_its_ring_once(half: Garment):
+    shoulder = Opening(kind="zip", line="shoulder left", length=0.1)
+    pattern = finished(replace(half, openings=(shoulder,)), Finishing(kind="band", edge="neck", width=0.02))
+    seams = {seam.name: seam for seam in pattern.seams}
+    # All around, and not sewn to a ring.
+    assert len(seams["neck band"].sides[1]) == 4
+    assert "neck band ends" not in seams
 
 
 def test_waistband_ends_at_the_zip(parted: Garment):

@@ -12,7 +12,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, without_side
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
 
@@ -74,10 +74,12 @@ def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
     """Return a pattern with a straight strip along a chain of free edges."""
     name = find_unused_name(wish.name, {piece.name for piece in pattern.pieces[pattern.sample]})
     sided = any(without_side(side.edge) != side.edge for side in chain.sides)
+    ring = chain.closed and not wish.overlap
     pieces = {}
     for size, row in pattern.pieces.items():
         length = wish.share * sum(pattern.piece(side.piece, size).edge(side.edge).length for side in chain.sides)
-        pieces[size] = (*row, _strip(wish, name, length, row[0], quantity=2 if sided else 1))
+        strip = _strip(wish, name, length, row[0], quantity=2 if sided else 1, ring=ring)
+        pieces[size] = (*row, strip)
     taken = {seam.name for seam in pattern.seams}
     words = name.replace("_", " ")
     seams = [
@@ -87,13 +89,13 @@ def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
             ease=1.0 / wish.share - 1.0,
         ),
     ]  # fmt: skip
-    if chain.closed and not wish.overlap:
+    if ring:
         ends = (SeamSide(piece=name, edge="right end"),), (SeamSide(piece=name, edge="left end", reversed=True),)
         seams.append(Seam(name=find_unused_name(f"{words} ends", taken), sides=ends))
     return replace(pattern, pieces=pieces, seams=seams)
 
 
-def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: int) -> Piece:
+def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool) -> Piece:
     """Return a strip of one size; its grain runs along a waistband, across a band and aslant over a binding."""
     folded = wish.kind != "binding"
     high, whole = wish.width * (2 if folded else 1), length + wish.overlap
@@ -103,8 +105,11 @@ def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: 
     for i, edge in enumerate(names):
         ends = np.array([corners[i], corners[(i + 1) % len(corners)]])
         if np.linalg.norm(ends[1] - ends[0]) > 0.0:
+            sewn = edge == "lower" or (ring and edge.endswith("end"))
+            # What is turned in has an allowance too, and no seam; a binding's other edge is folded over as it is cut.
+            turned_in = 0.0 if wish.kind == "binding" and edge == "upper" else DEFAULT_ALLOWANCE["seam"]
             edges.append(
-                Edge(name=edge, points=ends, kind="cut" if wish.kind == "binding" and edge == "upper" else "seam")
+                Edge(name=edge, points=ends, kind="seam" if sewn else "cut", allowance=None if sewn else turned_in)
             )
     along = {"waistband": [1.0, 0.0], "band": [0.0, 1.0], "binding": [0.7071, 0.7071]}[wish.kind]
     middle, reach = np.array([0.5 * whole, 0.5 * high]), 0.4 * (whole if wish.kind == "waistband" else high)

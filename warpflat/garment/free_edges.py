@@ -111,7 +111,10 @@ def _across(pattern: Garment, corner: _Corner, gaps: Collection[str]) -> _Corner
                     own = (side.piece, side.edge, side.mirrored != turned)
                     if own != (piece, edge, mirrored) or (end == 0) == (at_start == side.reversed):
                         continue
-                    if seam.name in gaps:
+                    # Halves that meet in the centre are one edge twice. Of a half's other seams the list has the left one.
+                    centre = (side.piece, side.edge) == (other.piece, other.edge)
+                    if seam.name in gaps and (centre or not turned):
                         return None
-                    return other.piece, other.edge, other.mirrored != turned, int(at_start == other.reversed)
+                    turned_over = not mirrored if centre else other.mirrored != turned
+                    return other.piece, other.edge, turned_over, int(at_start == other.reversed)
     return None
