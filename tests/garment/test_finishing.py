@@ -58,6 +58,7 @@ def test_facings_repeat_the_neck_and_are_joined_at_the_shoulders(parted: Garment
     drafted = draft_garment(pattern)
     own = {seam.name: seam for seam in drafted.seams if "facing" in seam.name}
     assert {"front neck facing", "back left neck facing", "shoulder left of neck facing"} <= set(own)
+    assert "centre back of neck facing" not in own
     assert all(seam.matches for seam in own.values())
     # Every seam of a facing meets the pieces with a notch on both sides.
     for seam in ("front neck facing", "back left neck facing"):

@@ -62,7 +62,7 @@ def finish_edges(pattern: Garment, finishing: Sequence[Finishing], *, gaps: Coll
             raise InputError(f"finishing[{number}]: no free edge {wish.edge!r}; {nearest(wish.edge, known)}")
         try:
             if wish.kind == "facing":
-                pattern = _with_facings(pattern, wish, found)
+                pattern = _with_facings(pattern, wish, found, gaps)
             else:
                 pattern = _with_strip(pattern, wish, free_chain(pattern, found, gaps))
         except InputError as error:
@@ -121,7 +121,9 @@ def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: 
     )  # fmt: skip
 
 
-def _with_facings(pattern: Garment, wish: Finishing, places: Sequence[tuple[str, str]]) -> Garment:
+def _with_facings(
+    pattern: Garment, wish: Finishing, places: Sequence[tuple[str, str]], gaps: Collection[str]
+) -> Garment:
     """Return a pattern with a facing along each of some free edges, joined as the pieces themselves are."""
     names: dict[tuple[str, str], str] = {}
     taken = {piece.name for piece in pattern.pieces[pattern.sample]}
@@ -143,7 +145,8 @@ def _with_facings(pattern: Garment, wish: Finishing, places: Sequence[tuple[str,
         sides = (SeamSide(piece=piece, edge=edge),), (SeamSide(piece=name, edge=edge),)
         seams.append(Seam(name=words, sides=sides))
         called.add(words)
-    for seam in pattern.seams:
+    # Beside a zip that runs out into the edge the facing's ends are turned in.
+    for seam in (seam for seam in pattern.seams if seam.name not in gaps):
         both = [row[0] for row in seam.sides]
         if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
             first, second = (replace(side, piece=parts[side.piece, side.edge]) for side in both)
