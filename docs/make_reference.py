@@ -53,6 +53,8 @@ HEADINGS = {
     "OutputTable": "`[output]`",
     "PatternTable": "`[pattern]`",
     "MarkerTable": "`[marker]`",
+    "OpeningTable": "`[[openings]]`",
+    "FinishingTable": "`[[finishing]]`",
     "FabricTable": "`[fabric]`",
     "ValueTable": "A fabric's value as a table",
     "CurveTable": "`[fabric.curve_warp]`, `[fabric.curve_weft]`",

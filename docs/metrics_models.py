@@ -252,6 +252,26 @@ class Girth(Entry):
     ease_wanted_m: float | None = None
 
 
+class Ring(Entry):
+    """A closed way around the garment, and what of the body must pass through it."""
+
+    name: str
+    edge: bool
+    """Whether it is an edge of the cloth; otherwise a level within it."""
+    length_mm: float
+    """Seams and darts closed."""
+    stretched_mm: float
+    """At the cloth's strain limit."""
+    over: str
+    girth_mm: float | None
+    source: str
+    opened_mm: float
+    """What openings add."""
+    passes: bool | None
+    opening_needed_mm: float
+    """Depth of the opening through this ring; at a level, how far it must reach beyond it."""
+
+
 class Constraint(Entry):
     """A constraint and its price."""
 
@@ -397,6 +417,7 @@ class Metrics(Entry):
     seams: list[Seam] | None = None
     pairs: list[list[str]] | None = None
     girths: dict[str, Girth] | None = None
+    rings: list[Ring] | None = None
     constraints: list[Constraint] | None = None
     sewing: Sewing | None = None
     sizes: dict[str, dict[str, Any]] | None = None

@@ -73,6 +73,10 @@ def run_summary(metrics: Mapping[str, Any], files: Sequence[str], folder: str) -
         tables.append(_constraint_table(metrics["constraints"]))
     if metrics.get("girths"):
         tables.append(_girth_line(metrics["girths"]))
+    if metrics.get("rings"):
+        from warpflat.garment.rings import rings_line
+
+        tables.append(rings_line(metrics["rings"]))
     return "\n\n".join(tables) + f"\n{folder}: {', '.join(files)}"
 
 

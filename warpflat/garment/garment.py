@@ -20,8 +20,11 @@ from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
 from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
+from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths, wearer_fit
+from warpflat.garment.openings import Opening, opened_rings
+from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
 from warpflat.mannequin.forms import FormResult
@@ -46,6 +49,8 @@ class Garment:
         pieces: the flat pieces by name, in the form's order.
         sewn: outcome of relaxing them together under their seams and constraints; None if they were not sewn.
         wished: the ease of its seams; None if it was not sewn.
+        openings: along its seams.
+        finishing: of its free edges, in the pattern.
     """
 
     name: str
@@ -54,6 +59,8 @@ class Garment:
     pieces: Mapping[str, Flattening]
     sewn: Sewn | None = None
     wished: SeamRatios | None = None
+    openings: Sequence[Opening] = ()
+    finishing: Sequence[Finishing] = ()
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -94,6 +101,19 @@ class Garment:
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
         return (*self.mannequin.notes, *of_pieces)
 
+    @property
+    def rings(self) -> list[GarmentRing]:
+        """Every closed way around the garment, and what must pass through it."""
+        first, positions = (
+            next(iter(self.pieces.values())),
+            {name: flat.positions for name, flat in self.pieces.items()},
+        )
+        return measure_rings(
+            self.mannequin, self.form, positions, strain_limit=first.fabric.strain_limit,
+            girths=pattern_girths(self.mannequin, self.form, positions),
+            opened=opened_rings(self.mannequin, self.form, positions, self.openings),
+        )  # fmt: skip
+
     def _measured(self, number: int, cost: float | None) -> SeamLengths:
         seam = self.form.seams[number]
         first, second = (self.pieces[piece] for piece in seam.pieces)
@@ -125,9 +145,8 @@ class Garment:
         """Return the content of `metrics.json`."""
         first = next(iter(self.pieces.values()))
         pieces = {name: self._measure(name) for name in self.pieces}
-        girths = pattern_girths(
-            self.mannequin, self.form, {name: piece.positions for name, piece in self.pieces.items()}
-        )
+        positions = {name: piece.positions for name, piece in self.pieces.items()}
+        girths = pattern_girths(self.mannequin, self.form, positions)
         limit = min(piece.fabric.strain_limit for piece in self.pieces.values())
         wearer = {"against": "form", "wearer": wearer_fit(girths, limit)} if girths else {}
         more = {
@@ -136,6 +155,7 @@ class Garment:
             "seams": [seam.as_dict() for seam in self.seams],
             "pairs": [list(pair) for pair in self.pairs],
             "girths": girths,
+            "rings": [ring.as_dict() for ring in self.rings],
             **({} if self.sewn is None else self._sewing()),
         }
         return run_metrics(pieces, first.network.device, more)

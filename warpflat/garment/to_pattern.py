@@ -18,6 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import (
     EdgePlan,
     FormPlan,
@@ -25,7 +26,9 @@ from warpflat.garment.form_plan import (
     find_fold_lines,
     plan_form,
 )
+from warpflat.garment.mark_openings import mark_openings
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
+from warpflat.garment.openings import one_sided, place_opening
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
@@ -87,14 +90,27 @@ def pattern_of_garment(
         for size, garment in garments.items()
     }
     seams = _with_opened_folds(plan.seams, opened)
-    pairs = find_mirror_pairs(garments, pieces, seams)
+    # One pattern cannot serve for both sides where just one of them has an opening.
+    pairs = () if one_sided(sample.openings) else find_mirror_pairs(garments, pieces, seams)
     drawn = {size: _without_mirror_images(row, pairs) for size, row in pieces.items()}
     notes = tuple(f"{pair.of}: cut twice, once mirrored, it serves for {pair.name} too" for pair in pairs)
     notes += tuple(
         f"{piece}: {opened[piece]} bends by {stray * 1000:.1f} mm and cannot lie on the fold: cut twice, with a seam there"
         for piece, stray in bent.items()
     )
-    return Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size), notes
+    pattern = Garment(name=name, pieces=drawn, seams=sew_mirror_pairs(seams, pairs), sample_size=sample_size)
+    placed = {
+        size: [
+            place_opening(garment.form, opening, {piece: flat.positions for piece, flat in garment.pieces.items()})
+            for opening in garment.openings
+        ]
+        for size, garment in garments.items()
+    }
+    pattern = mark_openings(pattern, sample.openings, placed)
+    zips = [
+        row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
+    ]
+    return finish_edges(pattern, sample.finishing, gaps=zips), notes
 
 
 def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:

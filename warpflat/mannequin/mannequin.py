@@ -61,6 +61,7 @@ class Mannequin:
         notes: completions and repairs, one sentence each.
         sections: for a scan, the length [m] of the body's own section at each level.
         measures: for a scan, tapes around the scan itself, by name.
+        lengths: for a body of a size or of measurements, all of these by name [m].
         scan: for a scan, its vertices (#P by 3 [m]) upright with the legs moved together, and its triangles; else None.
         sources: files from which a scan was read; none of them is ever replaced by what is made of it.
     """
@@ -71,6 +72,7 @@ class Mannequin:
     notes: tuple[str, ...] = ()
     sections: Mapping[str, float] = field(default_factory=dict)
     measures: Mapping[str, ScanMeasure] = field(default_factory=dict)
+    lengths: Mapping[str, float] = field(default_factory=dict)
     scan: tuple[FloatArray, NDArray[np.int64]] | None = None
     sources: tuple[Path, ...] = ()
 
@@ -145,7 +147,10 @@ class Mannequin:
                 lengths[name] -= miss / min(max(slope, 0.3), 2.0)
             if worst < 0.0002:
                 break
-        return cls(layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes)
+        return cls(
+            layout=layout, vertices=vertices, source=measurements.source, notes=measurements.notes,
+            lengths=measurements.lengths,
+        )  # fmt: skip
 
     def brick(self, name: str) -> Brick:
         """Return a brick with its vertices, faces and neighbours.
@@ -203,6 +208,12 @@ class Mannequin:
             points = self.line(name)
             found[name] = Level(height=float(points[:, 1].min()), girth=polyline_length(points))
         return found
+
+    def extremity(self, name: str) -> float | None:
+        """Return the girth [m] of "head", "hand left" or "foot left"; None where neither a table nor the scan gives it."""
+        if name in self.measures:
+            return self.measures[name].girth
+        return self.lengths.get(name.split(" ")[0])
 
     def surface(self) -> Surface:
         """Return the body as one surface with every feature line on it; the tube around both legs is no part of it."""

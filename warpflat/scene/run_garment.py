@@ -17,6 +17,7 @@ from warpflat.garment.constraints import Constraint
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.openings import Opening, part_at_centres, place_opening
 from warpflat.garment.pattern_files import PatternOptions, check_names, garment_files
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along
@@ -29,6 +30,7 @@ from warpflat.scene.drape import write_drape
 from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
+from warpflat.scene.openings import scene_finishing, scene_openings, sewn_centres
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult, review_files
@@ -68,6 +70,8 @@ def scene_recipe(scene: Scene, mannequin: Mannequin | None = None) -> tuple[Mann
     if settings.ease is not None:
         form = replace(form, ease=ease_from(settings.ease, scene.where, base=form.ease))
     with errors_named(f"{scene.where}: form"):
+        if not settings.half:
+            form = part_at_centres(mannequin.layout, form, scene_openings(settings.openings))
         form = shaped_form(mannequin.layout, form, "darts" if settings.shape == "auto" else settings.shape)
     # Its bricks are known to be right: with cuts, what is wrong now is most likely one of them.
     with errors_named(f"{scene.where}: {'cuts' if settings.cuts else 'form'}"):
@@ -84,6 +88,7 @@ class GarmentPlan:
         drawing: options of the pattern files.
         wishes: fullness and gathers of seams.
         constraints: on edges and lines.
+        openings: along seams.
         settings: further arguments of :func:`warpflat.garment.garment.flatten_form`.
     """
 
@@ -93,6 +98,7 @@ class GarmentPlan:
     drawing: PatternOptions
     wishes: Sequence[SeamWish]
     constraints: Sequence[Constraint]
+    openings: Sequence[Opening]
     settings: Mapping[str, Any]
 
     def flatten(self, *, callback: Callable[[str, Progress], bool | None] | None = None) -> Garment:
@@ -102,7 +108,7 @@ class GarmentPlan:
             InputError: as :func:`warpflat.garment.garment.flatten_form`.
         """
         with errors_named(self.scene.where):
-            return flatten_form(
+            garment = flatten_form(
                 self.mannequin,
                 self.form,
                 callback=callback,
@@ -110,6 +116,8 @@ class GarmentPlan:
                 constraints=self.constraints,
                 **self.settings,
             )
+            finishing = scene_finishing(self.scene.settings.finishing)
+            return replace(garment, openings=tuple(self.openings), finishing=finishing)
 
 
 def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
@@ -128,8 +136,14 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     mannequin, form = scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker)
+        openings = scene_openings(settings.openings)
+        if settings.half:
+            drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
         plan = plan_form(form, drawing.rules)
         check_names(drawing.names, form.pieces)
+    for number, opening in enumerate(openings):
+        with errors_named(f"{scene.where}: openings[{number}]"):
+            place_opening(form, opening, {name: piece.surface.vertices for name, piece in form.pieces.items()})
     with errors_named(f"{scene.where}: grain_angle"):
         check_fold_grain(find_fold_lines(form, plan), settings.grain_angle)
     wishes = scene_wishes(settings.seams)
@@ -149,6 +163,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
         drawing=drawing,
         wishes=wishes,
         constraints=constraints,
+        openings=openings,
         settings={
             "fabric": fabric,
             "grain_angle": settings.grain_angle,

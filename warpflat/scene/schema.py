@@ -30,8 +30,10 @@ __all__ = [
     "BorderTable",
     "ConstraintTable",
     "FileSurface",
+    "FinishingTable",
     "LineTable",
     "MarkerTable",
+    "OpeningTable",
     "OutputTable",
     "PatternTable",
     "SceneTable",
@@ -232,6 +234,46 @@ class PatternTable(Table):
     """More sizes of a mannequin's garment, flattened too and laid upon each other as a graded nest."""
 
 
+class OpeningTable(Table):
+    """An opening along a seam of a form. A piece that runs across a centre line is parted there, with a seam below the zip.
+
+    A `zip` is measured from the upper end of its seam, a `slit` or `vent` from the lower one.
+    """
+
+    kind: Literal["zip", "slit", "vent"]
+    seam: Annotated[str, Field(min_length=1, max_length=100)]
+    length_mm: Annotated[float, Field(ge=10, le=2000)]
+    start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    style: Literal["invisible", "lapped"] = "invisible"
+    width_mm: Annotated[float, Field(ge=5, le=200)] | None = None
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> OpeningTable:
+        if self.kind == "zip" and self.width_mm is not None:
+            raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
+        if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
+            raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
+        return self
+
+
+class FinishingTable(Table):
+    """Pieces that finish free edges of a form: a facing of each piece, or one straight strip along the whole edge."""
+
+    kind: Literal["facing", "band", "waistband", "binding"]
+    edge: Annotated[str, Field(min_length=1, max_length=100)]
+    width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
+    share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
+    overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
+
+    @model_validator(mode="after")
+    def _fits_its_kind(self) -> FinishingTable:
+        if self.kind != "band" and self.share != 1.0:
+            raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
+        if self.kind != "waistband" and self.overlap_mm:
+            raise ValueError("overlap_mm belongs to a waistband; leave it out")
+        return self
+
+
 class MarkerTable(Table):
     """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
 
@@ -301,6 +343,8 @@ class SceneTable(Table):
     output: OutputTable = Field(default_factory=OutputTable)
     pattern: PatternTable = Field(default_factory=PatternTable)
     marker: MarkerTable | None = None
+    openings: list[OpeningTable] = Field(default_factory=list)
+    finishing: list[FinishingTable] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _consistent(self) -> SceneTable:
@@ -325,6 +369,9 @@ class SceneTable(Table):
         """Refuse what belongs to the form on a mannequin."""
         if self.shape != "none":
             raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
+        for key in ("openings", "finishing"):
+            if getattr(self, key):
+                raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
             raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
         for number, cut in enumerate(self.cuts):

@@ -1,0 +1,169 @@
+"""Openings on a pattern: the notch at a zip's end, its line, and the edges of slits and vents."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
+from warpflat.core.text import find_unused_name
+from warpflat.garment.openings import Opening, OpeningPart
+from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+
+__all__ = ["mark_openings"]
+
+# How far inside the sewing line the line of a zip is drawn [m].
+_INSIDE = 0.004
+# A seam's own notches keep this clear of a zip's end [m], and are this far apart, as in `warpflat.pattern.notches`.
+_CLEAR, _SPACING = 0.030, 0.200
+# A slit or vent closer to the whole seam than this [m] leaves nothing to sew.
+_LEAST_SEWN = 0.02
+
+#: By size and opening, the seams that the opening runs along.
+Placed = Mapping[str, Sequence[Sequence[OpeningPart]]]
+
+
+def mark_openings(pattern: Garment, openings: Sequence[Opening], placed: Placed) -> Garment:
+    """Return a pattern with its openings drawn.
+
+    A zip is a line along its edges with its name, and a notch at its end. A slit or a vent is an edge of its own, which
+    is not sewn and has an allowance of its width.
+
+    Args:
+        pattern: pieces and seams, without mirror images.
+        openings: to be drawn.
+        placed: see :data:`Placed`.
+
+    Raises:
+        InputError: a slit takes the whole seam, or the pattern has no such seam.
+    """
+    for number, opening in enumerate(openings):
+        for part in placed[pattern.sample][number]:
+            begin, end = _reach(opening, part)
+            if end <= begin:
+                continue
+            seam = next((each for each in pattern.seams if each.name == part.seam), None)
+            if seam is None:
+                raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
+            if opening.kind == "zip":
+                pattern = _with_zip(pattern, seam, opening, end if end < part.whole else None, number, placed)
+            else:
+                pattern = _with_slit(pattern, seam, opening, number, placed)
+    return pattern
+
+
+def _reach(opening: Opening, part: OpeningPart) -> tuple[float, float]:
+    """Return where along a seam, from the end of measuring, an opening begins and ends [m]."""
+    begin, end = opening.start - part.before, opening.start + opening.length - part.before
+    return max(0.0, begin), min(part.whole, end)
+
+
+def _part_of(placed: Placed, size: str, number: int, seam: str) -> OpeningPart:
+    return next(part for part in placed[size][number] if part.seam == seam)
+
+
+def _with_zip(
+    pattern: Garment, seam: Seam, opening: Opening, end: float | None, number: int, placed: Placed
+) -> Garment:
+    pieces = dict(pattern.pieces)
+    for size in pieces:
+        begin, stop = _reach(opening, _part_of(placed, size, number, seam.name))
+        for side in (side for row in seam.sides for side in row if not side.mirrored):
+            pieces[size] = [
+                _with_line(piece, side, begin, stop, opening) if piece.name == side.piece else piece
+                for piece in pieces[size]
+            ]
+    if end is None:
+        return replace(pattern, pieces=pieces)
+    whole = _part_of(placed, pattern.sample, number, seam.name).whole
+    share = end / whole
+    if not _starts_on_top(pattern, seam):
+        share = 1.0 - share
+    count = max(1, round(whole / _SPACING))
+    own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
+    notches = tuple(sorted([share, *(each for each in own if abs(each - share) * whole > _CLEAR)]))
+    seams = [replace(each, notches=notches) if each.name == seam.name else each for each in pattern.seams]
+    return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _starts_on_top(pattern: Garment, seam: Seam) -> bool:
+    """Return whether a seam's first side begins at its upper end."""
+    side = seam.sides[0][0]
+    piece = pattern.piece(side.piece, pattern.sample)
+    return _runs_down(piece, piece.edge(side.edge).points) != side.reversed
+
+
+def _runs_down(piece: Piece, points: FloatArray) -> bool:
+    """Return whether a line of a piece runs against the grain."""
+    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
+    return bool((points[-1] - points[0]) @ grain < 0.0)
+
+
+def _with_line(piece: Piece, side: SeamSide, begin: float, end: float, opening: Opening) -> Piece:
+    """Return a piece with the line of an opening beside one of its edges."""
+    import shapely
+
+    edge = piece.edge(side.edge)
+    inside = shapely.LineString(edge.points).offset_curve(_INSIDE)
+    line = np.asarray(inside.coords)
+    if not _runs_down(piece, line):
+        line = line[::-1]
+    stretch = _between(line, begin, min(end, polyline_length(line)))
+    name = find_unused_name(opening.title, piece.internal_lines)
+    return replace(piece, internal_lines={**piece.internal_lines, name: stretch})
+
+
+def _between(line: FloatArray, begin: float, end: float) -> FloatArray:
+    """Return the part of a line between two lengths along it."""
+    at = arc_lengths(line)
+    ends = points_at_lengths(line, np.array([begin, end]))
+    return np.vstack([ends[:1], line[(at > begin + 1e-6) & (at < end - 1e-6)], ends[1:]])
+
+
+def _with_slit(pattern: Garment, seam: Seam, opening: Opening, number: int, placed: Placed) -> Garment:
+    sides = [side for row in seam.sides for side in row]
+    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0:
+        raise InputError(f"openings[{number}]: a {opening.kind} begins at the lower end of a seam between two edges")
+    pieces = dict(pattern.pieces)
+    for size in pieces:
+        part = _part_of(placed, size, number, seam.name)
+        if part.whole - opening.length < _LEAST_SEWN:
+            raise InputError(
+                f"openings[{number}]: a {opening.kind} of {1e3 * opening.length:.0f} mm leaves nothing of the seam {seam.name!r}, "
+                f"{1e3 * part.whole:.0f} mm long; make it shorter, or leave the seam out of the form"
+            )
+        for side in (side for side in sides if not side.mirrored):
+            pieces[size] = [
+                _with_free_end(piece, side.edge, opening) if piece.name == side.piece else piece
+                for piece in pieces[size]
+            ]
+    return replace(pattern, pieces=pieces)
+
+
+def _with_free_end(piece: Piece, name: str, opening: Opening) -> Piece:
+    """Return a piece one of whose edges has its lower end as an edge of its own."""
+    edges: list[Edge] = []
+    taken = {edge.name for edge in piece.edges}
+    for edge in piece.edges:
+        if edge.name != name:
+            edges.append(edge)
+            continue
+        down, whole = _runs_down(piece, edge.points), edge.length
+        at = whole - opening.length if down else opening.length
+        free = find_unused_name(f"{name} {opening.kind}", taken)
+        parts = [_between(edge.points, 0.0, at), _between(edge.points, at, whole)]
+        # Corners are shared bit for bit.
+        parts[0][0], parts[1][-1], parts[1][0] = edge.points[0], edge.points[-1], parts[0][-1]
+        names = (name, free) if down else (free, name)
+        edges += [
+            Edge(
+                name=part, points=points, kind="hem" if part == free else edge.kind,
+                allowance=opening.width if part == free else edge.allowance,
+            )
+            for part, points in zip(names, parts, strict=True)
+        ]  # fmt: skip
+    return replace(piece, edges=edges)
