@@ -26,7 +26,7 @@ class Watch:
             self.seen = progress.model_energy
 
 
-surface = make_shape("dome", resolution=33)
+surface = make_shape("dome", resolution=65)
 for fabric in ("denim", "interlock"):
     print(fabric)
     pattern = warpflat.flatten(surface, fabric=fabric, datum="centre", callback=Watch())

@@ -91,7 +91,7 @@ def test_a_run_that_does_not_converge_exits_with_1_and_says_so(warpflat: Run):
     Path("cap.toml").write_text("[surface]\nshape = 'dome'\nresolution = 9\n[relax]\nmax_steps = 2\n" + BARE)
     code, out, err = warpflat("run", "cap.toml", "--quiet")
     assert (code, out) == (1, "")
-    assert re.fullmatch(r"warpflat: cap did not converge within 2 steps .*max_steps\n", err)
+    assert re.fullmatch(r"warpflat: cap did not converge within 4 work units .*max_steps\n", err)
     code, out, err = warpflat("run", "cap.toml")
     assert out.startswith("pieces: 1; 81 vertices, NOT converged: cap, ")
     code, out, err = warpflat("run", "cap.toml", "-v")

@@ -64,7 +64,9 @@ def test_membrane_forces_are_minus_the_gradient_of_its_energy(stretch: tuple[flo
         on([AREA], wp.float64),
         law,
     ]
-    launch_each(evaluate_cloth, 1, inputs, [force], device=DEVICE)
+    energy = wp.zeros(1, dtype=wp.float64, device=DEVICE)
+    launch_each(evaluate_cloth, 1, inputs, [force, energy], device=DEVICE)
+    assert energy.numpy()[0] == pytest.approx(membrane_energy(x), rel=1e-6)
     step, by_hand = 1e-7, np.zeros((3, 3))
     for place in np.ndindex(3, 3):
         away = np.zeros((3, 3))

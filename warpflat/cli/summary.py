@@ -9,6 +9,7 @@ from typing import Any
 from warpflat.cli.tables import energy_words
 from warpflat.core.text import format_count
 from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words
+from warpflat.garment.rings import rings_line
 
 __all__ = ["WIDTH", "notes_line", "summary_lines"]
 
@@ -36,6 +37,8 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
     lines += _fit_lines(metrics["pieces"])
     if metrics.get("seams") or metrics.get("constraints"):
         lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
+    if metrics.get("rings"):
+        lines.append(_clipped(rings_line(metrics["rings"])))
     if "drape" in metrics:
         lines.append(_drape_line(metrics["drape"]))
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
