@@ -8,7 +8,7 @@ from typing import Any
 
 from warpflat.cli.tables import energy_words
 from warpflat.core.text import format_count
-from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words
+from warpflat.flattening.fit_report import garment_wear, no_cut_words, remedy_words, wearer_words
 from warpflat.garment.rings import rings_line
 
 __all__ = ["WIDTH", "notes_line", "summary_lines"]
@@ -34,7 +34,10 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
     lines = [_pieces_line(metrics["pieces"])]
     if girths := metrics.get("girths"):
         lines.append(_girths_line(girths))
-    lines += _fit_lines(metrics["pieces"])
+    wearer = metrics.get("wear", {}).get("wearer")
+    if wearer:
+        lines.append(_clipped(wearer_words(wearer)))
+    lines += _fit_lines(metrics["pieces"], "lies on the form" if wearer else "fit")
     if metrics.get("seams") or metrics.get("constraints"):
         lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
     if metrics.get("rings"):
@@ -86,7 +89,7 @@ def _girths_line(girths: Mapping[str, Mapping[str, float]]) -> str:
     return _listed("girths [cm] (ease): ", [parts[level] for level in (*first, *then, *rest)])
 
 
-def _fit_lines(pieces: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _fit_lines(pieces: Mapping[str, Mapping[str, Any]], head: str) -> list[str]:
     """Return whether all pieces fit, with their ranges or the worst place, and the best advice where one does not."""
     worn = {name: piece for name, piece in pieces.items() if piece.get("wear")}
     if not worn:
@@ -94,7 +97,7 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]]) -> list[str]:
     all_of_it = garment_wear(worn)
     beyond = f"{100 * all_of_it['outside']:.1f} % beyond the limit"
     if all_of_it["fits"]:
-        return [_clipped(f"fit: yes; {beyond}; {', '.join(_ranges([piece['wear'] for piece in worn.values()]))}")]
+        return [_clipped(f"{head}: yes; {beyond}; {', '.join(_ranges([piece['wear'] for piece in worn.values()]))}")]
     worst = max(
         (name for name in worn if not worn[name]["wear"]["fits"]),
         key=lambda name: worn[name]["wear"]["outside"] * worn[name]["area_m2"],
@@ -109,7 +112,7 @@ def _fit_lines(pieces: Mapping[str, Mapping[str, Any]]) -> list[str]:
     advice = no_cut_words(before, sewn=sewn) if best is None else remedy_words(best, before, sewn=sewn)
     place = next(iter(wear["where_not"]), "").partition(" (limit")[0]
     unfit = [name for name in worn if not worn[name]["wear"]["fits"]]
-    return [_clipped(f"fit: no: {_some(unfit)}; {beyond}; {worst} {place}"), _clipped(f"  {advice}")]
+    return [_clipped(f"{head}: no: {_some(unfit)}; {beyond}; {worst} {place}"), _clipped(f"  {advice}")]
 
 
 def _ranges(worn: Sequence[Mapping[str, Any]]) -> list[str]:

@@ -21,6 +21,7 @@ __all__ = [
     "remedy_words",
     "strain_words",
     "wear_measures",
+    "wearer_words",
 ]
 
 
@@ -172,11 +173,11 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
             f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
         if wearer := metrics["wear"].get("wearer"):
-            lines.append(_wearer_words(wearer))
+            lines.append(wearer_words(wearer))
     return lines
 
 
-def _wearer_words(wearer: Mapping[str, Any]) -> str:
+def wearer_words(wearer: Mapping[str, Any]) -> str:
     """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller."""
     loose = [
         f"{name} {100 * level['ease_m']:+.1f} cm" for name, level in wearer["levels"].items() if level["strain"] == 0.0
