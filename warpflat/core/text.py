@@ -11,6 +11,7 @@ __all__ = [
     "control_in",
     "find_unused_name",
     "format_count",
+    "name_without_number",
     "one_line",
     "plain_letters",
     "quote_value",
@@ -97,3 +98,9 @@ def find_unused_name(name: str, taken: Container[str]) -> str:
     while f"{name} {number}" in taken:
         number += 1
     return f"{name} {number}" if name in taken else name
+
+
+def name_without_number(name: str, names: Container[str]) -> str:
+    """Return "waist" for "waist 2" where `names` has a "waist", of which that is a further stretch; else the name itself."""
+    line, _, number = name.rpartition(" ")
+    return line if number.isdigit() and line in names else name

@@ -13,6 +13,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.polyline import polyline_length, resample
+from warpflat.core.text import name_without_number
 from warpflat.export.labels import (
     LabelRoom,
     Spot,
@@ -76,7 +77,8 @@ class _Names:
         self._lines = {name: stretches[name] for name in named if len(stretches[name]) > 1}
         _, height = pen.measure("x", LABEL_SIZE)
         self._ink = {name: points_on(line, 0.5 * height) for name, line in self._lines.items()}
-        self.unplaced = list(self._lines)
+        # The stretches of a line between darts need one name together.
+        self.unplaced = [name for name in self._lines if name_without_number(name, self._lines) == name]
 
     def on_border(self) -> list[str]:
         """Return the names of lines most of whose vertices are on the border."""

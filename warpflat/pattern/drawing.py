@@ -11,6 +11,7 @@ import numpy as np
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, resample
+from warpflat.core.text import name_without_number
 from warpflat.pattern.curves import Curve, fit_curve
 from warpflat.pattern.draft import nest_label
 from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
@@ -297,13 +298,7 @@ def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, Float
             lines.append((edge.name, edge.line, True))
     lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
     called = {name for name, _, _ in lines}
-    return [(_without_number(name, called), line, inwards) for name, line, inwards in lines]
-
-
-def _without_number(name: str, called: set[str]) -> str:
-    """Return what stands beside a line: "waist" at "waist 2" too, a further stretch of the line "waist"."""
-    line, _, number = name.rpartition(" ")
-    return line if number.isdigit() and line in called else name
+    return [(name_without_number(name, called), line, inwards) for name, line, inwards in lines]
 
 
 def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:
