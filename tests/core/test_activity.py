@@ -43,6 +43,7 @@ def test_a_run_reports_what_it_does_besides_steps(tmp_path: Path, monkeypatch: p
         "drafting the pattern",
         *(f"writing {name}" for name in ("block.dxf", "block.svg", "pattern.pdf", "pattern.json")),
         "laying the marker",
+        "drawing walked.png",
         "writing the review page",
     ]
     missed = [float(words.split(", ")[2].split()[0]) for words in heard if "mm amiss" in words]

@@ -78,7 +78,7 @@ def test_seams_match_and_say_what_that_costs(block: Garment, mannequin: Mannequi
     assert 0.0 < block.sewn.cost < 0.2 * block.sewn.energy_before
     prices = {seam.name: seam.cost for seam in block.seams}
     assert sum(price for price in prices.values() if price is not None) == pytest.approx(block.sewn.cost, rel=0.05)
-    assert prices["side left"] == pytest.approx(prices["side right"], rel=1e-3)
+    assert prices["bodice side left"] == pytest.approx(prices["bodice side right"], rel=1e-3)
     assert all(seam.cost is None for seam in alone.seams)
     assert block.sewn.energy_before == pytest.approx(sum(p.stages[-1].model_energy_j for p in alone.pieces.values()))
 
@@ -165,7 +165,7 @@ def test_the_waist_of_a_small_body_does_not_zigzag_in_knitwear():
 
 def test_both_sides_of_a_seam_come_from_one_curve(block: Garment):
     names = {seam.name for seam in block.seams}
-    assert {"side left", "side right", "shoulder left", "waist"} <= names
+    assert {"bodice side left", "skirt side right", "shoulder left", "front waist"} <= names
     for seam, measured in zip(block.form.seams, block.seams, strict=True):
         first, second = (block.form.pieces[name].surface.vertices for name in seam.pieces)
         np.testing.assert_array_equal(first[seam.runs[0].vertices[0]], second[seam.runs[0].vertices[1]])

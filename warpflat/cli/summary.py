@@ -52,7 +52,10 @@ def notes_line(notes: Sequence[str]) -> str:
     """Return notes as one line: completed measurements are counted, and as many others follow as fit; nothing without any."""
     guessed = [note for note in notes if _COMPLETED.match(note)]
     parts = [f"{format_count(len(guessed), 'measurement')} guessed from others"] if guessed else []
-    parts += [note for note in notes if note not in guessed]
+    others = [note for note in notes if note not in guessed]
+    # What became of the user's files comes first.
+    parts = [*(note for note in others if note.startswith("removed")), *parts]
+    parts += [note for note in others if not note.startswith("removed")]
     for count in range(len(parts), 0, -1):
         more = [f"{len(parts) - count} more"] if count < len(parts) else []
         line = "; ".join([*parts[:count], *more, *(["-v lists them"] if more or guessed else [])])
