@@ -50,12 +50,12 @@ def licence_of(package: Distribution) -> str:
 
 
 def home_of(package: Distribution) -> str:
-    """Return a package's page."""
+    """Return a package's page in angle brackets, or nothing if it names none."""
     about = package.metadata
     urls = dict(line.split(", ", 1) for line in about.get_all("Project-URL") or ())
     by_name = {key.lower(): url for key, url in urls.items()}
     found = (by_name.get(key) for key in ("homepage", "home", "source", "source code", "repository", "github"))
-    return next((url for url in (*found, about.get("Home-page")) if url), f"https://pypi.org/project/{about['Name']}/")
+    return next((f"<{url}>" for url in (*found, about.get("Home-page")) if url), "")
 
 
 def licences_page() -> str:
@@ -67,7 +67,7 @@ def licences_page() -> str:
         "| package | licence | page |", "|---|---|---|",
     ]  # fmt: skip
     for name, package in find_packages("warpflat", EXTRAS).items():
-        lines.append(f"| {name} | {licence_of(package)} | <{home_of(package)}> |")
+        lines.append(f"| {name} | {licence_of(package)} | {home_of(package)} |")
     return "\n".join(lines) + "\n"
 
 
