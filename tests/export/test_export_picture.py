@@ -127,6 +127,20 @@ def test_pieces_are_rows_and_share_the_scale(tmp_path: Path) -> None:
     assert near(upper, energy_colours(0.5, 1.0)) < 500
 
 
+def test_narrow_pieces_stand_side_by_side(tmp_path: Path) -> None:
+    tall = dome(5)
+    tall = surface(tall.vertices * [0.15, 1.0, 0.15], tall.faces, "tall")
+    left, right = (find_piece(tall, np.full(16, d), positions=tall.vertices[:, :2]) for d in (1.0, 0.5))
+    write_picture(tmp_path / "one.png", [left], scale=1.0)
+    write_picture(tmp_path / "two.png", [left, right], scale=1.0)
+    one, two = pixels_of(tmp_path / "one.png"), pixels_of(tmp_path / "two.png")
+    assert len(two) <= len(one)
+    halves = np.split(two[:, 80:1610], 2, axis=1)
+    for half, density in zip(halves, (1.0, 0.5), strict=True):
+        assert near(half, energy_colours(density, 1.0)) > 20_000
+        assert near(half, energy_colours(1.5 - density, 1.0)) < 500
+
+
 def test_all_kinds_of_pieces_can_be_drawn(tmp_path: Path) -> None:
     index, quads = grid(41, 3)
     x, y = np.meshgrid(np.linspace(0.0, 1.5, 41), np.linspace(0.0, 0.04, 3))

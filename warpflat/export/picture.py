@@ -17,7 +17,7 @@ from warpflat.export.colours import energy_scale
 from warpflat.export.geometry import polylines_of
 from warpflat.export.letters import all_letters, is_drawn, titles
 from warpflat.export.picture_garment import Body, GarmentViews
-from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out
+from warpflat.export.picture_page import TOP_MARGIN, Row, draw_colour_bar, draw_row, lay_out, page_height
 from warpflat.export.picture_pen import DPI, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import make_facets, pattern_view, surface_view
@@ -112,7 +112,8 @@ def draw_figure(
     worn = None
     if body is not None:
         worn = GarmentViews(body, [piece.surface for piece in pieces], [row.density for row in rows])
-    height = lay_out(pen, rows) + (0.0 if worn is None else worn.height)
+    bands = lay_out(pen, rows)
+    height = page_height(bands) + (0.0 if worn is None else worn.height)
     figure.set_size_inches(PAGE_WIDTH, height)
     pen.open_page(figure, height)
     top = height - TOP_MARGIN
@@ -120,9 +121,10 @@ def draw_figure(
         worn.draw(pen, top, scale)
         top -= worn.height
     band_top = top
-    for row in rows:
-        draw_row(pen, row, top, scale)
-        top -= row.height
+    for band in bands:
+        for row in band:
+            draw_row(pen, row, top, scale)
+        top -= band[0].height
     draw_colour_bar(pen, rows[0], scale, density, areas, quantity, top=band_top)
     return figure
 

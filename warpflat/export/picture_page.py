@@ -15,12 +15,14 @@ from warpflat.export.picture_lines import draw_lines
 from warpflat.export.picture_pen import DPI, GRAIN, GREY, LABEL_SIZE, PAGE_WIDTH, POINT, Pen
 from warpflat.export.picture_views import INK, DrawnView, View
 
-__all__ = ["TOP_MARGIN", "Row", "draw_colour_bar", "draw_row", "lay_out"]
+__all__ = ["TOP_MARGIN", "Row", "draw_colour_bar", "draw_row", "lay_out", "page_height"]
 
 TOP_MARGIN = 0.30  # [in], as all that follows
 _LEFT, _RIGHT = 0.55, 1.75  # the colour bar stands in the right margin
 _BETWEEN = 1.35  # from surface to pattern: the height's dimension line, and labels that do not fit inside
 _BESIDE = 0.75  # right of the pattern, for labels
+_NAMES_LEFT = 1.0  # left of the surface, for labels, where two pieces stand side by side
+_LITTLE_SMALLER = 0.8
 _BELOW = 0.95  # a row's foot: the width's dimension line and the scale bar
 _SMALLEST_BAND, _SMALLEST_PATTERN = 1.0, 2.4
 _COLOUR_BAR = (1.9, 3.6)  # its least and its greatest height
@@ -32,7 +34,7 @@ _TICK_SIZE = 8.5  # [pt]
 
 @dataclass(kw_only=True, eq=False)
 class Row:
-    """One piece on the page: its name, captions, two views, and where they lie."""
+    """One piece on the page: its name, captions, two views, and where they lie, from `left` to `right` [in]."""
 
     name: str
     captions: Mapping[str, str]
@@ -44,6 +46,8 @@ class Row:
     caption_lines: list[str] = field(default_factory=list)
     inches_per_metre: float = 1.0
     band: float = 0.0
+    left: float = _LEFT
+    right: float = PAGE_WIDTH - _RIGHT
 
     @property
     def areas(self) -> FloatArray:
@@ -64,11 +68,11 @@ class Row:
         return self.head + self.band + _BELOW
 
 
-def lay_out(pen: Pen, rows: Sequence[Row]) -> float:
-    """Choose the scale and the height of each row, and return the height of the page [in].
+def lay_out(pen: Pen, rows: Sequence[Row]) -> list[list[Row]]:
+    """Choose the scale and the place of each piece, and return the pieces of each band across the page, from the top.
 
-    All rows have the same scale, so that pieces can be compared; only a piece that would become too small to read is
-    drawn larger. Each row has its own scale bar.
+    All pieces have the same scale, so that they can be compared; only a piece that would become too small to read is
+    drawn larger. Each has its own scale bar. Narrow pieces stand side by side.
     """
     wide = PAGE_WIDTH - _LEFT - _RIGHT - _BETWEEN - _BESIDE
     high = 6.0 if len(rows) == 1 else 4.4 if len(rows) < 4 else 3.4
@@ -77,24 +81,65 @@ def lay_out(pen: Pen, rows: Sequence[Row]) -> float:
         min(wide / max(float(body[0] + flat[0]), 1e-9), high / max(float(body[1]), float(flat[1]), 1e-9))
         for body, flat in sizes
     ]
+    scale = min(fits)
+    # The scale at which any two stand side by side, where that is not much smaller.
+    room = 0.5 * (PAGE_WIDTH - _LEFT - _RIGHT) - _NAMES_LEFT - _BETWEEN - _BESIDE
+    paired = room / max(float(body[0] + flat[0]) for body, flat in sizes)
+    if len(rows) > 1 and paired > _LITTLE_SMALLER * scale:
+        scale = min(scale, paired)
     for row, fit, (body, flat) in zip(rows, fits, sizes, strict=True):
         readable = _SMALLEST_PATTERN / max(float(flat.max()), 1e-9)
-        row.inches_per_metre = max(min(fits), min(fit, readable))
+        row.inches_per_metre = max(scale, min(fit, readable))
         row.band = max(_SMALLEST_BAND, row.inches_per_metre * float(max(body[1], flat[1])))
-        row.caption_lines = _wrapped(pen, row)
     rows[0].band = max(rows[0].band, _COLOUR_BAR[0])
-    return TOP_MARGIN + sum(row.height for row in rows) + 0.15
+    bands = _bands(rows)
+    for band in bands:
+        width = (PAGE_WIDTH - _LEFT - _RIGHT) / len(band)
+        for place, row in enumerate(band):
+            row.left, row.right = _LEFT + place * width, _LEFT + (place + 1) * width
+            row.caption_lines = _wrapped(pen, row)
+        # The views of a band stand at one height.
+        lines = max(len(row.caption_lines) for row in band)
+        tallest = max(row.band for row in band)
+        for row in band:
+            row.caption_lines += [""] * (lines - len(row.caption_lines))
+            row.band = tallest
+    return bands
+
+
+def _bands(rows: Sequence[Row]) -> list[list[Row]]:
+    """Return the pieces in bands, as many to each as fit side by side."""
+    bands: list[list[Row]] = []
+    for row in rows:
+        if bands:
+            wider = [*bands[-1], row]
+            if max(map(_least_width, wider)) * len(wider) <= PAGE_WIDTH - _LEFT - _RIGHT + 1e-9:
+                bands[-1] = wider
+                continue
+        bands.append([row])
+    return bands
+
+
+def _least_width(row: Row) -> float:
+    """Return how wide a piece is with its two views and their labels [in]."""
+    views = float(row.on_body.size[0] + row.pattern.size[0]) * row.inches_per_metre
+    return _NAMES_LEFT + views + _BETWEEN + _BESIDE
+
+
+def page_height(bands: Sequence[Sequence[Row]]) -> float:
+    """Return the height of the page [in]."""
+    return TOP_MARGIN + sum(band[0].height for band in bands) + 0.15
 
 
 def _wrapped(pen: Pen, row: Row) -> list[str]:
-    """Return the captions as lines that end before the colour bar."""
+    """Return the captions as lines that end before the next piece or the colour bar."""
     width, height = row.pattern.size[:2]
     captions = {"pattern": f"{_length(width, unit=False)} × {_length(height)}"} | dict(row.captions)
     lines: list[str] = []
     for key, value in captions.items():
         entry = f"{key} {value}"
         longer = f"{lines[-1]}   ·   {entry}" if lines else entry
-        if lines and pen.measure(longer, 9.5)[0] < PAGE_WIDTH - _LEFT - _RIGHT:
+        if lines and pen.measure(longer, 9.5)[0] < row.right - row.left:
             lines[-1] = longer
         else:
             lines.append(entry)
@@ -102,15 +147,15 @@ def _wrapped(pen: Pen, row: Row) -> list[str]:
 
 
 def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
-    """Draw a row whose upper edge is at `top` [in], its colours up to `scale` [J/m2]."""
-    pen.write(_LEFT, top - 0.14, row.name, 15, fontweight="bold")
+    """Draw a piece whose upper edge is at `top` [in], its colours up to `scale` [J/m2]."""
+    pen.write(row.left, top - 0.14, row.name, 15, fontweight="bold")
     for index, text in enumerate(row.caption_lines):
-        pen.write(_LEFT, top - 0.42 - 0.20 * index, text, 9.5, color=GREY)
+        pen.write(row.left, top - 0.42 - 0.20 * index, text, 9.5, color=GREY)
     middle = top - row.head - 0.5 * row.band
     size = row.inches_per_metre
     body, flat = row.on_body.size * size, row.pattern.size * size
-    spare = PAGE_WIDTH - _LEFT - _RIGHT - _BETWEEN - _BESIDE - float(body[0] + flat[0])
-    left = _LEFT + 0.3 * spare
+    spare = row.right - row.left - _BETWEEN - _BESIDE - float(body[0] + flat[0])
+    left = row.left + 0.3 * spare
     shown = []
     for view, extent in ((row.on_body, body), (row.pattern, flat)):
         bottom = middle - 0.5 * float(extent[1])
@@ -127,16 +172,17 @@ def draw_row(pen: Pen, row: Row, top: float, scale: float) -> None:
     datum = row.pattern.lines.get(row.datum, [None])[0] if row.datum is not None else None
     has_grain = datum is None or _grain(pen, room, pattern, datum, row.grain_angle, inside=True)
     floor = top - row.height + 0.02
+    left_end = 0.1 if row.left == _LEFT else row.left + 0.05
     between = 0.5 * (on_body.box[2] + pattern.box[0])
     unnamed: dict[str, None] = {}
-    for drawn, left, right in ((on_body, 0.1, between), (pattern, between, PAGE_WIDTH - _RIGHT + 0.1)):
+    for drawn, left, right in ((on_body, left_end, between), (pattern, between, row.right + 0.05)):
         page = (left, floor, right, top - row.head + 0.2)
         unnamed |= dict.fromkeys(draw_lines(pen, room, drawn, row.datum, page))
     if not has_grain and datum is not None and not _grain(pen, room, pattern, datum, row.grain_angle, inside=False):
         unnamed["grain"] = None
     if unnamed:
         text = f"not labelled for want of room: {', '.join(unnamed)}"
-        pen.write(_LEFT, floor + 0.06, text, 7.5, color=GREY)
+        pen.write(row.left, floor + 0.06, text, 7.5, color=GREY)
 
 
 def _heading(pen: Pen, room: LabelRoom, drawn: DrawnView, words: str, y: float) -> None:
@@ -253,7 +299,7 @@ def _scale_bar(pen: Pen, room: LabelRoom, drawn: DrawnView, inches_per_metre: fl
     from matplotlib.patches import Rectangle
 
     steps = np.outer(10.0 ** np.arange(-6, 4), [1.0, 2.0, 5.0]).ravel()
-    metres = float(steps[max(int(np.searchsorted(steps, 1.7 / inches_per_metre, side="right")) - 1, 0)])
+    metres = float(steps[max(int(np.searchsorted(steps, 1.3 / inches_per_metre, side="right")) - 1, 0)])
     wide = metres * inches_per_metre
     left = max(0.5 * (drawn.box[0] + drawn.box[2] - wide), 0.2)
     y = drawn.box[1] - 0.42
