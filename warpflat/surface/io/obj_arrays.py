@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,7 @@ def _read_runs(raw: bytes, begins: Index, kinds: NDArray[np.uint8], firsts: list
     others = list[tuple[int, int, str]]()
     seen = textures = 0
     split = True
-    for begin, end in zip(firsts, firsts[1:], strict=False):
+    for begin, end in pairwise(firsts):
         kind = kinds[begin]
         if kind == _TEXTURE:
             textures += end - begin
