@@ -247,6 +247,46 @@ def test_a_batch_over_bodies_draws_them(tmp_path: Path):
 # --- workers
 
 
+def test_a_task_that_never_began_is_not_said_to_have_killed_its_worker(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    workers = pytest.importorskip("warpflat.batch.workers", reason="the extra `batch` (Dask) is not installed")
+    tasks, retried = plan(tmp_path), list[str]()
+
+    class Lost:
+        """A future whose workers die before its task begins, or once it has begun for the third time."""
+
+        def __init__(self, task: Task) -> None:
+            self.task = task
+
+        def result(self) -> Row:
+            raise workers.KilledWorker(self.task.key, None, 3)
+
+        def retry(self) -> None:
+            retried.append(self.task.key)
+            if self.task is tasks[0]:
+                with (tmp_path / f"{self.task.key}.started").open("a") as file:
+                    file.write("here 1\n")
+
+    class Scheduler:
+        def nthreads(self) -> dict[str, int]:
+            return {"one": 1, "two": 1}
+
+        def submit(self, _: object, task: Task, *__: object, **___: object) -> Lost:
+            return Lost(task)
+
+    class Waited:
+        def __init__(self, futures: list[Lost], **_: object) -> None:
+            self.done = futures
+
+    monkeypatch.setattr(workers, "wait", Waited)
+    killer, innocent = workers._run_round(Scheduler(), {task.key: task for task in tasks[:2]}, tmp_path)
+    assert retried.count(tasks[0].key) == 3
+    assert (killer.status, innocent.status) == ("set aside", "set aside")
+    assert "killed 3 times" in killer.message
+    assert "died before it began" in innocent.message
+    assert read_row(tasks[0], tmp_path) == killer
+    assert read_row(tasks[1], tmp_path) is None
+
+
 def test_a_killed_worker_costs_nothing_but_time(tmp_path: Path):
     pytest.importorskip("distributed", reason="the extra `batch` (Dask) is not installed")
     import psutil

@@ -18,13 +18,14 @@ from distributed.system import MEMORY_LIMIT
 
 from warpflat._version import __version__
 from warpflat.batch.plan import Task
-from warpflat.batch.task import Row, has_killed, run_task, set_aside
+from warpflat.batch.task import SET_ASIDE, Row, has_killed, run_task, set_aside
 from warpflat.core.errors import InputError
 
 __all__ = ["run_on_cluster", "run_on_workers"]
 
-# A task that is blamed for so many dead workers is set aside, even if it never got as far as its start.
+# A task that waits while so many workers die is given up for this time, though it never got as far as its start.
 _MOST_BLAMES = 20
+_NOT_BEGUN = f"{_MOST_BLAMES} times all workers that had it died before it began: see why they die, and run the batch again to try it"
 # How long a scheduler is waited for [s].
 _PATIENCE = 60.0
 # How often the number of workers is asked for [s].
@@ -101,7 +102,8 @@ def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row
     """Run tasks on the workers that a client has, and take each from `todo` when it is done.
 
     No more tasks are submitted than there are workers: when a worker dies, Dask blames all tasks that it had been given. A task that Dask
-    gives up is tried again, unless the count of its own starts says that it has killed its workers itself.
+    gives up is tried again, unless the count of its own starts says that it has killed its workers itself. Where worker after worker dies
+    before it begins, it is no fault of the task: nothing is recorded, and the same command tries it again.
     """
     blames = Counter[str]()
     waiting = list(todo.values())
@@ -121,10 +123,13 @@ def _run_round(client: Client, todo: dict[str, Task], out: Path) -> Iterator[Row
                 row: Row = future.result()
             except KilledWorker:
                 blames[task.key] += 1
-                if not has_killed(task, out) and blames[task.key] < _MOST_BLAMES:
+                if has_killed(task, out):
+                    row = set_aside(task, out)
+                elif blames[task.key] < _MOST_BLAMES:
                     future.retry()
                     continue
-                row = set_aside(task, out)
+                else:
+                    row = Row(task=task, status=SET_ASIDE, message=_NOT_BEGUN)
             del going[future], todo[task.key]
             yield row
 

@@ -6,6 +6,7 @@ normals its corners carry, so corners that a file splits per `vt` are whole agai
 
 from __future__ import annotations
 
+import codecs
 import re
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
+from warpflat.surface.io.obj_arrays import read_arrays
 from warpflat.surface.repair.polygons import pad_corners
 
 __all__ = ["ObjMesh", "chain_lines", "read_obj"]
@@ -62,6 +64,8 @@ def read_obj(path: Path) -> ObjMesh:
     raw = path.read_bytes()
     if b"\0" in raw:
         raise InputError("not an OBJ file: it holds binary data")
+    if (mesh := _plain_mesh(raw.removeprefix(codecs.BOM_UTF8))) is not None:
+        return mesh
     text = raw.decode("utf-8-sig", errors="replace")
     _check_last_line(text)
     statements = _collect(text)
@@ -76,6 +80,24 @@ def read_obj(path: Path) -> ObjMesh:
         polygons=polygons,
         lines=_line_elements(statements, len(vertices)),
         split_corners=_split_per_texture(statements, len(vertices)),
+    )
+
+
+def _plain_mesh(raw: bytes) -> ObjMesh | None:
+    """Return the contents of a plain file without its byte order mark; None if it has to be read line by line."""
+    plain = read_arrays(raw)
+    if plain is None:
+        return None
+    found, group = _Statements(), ""
+    for number, seen, line in plain.others:
+        group = _collect_line(found, line, number, seen, group)
+    if found.vertices or found.faces or found.texture:
+        return None
+    return ObjMesh(
+        vertices=plain.vertices,
+        polygons=pad_corners(plain.corners, plain.counts),
+        lines=_line_elements(found, len(plain.vertices)),
+        split_corners=plain.split_corners,
     )
 
 
@@ -100,23 +122,29 @@ def _collect(text: str) -> _Statements:
         if _CONTINUED in line:
             number += line.count(_CONTINUED)
             line = line.replace(_CONTINUED, " ")
-        if "#" in line:
-            line = line[: line.index("#")]
-        key, _, rest = line.strip().replace("\t", " ").partition(" ")
-        if key == "v":
-            found.vertices.append(rest)
-            found.vertex_line.append(here)
-        elif key in ("f", "fo"):
-            found.faces.append(rest)
-            found.face_line.append(here)
-            found.face_seen.append(len(found.vertices))
-        elif key == "vt":
-            found.texture += 1
-        elif key == "l":
-            found.lines.append((group, rest, here, len(found.vertices)))
-        elif key in ("g", "o"):
-            group = rest.strip() or group
+        group = _collect_line(found, line, here, len(found.vertices), group)
     return found
+
+
+def _collect_line(found: _Statements, line: str, number: int, seen: int, group: str) -> str:
+    """Add the statement of a line that has `seen` vertices above it, and return the group from there on."""
+    if "#" in line:
+        line = line[: line.index("#")]
+    key, _, rest = line.strip().replace("\t", " ").partition(" ")
+    if key == "v":
+        found.vertices.append(rest)
+        found.vertex_line.append(number)
+    elif key in ("f", "fo"):
+        found.faces.append(rest)
+        found.face_line.append(number)
+        found.face_seen.append(seen)
+    elif key == "vt":
+        found.texture += 1
+    elif key == "l":
+        found.lines.append((group, rest, number, seen))
+    elif key in ("g", "o"):
+        return rest.strip() or group
+    return group
 
 
 def _numbers(found: _Statements) -> FloatArray:

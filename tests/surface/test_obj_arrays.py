@@ -1,0 +1,108 @@
+"""Plain OBJ files are read by arrays, and all others by lines, with the same result."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from warpflat.core.errors import InputError
+from warpflat.surface.io import read_obj
+from warpflat.surface.io.obj_arrays import read_arrays
+
+GRID = 12
+
+
+def plain(corner: str, *, position: str = "v {x!r} {y!r} {z!r}", end: str = "\n") -> str:
+    """A grid of quads and triangles; `corner` writes the corner of a vertex's number."""
+    random = np.random.default_rng(4)
+    lines = ["# a comment, ö", "o piece"]
+    for x, y, z in random.normal(size=(GRID * GRID, 3)).tolist():
+        lines.append(position.format(x=x, y=y, z=z))
+    lines += [f"vt {u!r} {v!r}" for u, v in random.normal(size=(GRID * GRID, 2)).tolist()]
+    lines += ["g side", "l 1 2 3", "usemtl cloth"]
+    for row in range(GRID - 1):
+        for column in range(GRID - 1):
+            first = row * GRID + column + 1
+            quad = [first, first + 1, first + GRID + 1, first + GRID]
+            lines.append("f " + " ".join(corner.format(v=v) for v in (quad if column % 3 else quad[:3])))
+    return end.join([*lines, ""])
+
+
+def read_both(text: str, path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[read_obj.ObjMesh, read_obj.ObjMesh]:
+    path.write_bytes(text.encode())
+    quick = read_obj.read_obj(path)
+    with monkeypatch.context() as patch:
+        patch.setattr(read_obj, "read_arrays", lambda raw: None)
+        return quick, read_obj.read_obj(path)
+
+
+def same(one: read_obj.ObjMesh, other: read_obj.ObjMesh) -> bool:
+    return (
+        np.array_equal(one.vertices, other.vertices)
+        and np.array_equal(one.polygons, other.polygons)
+        and one.lines == other.lines
+        and one.split_corners == other.split_corners
+    )
+
+
+PLAIN = {
+    "vertices": plain("{v}"),
+    "texture": plain("{v}/{v}"),
+    "texture and normal": plain("{v}/{v}/7"),
+    "normal": plain("{v}//{v}"),
+    "other texture": plain("{v}/1"),
+    "Windows": plain("{v}/{v}", end="\r\n"),
+    "tabs and colours": plain("{v}", position="v\t{x!r}  {y!r}\t{z!r} 0.5 0.5 1"),
+    "byte order mark": "\ufeff" + plain("{v}"),
+    "short numbers": plain("{v}", position="v {x:.2e} {y:.3f} {z:+.1f}"),
+}
+OTHER = {
+    "negative": plain("{v}").replace("f 14 15", "f -131 15"),
+    "mixed corners": plain("{v}/{v}").replace("f 14/14", "f 14"),
+    "comment behind": plain("{v}").replace("usemtl cloth\n", "usemtl cloth\nf 1 2 3 # corner\n"),
+    "indented": plain("{v}").replace("g side", " v 1 2 3"),
+    "continued": plain("{v}").replace("f 14 15", "f 14 \\\n15"),
+    "Arabic digits": plain("{v}").replace("f 14 15", "f 14 ١٥"),
+    "interleaved": re.sub(r"\nl 1 2 3", "\nl 1 2 3" + "\nv 1 2 3\nf 1 2 3" * 40, plain("{v}")),
+    "fourth number of some": plain("{v}").replace("\nvt", " 1.0\nvt", 1),
+}
+WRONG = {
+    "f 14 15": ("f 14 x", "f 14 1_5 a", "f 14 0", "f 14 999", "f 14 #", "f 14 1.5", "f 14 99999999999999999999 2"),
+    "\nvt": ("\nv 1 2\nvt", "\nv 1 2 x\nvt", "\nv 1 2 3,5\nvt"),
+}
+
+
+@pytest.mark.parametrize("name", PLAIN)
+def test_plain_file_is_read_by_arrays(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert read_arrays(PLAIN[name].removeprefix("\ufeff").encode()) is not None
+    quick, slow = read_both(PLAIN[name], tmp_path / "a.obj", monkeypatch)
+    assert same(quick, slow)
+    assert len(quick.vertices) == GRID * GRID
+    assert quick.lines == {"side": [[0, 1, 2]]}
+    assert quick.split_corners == (name in ("texture", "texture and normal", "Windows"))
+
+
+@pytest.mark.parametrize("name", OTHER)
+def test_other_file_is_read_by_lines(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    quick, slow = read_both(OTHER[name], tmp_path / "a.obj", monkeypatch)
+    assert same(quick, slow)
+
+
+@pytest.mark.parametrize(("text", "wrong"), [(text, each) for text, all_of in WRONG.items() for each in all_of])
+def test_mistake_is_named_with_its_line(text: str, wrong: str, tmp_path: Path) -> None:
+    good = plain("{v}")
+    path = tmp_path / "a.obj"
+    path.write_text(good.replace(text, wrong, 1), encoding="utf-8")
+    number = good[: good.index(text)].count("\n") + 1 + wrong.startswith("\n")
+    with pytest.raises(InputError, match=f"^line {number}: "):
+        read_obj.read_obj(path)
+
+
+def test_file_that_is_cut_short_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "a.obj"
+    path.write_text(plain("{v}/{v}").rstrip("\n").rpartition("/")[0])
+    with pytest.raises(InputError, match="is cut short"):
+        read_obj.read_obj(path)
