@@ -146,7 +146,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         edges=edges,
         cut_line=cut.points,
         darts=drafted_darts,
-        drill_holes=_drill_holes(drafted_darts, fisheyes),
+        drill_holes=(
+            *_drill_holes(drafted_darts, fisheyes),
+            *(DrillHole(name=name, at=_moved(at[None], frame)[0]) for name, at in piece.marks.items()),
+        ),
         notches=dart_notches(piece, _wedges(darts), cut),
         internal_lines=internal,
         cutouts=cutouts,

@@ -61,6 +61,9 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     images = tips * mirror + [2 * axis, 0]
     if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
         return False
+    marks = np.array([hole.at for hole in piece.drill_holes]).reshape(-1, 2)
+    if any(np.linalg.norm(marks - mark, axis=1).min() > INNER for mark in marks * mirror + [2 * axis, 0]):
+        return False
     lines = list(piece.internal_lines.values())
     return all(min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER for line in lines)
 
@@ -117,6 +120,11 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         edges=[edge.edge for edge in edges],
         darts=darts,
         internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
+        marks={
+            hole.name: hole.at + shift
+            for hole in piece.drill_holes
+            if hole.name in piece.piece.marks and side * (hole.at[0] - axis) > -ON_AXIS
+        },
         paired=piece.piece.paired,
         title=piece.piece.title,
         units=piece.piece.units,

@@ -161,6 +161,7 @@ class Piece:
         internal_lines: #P by 2 [m] by name: feature lines, placement lines; drawn, not cut.
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
+        marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
@@ -175,6 +176,7 @@ class Piece:
     internal_lines: Mapping[str, FloatArray] = field(default_factory=dict)
     grain: FloatArray | None = None
     holes: Sequence[Hole] = ()
+    marks: Mapping[str, FloatArray] = field(default_factory=dict)
     paired: bool = True
     title: str = ""
     units: str = "cm"

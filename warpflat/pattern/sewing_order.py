@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
 
-from warpflat.core.text import without_side
+from warpflat.core.text import format_count, other_side, without_side
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
 
@@ -24,6 +24,8 @@ _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
     ("Set the sleeves in", ("armhole",)),
     ("Attach the collar", ("neck", "collar")),
+    ("Join the linings", ("lining",)),
+    ("Join facings, bands and bindings, and sew them to their edges", ("facing", "band", "binding", "waistband")),
 )
 
 
@@ -117,7 +119,7 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
     if hems:
         steps.append(f"Turn up and sew the hems: {hems}.")
-    return tuple(steps)
+    return (*steps, *_button_steps(pieces, titles))
 
 
 def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
@@ -138,6 +140,16 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
         if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
             return number
     return 0
+
+
+def _button_steps(pieces: Sequence[DraftedPiece], titles: Mapping[str, str]) -> list[str]:
+    """Return the steps for buttons."""
+    own = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
+    return [
+        f"Work the buttonholes on the right half, and sew {format_count(count, 'button')} to the left one: {title}."
+        for title, count in own.items()
+        if count > 1
+    ]
 
 
 def _letter(number: int) -> str:
@@ -177,6 +189,8 @@ def _free_edges(
 ) -> str:
     """Return the edges of some kinds that are in no seam, by name, with their pieces."""
     sewn = {(part.piece, part.edge) for seam in seams for side in seam.sides for part in side}
+    # A strip that is cut twice is drawn for one side.
+    sewn |= {(piece, other_side(edge)) for piece, edge in sewn}
     found: dict[str, list[str]] = {}
     for piece in pieces:
         for edge in piece.piece.edges:

@@ -235,17 +235,27 @@ class PatternTable(Table):
 
 
 class OpeningTable(Table):
-    """An opening along a seam of a form. A piece that runs across a centre line is parted there, with a seam below the zip.
+    """An opening along a line of a form. A piece that runs across a centre line is parted there, with a seam below the opening.
 
-    A `zip` is measured from the upper end of its seam, a `slit` or `vent` from the lower one.
+    A `zip`, `buttons` and a `keyhole` are measured from the upper end of the line, a `slit` or `vent` from the lower one. Buttons
+    run all along the line without a `length_mm`. A keyhole is cut into its piece and needs a facing.
     """
 
-    kind: Literal["zip", "slit", "vent"]
+    kind: Literal["zip", "buttons", "slit", "vent", "keyhole"]
     seam: Annotated[str, Field(min_length=1, max_length=100)]
-    length_mm: Annotated[float, Field(ge=10, le=2000)]
+    length_mm: Annotated[float, Field(ge=10, le=2000)] | None = None
     start_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
     style: Literal["invisible", "lapped"] = "invisible"
     width_mm: Annotated[float, Field(ge=5, le=200)] | None = None
+    """Of a slit's hem (15 mm if not given), a vent's flap (40), a button stand beyond the line (20), a keyhole's round end (12)."""
+    button_mm: Annotated[float, Field(ge=5, le=60)] = 18.0
+    spacing_mm: Annotated[float, Field(ge=20, le=300)] = 85.0
+    """About how far buttons are apart; one lies on the bust line."""
+    count: Annotated[int, Field(ge=2, le=60)] | None = None
+    """How many buttons; as many as the spacing gives, if not given."""
+    facing: Literal["grown-on", "separate"] = "grown-on"
+    """Of a button stand."""
+    facing_mm: Annotated[float, Field(ge=20, le=200)] = 60.0
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> OpeningTable:
@@ -253,6 +263,11 @@ class OpeningTable(Table):
             raise ValueError("width_mm is that of a slit's hem or a vent's flap; leave it out for a zip")
         if self.kind != "zip" and (self.start_mm or "style" in self.model_fields_set):
             raise ValueError("start_mm and style belong to a zip; a slit or a vent begins at the lower end of its seam")
+        if self.kind != "buttons" and self.length_mm is None:
+            raise ValueError("length_mm is missing; only buttons run all along their line without one")
+        own = {"button_mm", "spacing_mm", "count", "facing", "facing_mm"} & self.model_fields_set
+        if self.kind != "buttons" and own:
+            raise ValueError(f"{sorted(own)[0]} belongs to buttons; leave it out for a {self.kind}")
         return self
 
 
