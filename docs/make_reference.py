@@ -53,6 +53,7 @@ HEADINGS = {
     "OutputTable": "`[output]`",
     "PatternTable": "`[pattern]`",
     "MarkerTable": "`[marker]`",
+    "ClothTable": "`[cloth]`",
     "OpeningTable": "`[[openings]]`",
     "FinishingTable": "`[[finishing]]`",
     "FabricTable": "`[fabric]`",

@@ -24,6 +24,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import turning_angles
 from warpflat.core.text import control_in, plain_letters
 from warpflat.export.letters import titles
+from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
@@ -212,7 +213,7 @@ def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
 def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: float) -> None:
     """Write the system texts where the label has its room; notes may run on to the right."""
     texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
-    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
+    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {' / '.join(cloths_of(piece))}"]
     texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
     low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
     widest = max(text_width(text, 1.0) for text in texts)

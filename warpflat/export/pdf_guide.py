@@ -10,6 +10,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.export.pdf_legend import page_footer
 from warpflat.pattern.cloth_needed import WIDTHS, cloth_needed
+from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.label import cutting_words
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width, wrap_text
@@ -95,6 +96,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     size, units = whole.garment.sample, whole.garment.units
     size = size if size in printed.pieces else next(iter(printed.pieces))
     _pieces(page, printed.pieces[size], units)
+    _cut_list(page, printed.pieces[size])
     _cloth(page, whole, units)
     _steps(page, whole, size)
     _seams(page, whole, size, units)
@@ -124,7 +126,11 @@ def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
             _thumbnail(page.canvas, piece, np.array([middle, top - THUMBNAIL[1] / 2]), scale)
         page.y = top - THUMBNAIL[1] - LINE
         for number, piece in enumerate(row):
-            lines = [f"{start + number + 1}  {titles[piece.name]}", cutting_words(piece.piece), piece.piece.fabric]
+            lines = [
+                f"{start + number + 1}  {titles[piece.name]}",
+                cutting_words(piece.piece),
+                " / ".join(cloths_of(piece)),
+            ]
             y = page.y
             for k, line in enumerate(lines):
                 page.text(page.left + number * step + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
@@ -132,6 +138,17 @@ def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
             page.y = y
         page.y -= 3 * 0.0038
     page.paragraph(f"Allowances are included: {_allowances(pieces, units)}. Lay every grain arrow along the selvedge.")
+
+
+def _cut_list(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
+    """Write what is cut from each cloth, where there are several."""
+    cloths = cut_list(pieces)
+    if len(cloths) < 2:
+        return
+    page.heading("From each cloth", (1 + len(cloths)) * LINE)
+    for cloth, entries in cloths.items():
+        words = [f"{entry.title} {entry.quantity}{' on fold' if entry.on_fold else ''}" for entry in entries]
+        page.paragraph(", ".join(words), indent=0.030, lead=cloth)
 
 
 def _allowances(pieces: Sequence[DraftedPiece], units: str) -> str:

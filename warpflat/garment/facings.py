@@ -247,7 +247,7 @@ def _facing_piece(piece: Piece, edges: Sequence[Edge], title: str) -> Piece:
         return Piece(
             name=title, size=piece.size, fabric=piece.fabric, quantity=piece.quantity, edges=edges, paired=piece.paired,
             grain=_grain(edges, piece),
-            internal_lines={key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
+            role="facing", internal_lines={key: line for key, line in piece.internal_lines.items() if key.startswith("keyhole")},
         )  # fmt: skip
     except InputError:
         raise InputError(f"no facing can be drawn along {piece.name}.{edges[0].name}: make it narrower") from None

@@ -122,5 +122,5 @@ def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: 
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
     return Piece(
         name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines, grain=grain,
-        paired=False,
+        paired=False, role="waistband" if wish.kind == "waistband" else "strip",
     )  # fmt: skip

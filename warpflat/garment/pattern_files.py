@@ -11,6 +11,8 @@ from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -49,6 +51,8 @@ class PatternOptions:
         marker_seconds: time for the nesting.
         units: of lengths in printed words, "mm", "cm" or "in".
         names: by piece what is printed instead of its name.
+        shrinkage: of the shell's cloth; its pieces are drawn larger.
+        lining, interfacing: what these cloths are called; none without a name.
     """
 
     formats: Sequence[str] = FORMATS
@@ -60,6 +64,9 @@ class PatternOptions:
     marker_seconds: int = 5
     units: str = "cm"
     names: Mapping[str, str] = field(default_factory=dict)
+    shrinkage: Shrinkage = field(default_factory=Shrinkage)
+    lining: str = ""
+    interfacing: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -201,6 +208,8 @@ def _write_pattern(
     report_activity("drafting the pattern")
     try:
         pattern, notes = make()
+        pattern = add_lining(pattern, options.lining) if options.lining else pattern
+        pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
         drafted, remarks = _draft(_in_words(pattern, options), options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
@@ -211,8 +220,10 @@ def _write_pattern(
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
     walked = walk_seams(drafted)
+    drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
     metrics: dict[str, Any] = {
         "pattern": _quality(drafted),
+        "cloths": _cloths(drafted),
         "corners": [asdict(corner) for corner in drafted.corners],
         "walked": [
             {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
@@ -264,6 +275,14 @@ def _quality(drafted: DraftedGarment) -> dict[str, Any]:
         "seam_difference_per_50mm_mm": max(near, default=None),
         "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
     }
+
+
+def _cloths(drafted: DraftedGarment) -> list[dict[str, Any]]:
+    """Return what is cut from each cloth in the sample size."""
+    from warpflat.pattern.cut_list import cut_list
+
+    rows = cut_list(drafted.pieces[drafted.garment.sample])
+    return [{"name": cloth, "pieces": [asdict(entry) for entry in entries]} for cloth, entries in rows.items()]
 
 
 def _draft(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:

@@ -125,13 +125,15 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
             for hole in piece.drill_holes
             if hole.name in piece.piece.marks and side * (hole.at[0] - axis) > -ON_AXIS
         },
+        role=piece.piece.role,
+        also=piece.piece.also,
         paired=piece.piece.paired,
         title=piece.piece.title,
         units=piece.piece.units,
     )
     notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
     notches = tuple(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base)) for n in notches)
-    return draft_half(half, garment.name, tuple(edges), notches, piece.notes)
+    return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
 
 
 def _kept_notches(

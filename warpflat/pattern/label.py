@@ -99,6 +99,9 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
         words = size_words(piece.size)
         lines.append(words[0].upper() + words[1:])
     lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
+    lines += [
+        f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
+    ]
     if allowances := _allowance_words(piece):
         lines.append(f"Includes {allowances}")
     title = garment.replace("_", " ")

@@ -38,6 +38,7 @@ __all__ = [
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
 EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
+ROLES = ("shell", "facing", "strip", "waistband", "lining", "pocket")
 
 #: Ends of neighbouring edges that are closer than this [m] are one corner.
 SAME_POINT = 1e-6
@@ -162,6 +163,8 @@ class Piece:
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
+        role: "shell", or what it is derived as: "facing", "strip", "waistband", "lining", "pocket".
+        also: cloths from which it is cut too, and how often, as interfacing.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
@@ -177,6 +180,8 @@ class Piece:
     grain: FloatArray | None = None
     holes: Sequence[Hole] = ()
     marks: Mapping[str, FloatArray] = field(default_factory=dict)
+    role: str = "shell"
+    also: Mapping[str, int] = field(default_factory=dict)
     paired: bool = True
     title: str = ""
     units: str = "cm"
@@ -188,7 +193,9 @@ class Piece:
             check_label(self.title, "a piece's printed name")
         if self.units not in UNITS:
             raise InputError(f"{where}: unknown units {self.units!r}; {nearest(self.units, UNITS)}")
-        if self.quantity < 1:
+        if self.role not in ROLES:
+            raise InputError(f"{where}: unknown role {self.role!r}; {nearest(self.role, ROLES)}")
+        if min(self.quantity, *self.also.values(), self.quantity) < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
         object.__setattr__(self, "darts", tuple(self.darts))

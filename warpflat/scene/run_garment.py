@@ -135,7 +135,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     report_activity("building the mannequin")
     mannequin, form = scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
-        drawing = pattern_options(settings.pattern, settings.marker)
+        drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         openings = scene_openings(settings.openings)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))

@@ -28,6 +28,7 @@ from warpflat.solver.options import RelaxOptions
 
 __all__ = [
     "BorderTable",
+    "ClothTable",
     "ConstraintTable",
     "FileSurface",
     "FinishingTable",
@@ -289,6 +290,18 @@ class FinishingTable(Table):
         return self
 
 
+class ClothTable(Table):
+    """Cloth beside its fabric: what it loses in the wash, and what else the garment is cut from."""
+
+    shrinkage_warp: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    """Share of its length that the cloth loses along the warp; pieces are drawn larger by it."""
+    shrinkage_weft: Annotated[float, Field(ge=0, le=0.25)] = 0.0
+    lining: Annotated[str, Field(max_length=40)] = ""
+    """What the lining is called; with a name the shell's pieces are lined."""
+    interfacing: Annotated[str, Field(max_length=40)] = ""
+    """What the interfacing is called; with a name facings and waistbands are cut from it too."""
+
+
 class MarkerTable(Table):
     """The lay plan on a cloth (see `warpflat.Cloth`); one garment of each size. Lengths in metres."""
 
@@ -358,6 +371,7 @@ class SceneTable(Table):
     output: OutputTable = Field(default_factory=OutputTable)
     pattern: PatternTable = Field(default_factory=PatternTable)
     marker: MarkerTable | None = None
+    cloth: ClothTable | None = None
     openings: list[OpeningTable] = Field(default_factory=list)
     finishing: list[FinishingTable] = Field(default_factory=list)
 
