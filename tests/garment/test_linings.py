@@ -72,7 +72,7 @@ def test_lining_of_facings_that_meet_is_refused():
         [("front", "neck")],
         0.098,
     )
-    with pytest.raises(InputError, match="facings meet at 'shoulder"):
+    with pytest.raises(InputError, match="strips meet at 'shoulder"):
         add_lining(wide, "silk")
 
 

@@ -11,6 +11,7 @@ from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name, without_side
 from warpflat.garment.facings import Stand, with_facings, with_stand_facings
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
+from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
@@ -29,6 +30,7 @@ class Finishing:
         width: [m].
         share: length of a band over that of its edge; it is stretched as it is sewn.
         overlap: by how much a waistband runs past one end [m].
+        shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
     """
 
     kind: str
@@ -36,6 +38,7 @@ class Finishing:
     width: float
     share: float = 1.0
     overlap: float = 0.0
+    shaped: bool = False
 
     @property
     def name(self) -> str:
@@ -65,6 +68,8 @@ def finish_edges(
         try:
             if wish.kind == "facing":
                 pattern = with_facings(pattern, found, wish.width, gaps=gaps, stands=stands)
+            elif wish.shaped:
+                pattern = with_shaped_waistband(pattern, found, wish.width, gaps=gaps)
             else:
                 pattern = _with_strip(pattern, wish, free_chain(pattern, found, gaps))
         except InputError as error:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-import numpy as np
-
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.facings import INNER
-from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+from warpflat.garment.shaped_band import without_strip
+from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
 
 __all__ = ["add_interfacing", "add_lining"]
 
@@ -128,39 +127,13 @@ def _sewn_inside(facing: Piece) -> Piece:
 
 def _lining(piece: Piece, faced: Sequence[_Faced], pieces: Mapping[str, Piece], title: str, cloth: str) -> Piece:
     """Return the lining of a piece."""
-    edges = {edge.name: edge for edge in piece.edges}
-    order = list(edges)
     for each in faced:
-        facing = pieces[each.facing]
-        inner = facing.edge(INNER)
-        for name, at_start in ((each.after, True), (each.before, False)):
-            edge, part = edges[name], facing.edge(name)
-            if edge.length - part.length < 0.005:
-                raise InputError(
-                    f"{piece.name}: facings meet at {name!r}; make them narrower, or bind one of the edges"
-                )
-            edges[name] = replace(edge, points=_without(edge, part, at_start=at_start), vertices=None)
-        place = order.index(each.edges[0])
-        for name in each.edges:
-            order.remove(name)
-            del edges[name]
-        edges[_inner(each)] = Edge(name=_inner(each), points=inner.points[::-1])
-        order.insert(place, _inner(each))
-    for name, edge in edges.items():
-        if edge.kind == "hem":
-            edges[name] = replace(edge, allowance=max(edge.width - _SHORTER, _LEAST_HEM))
-    try:
-        return replace(
-            piece, name=title, fabric=cloth, role="lining", edges=[edges[name] for name in order], marks={}, also={},
-            internal_lines={k: line for k, line in piece.internal_lines.items() if "zip" not in k and "pocket" not in k},
-        )  # fmt: skip
-    except InputError:
-        raise InputError(f"{piece.name}: no lining can be drawn beside its facings; make them narrower") from None
-
-
-def _without(edge: Edge, part: Edge, *, at_start: bool) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
-    """Return the points of an edge without the part that a facing has of it."""
-    points, other = (edge.points, part.points) if at_start else (edge.points[::-1], part.points[::-1])
-    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-    rest = np.vstack([other[-1:], points[at > part.length + 1e-9]])
-    return rest if at_start else rest[::-1]
+        piece = without_strip(piece, pieces[each.facing].edges, _inner(each))
+    edges = [
+        replace(edge, allowance=max(edge.width - _SHORTER, _LEAST_HEM)) if edge.kind == "hem" else edge
+        for edge in piece.edges
+    ]
+    return replace(
+        piece, name=title, fabric=cloth, role="lining", edges=edges, marks={}, also={},
+        internal_lines={k: line for k, line in piece.internal_lines.items() if "zip" not in k and "pocket" not in k},
+    )  # fmt: skip

@@ -30,6 +30,7 @@ from warpflat.garment.form_plan import (
 from warpflat.garment.mark_openings import mark_openings
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
 from warpflat.garment.openings import Opening, one_sided, place_opening
+from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
@@ -111,7 +112,8 @@ def pattern_of_garment(
     zips = [
         row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
     ]
-    return finish_edges(pattern, sample.finishing, gaps=zips, stands=_stands(pattern, sample.openings)), notes
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=_stands(pattern, sample.openings))
+    return add_pockets(pattern, sample.pockets), notes
 
 
 def _stands(pattern: Garment, openings: Sequence[Opening]) -> list[Stand]:

@@ -10,10 +10,11 @@ from warpflat.garment.constraints import Constraint, Straight
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
 from warpflat.garment.openings import CENTRES, Buttons, Opening
+from warpflat.garment.pockets import Pocket
 from warpflat.mannequin.forms import FormResult
-from warpflat.scene.schema import FinishingTable, OpeningTable
+from warpflat.scene.schema import FinishingTable, OpeningTable, PocketTable
 
-__all__ = ["scene_finishing", "scene_openings", "sewn_centres", "straight_stands"]
+__all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
 # Allowance of a slit, flap of a vent, button stand beyond its line, round end of a keyhole [mm], where none is given.
 _WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0}
@@ -65,6 +66,23 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
             width=FINISHES[table.kind] if table.width_mm is None else 1e-3 * table.width_mm,
             share=table.share,
             overlap=1e-3 * table.overlap_mm,
+            shaped=table.shaped,
+        )
+        for table in tables
+    ]
+
+
+def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:
+    """Return the pockets that a scene wants."""
+    return [
+        Pocket(
+            kind=table.kind,
+            where=table.piece if table.kind == "patch" else table.seam,
+            width=1e-3 * table.width_mm,
+            height=1e-3 * table.height_mm,
+            line=table.line,
+            below=1e-3 * table.below_mm,
+            from_centre=1e-3 * table.from_centre_mm,
         )
         for table in tables
     ]

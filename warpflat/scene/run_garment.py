@@ -30,7 +30,7 @@ from warpflat.scene.drape import write_drape
 from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
-from warpflat.scene.openings import scene_finishing, scene_openings, sewn_centres, straight_stands
+from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult, review_files
@@ -117,7 +117,8 @@ class GarmentPlan:
                 **self.settings,
             )
             finishing = scene_finishing(self.scene.settings.finishing)
-            return replace(garment, openings=tuple(self.openings), finishing=finishing)
+            pockets = scene_pockets(self.scene.settings.pockets)
+            return replace(garment, openings=tuple(self.openings), finishing=finishing, pockets=pockets)
 
 
 def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:

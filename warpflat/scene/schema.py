@@ -37,6 +37,7 @@ __all__ = [
     "OpeningTable",
     "OutputTable",
     "PatternTable",
+    "PocketTable",
     "SceneTable",
     "SeamTable",
     "ShapeSurface",
@@ -280,6 +281,8 @@ class FinishingTable(Table):
     width_mm: Annotated[float, Field(ge=5, le=300)] | None = None
     share: Annotated[float, Field(ge=0.5, le=1)] = 1.0
     overlap_mm: Annotated[float, Field(ge=0, le=200)] = 0.0
+    shaped: bool = False
+    """A waistband that is cut from the upper strip of the pieces, as curved as they are."""
 
     @model_validator(mode="after")
     def _fits_its_kind(self) -> FinishingTable:
@@ -287,6 +290,33 @@ class FinishingTable(Table):
             raise ValueError("share belongs to a band, which is stretched as it is sewn; leave it out")
         if self.kind != "waistband" and self.overlap_mm:
             raise ValueError("overlap_mm belongs to a waistband; leave it out")
+        if self.shaped and (self.kind != "waistband" or self.overlap_mm):
+            raise ValueError("shaped belongs to a waistband without an overlap; leave one of them out")
+        return self
+
+
+class PocketTable(Table):
+    """A pocket: a `patch` on a piece, its place marked, or bags in a seam (`inseam`), on both sides of the body.
+
+    A patch lies `below_mm` under a line across its piece, its inner side `from_centre_mm` from the centre line. An opening begins
+    `below_mm` under the upper end of its seam, and is `height_mm` long.
+    """
+
+    kind: Literal["patch", "inseam"]
+    piece: Annotated[str, Field(max_length=100)] = ""
+    line: Annotated[str, Field(max_length=100)] = "hip"
+    seam: Annotated[str, Field(max_length=100)] = ""
+    width_mm: Annotated[float, Field(ge=30, le=400)] = 140.0
+    height_mm: Annotated[float, Field(ge=30, le=400)] = 160.0
+    below_mm: Annotated[float, Field(ge=-500, le=1000)] = 60.0
+    from_centre_mm: Annotated[float, Field(ge=0, le=500)] = 70.0
+
+    @model_validator(mode="after")
+    def _has_its_place(self) -> PocketTable:
+        if self.kind == "patch" and not self.piece:
+            raise ValueError('a patch pocket needs its piece: piece = "front"')
+        if self.kind == "inseam" and (not self.seam or self.below_mm < 0):
+            raise ValueError('an inseam pocket needs its seam, seam = "side left", and below_mm from 0')
         return self
 
 
@@ -374,6 +404,7 @@ class SceneTable(Table):
     cloth: ClothTable | None = None
     openings: list[OpeningTable] = Field(default_factory=list)
     finishing: list[FinishingTable] = Field(default_factory=list)
+    pockets: list[PocketTable] = Field(default_factory=list)
 
     @model_validator(mode="after")
     def _consistent(self) -> SceneTable:
@@ -398,7 +429,7 @@ class SceneTable(Table):
         """Refuse what belongs to the form on a mannequin."""
         if self.shape != "none":
             raise ValueError("shape belongs to a form; on a [surface] give [[cuts]] or [auto_cut]")
-        for key in ("openings", "finishing"):
+        for key in ("openings", "finishing", "pockets"):
             if getattr(self, key):
                 raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
