@@ -15,7 +15,7 @@ from warpflat.garment.button_stand import bust_depth, button_depths, with_button
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
-__all__ = ["mark_openings"]
+__all__ = ["mark_openings", "with_notches"]
 
 # How far inside the sewing line the line of a zip is drawn [m].
 _INSIDE = 0.004
@@ -86,15 +86,29 @@ def _with_zip(
             ]
     if end is None:
         return replace(pattern, pieces=pieces)
-    whole = _part_of(placed, pattern.sample, number, seam.name).whole
-    share = end / whole
-    if not _starts_on_top(pattern, seam):
-        share = 1.0 - share
+    by_size = {}
+    for size in pieces:
+        part = _part_of(placed, size, number, seam.name)
+        share = _reach(opening, part)[1] / part.whole
+        by_size[size] = with_notches(
+            seam.of_size(size), [share if _starts_on_top(pattern, seam) else 1.0 - share], part.whole
+        )
+    own = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
+    return replace(pattern, pieces=pieces, seams=[own if each.name == seam.name else each for each in pattern.seams])
+
+
+def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[float, ...]:
+    """Return the notches of a seam (shares of its length) with some more, which its own keep clear of.
+
+    Args:
+        seam: given notches, or none: then they are spaced as on any seam.
+        shares: of the new ones.
+        whole: length of the seam [m].
+    """
     count = max(1, round(whole / _SPACING))
     own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    notches = tuple(sorted([share, *(each for each in own if abs(each - share) * whole > _CLEAR)]))
-    seams = [replace(each, notches=notches) if each.name == seam.name else each for each in pattern.seams]
-    return replace(pattern, pieces=pieces, seams=seams)
+    kept = [each for each in own if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
+    return tuple(sorted([*shares, *kept]))
 
 
 def _starts_on_top(pattern: Garment, seam: Seam) -> bool:

@@ -170,7 +170,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
             cannot be written.
     """
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.atomic_files import file_in, output_folder
     from warpflat.core.manifest import record_file
     from warpflat.export.read_pattern_json import read_pattern_json
 
@@ -189,6 +189,8 @@ def export_patterns(
             _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
             for format in formats
         ]
+        if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
+            files.append(file_in(folder, drafted.name, ".rul").name)
         for file in files:
             record_file(folder, drafted.name, file)
     return files
@@ -200,7 +202,7 @@ def _write_pattern(
     """Make, draft and write a pattern; geometry that defeats it becomes a note, and `not_drawn` in the metrics."""
     from shapely.errors import ShapelyError
 
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.atomic_files import file_in, output_folder
     from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
@@ -236,6 +238,8 @@ def _write_pattern(
             for kind in FORMATS
             if kind in options.formats
         ]
+        if "dxf" in options.formats and len(drafted.pieces) > 1:
+            files.append(file_in(folder, name, ".rul").name)
         if options.cloth is not None:
             marked, remarks, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
             files += marked
@@ -325,7 +329,7 @@ def _write(
     file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
     report_activity(f"writing {file.name}")
     if kind == "dxf":
-        write_dxf(drafted, file, dialect=dialect, sizes=sizes)
+        write_dxf(drafted, file, dialect=dialect, sizes=sizes, rul=file_in(folder, name, ".rul"))
     elif kind == "svg":
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":

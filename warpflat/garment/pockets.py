@@ -11,6 +11,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, other_side
+from warpflat.garment.mark_openings import with_notches
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["Pocket", "add_pockets"]
@@ -19,7 +20,7 @@ __all__ = ["Pocket", "add_pockets"]
 _HEM, _POINT = 0.030, 0.015
 # A bag runs past both ends of its opening [m].
 _PAST = 0.020
-# A seam's own notches keep this clear of an opening's ends [m].
+# An opening ends this far above the lower end of its seam [m].
 _CLEAR = 0.030
 
 
@@ -175,19 +176,18 @@ def _with_opening(pattern: Garment, seam: Seam, pocket: Pocket) -> Seam:
     Raises:
         InputError: the seam is too short.
     """
-    side = seam.sides[0][0]
-    points, with_seam = _downwards(pattern.piece(side.piece, pattern.sample), side)
-    whole = float(arc_lengths(points)[-1])
-    ends = np.array([pocket.below, pocket.below + pocket.height])
-    if ends[1] > whole - _CLEAR:
-        raise InputError(
-            f"the pocket ends {1e3 * ends[1]:.0f} mm along {seam.name!r}, which is {1e3 * whole:.0f} mm long"
-        )
-    shares = ends / whole if with_seam else 1.0 - ends / whole
-    count = max(1, round(whole / 0.200))
-    own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    kept = [each for each in own if np.abs(each - shares).min() * whole > _CLEAR]
-    return replace(seam, notches=tuple(sorted([*kept, *shares.tolist()])))
+    side, by_size = seam.sides[0][0], {}
+    for size in pattern.pieces:
+        points, with_seam = _downwards(pattern.piece(side.piece, size), side)
+        whole = float(arc_lengths(points)[-1])
+        ends = np.array([pocket.below, pocket.below + pocket.height])
+        if ends[1] > whole - _CLEAR:
+            raise InputError(
+                f"the pocket ends {1e3 * ends[1]:.0f} mm along {seam.name!r}, which is {1e3 * whole:.0f} mm long"
+            )
+        shares = ends / whole if with_seam else 1.0 - ends / whole
+        by_size[size] = with_notches(seam.of_size(size), shares.tolist(), whole)
+    return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
 
 
 def _bag(piece: Piece, side: SeamSide, pocket: Pocket, title: str, quantity: int) -> Piece:

@@ -141,8 +141,10 @@ def _with_moved_notches(
     side = seam.sides[0][0]
     if seam.notches is None or (side.piece, side.edge) not in cut or len(seam.sides[0]) > 1:
         return seam
-    length = pattern.piece(side.piece, pattern.sample).edge(side.edge).length
     # The strip lies at the start of the edge after the waist, and at the end of the one before it.
-    at_start = cut[side.piece, side.edge][1] != side.reversed
-    places = [share * length - (width if at_start else 0.0) for share in seam.notches]
-    return replace(seam, notches=tuple(p / (length - width) for p in places if 0.0 < p < length - width))
+    at_start, by_size = cut[side.piece, side.edge][1] != side.reversed, {}
+    for size in pattern.pieces:
+        length = pattern.piece(side.piece, size).edge(side.edge).length
+        places = [share * length - (width if at_start else 0.0) for share in seam.of_size(size).notches or ()]
+        by_size[size] = tuple(p / (length - width) for p in places if 0.0 < p < length - width)
+    return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)

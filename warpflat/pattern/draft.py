@@ -79,7 +79,8 @@ def draft_garment(
         pieces = {
             piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
         }
-        notches = seam_notches([*garment.seams, *cut_darts(pieces)], pieces)
+        seams = [seam.of_size(size) for seam in garment.seams]
+        notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
         drafted[size] = tuple(
             replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
         )

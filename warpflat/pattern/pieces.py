@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -269,6 +269,7 @@ class Seam:
         ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
         eased: shares of the first side's length between which the second is longer; all along it if not given.
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
+        size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
     """
 
@@ -277,6 +278,7 @@ class Seam:
     ease: float = 0.0
     eased: tuple[float, float] = (0.0, 1.0)
     notches: tuple[float, ...] | None = None
+    size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
 
     def __post_init__(self) -> None:
@@ -290,8 +292,12 @@ class Seam:
             raise InputError(
                 f"seam {self.name!r}: eased between {self.eased}; two shares from 0 to 1, rising, are needed"
             )
-        if any(not 0 < f < 1 for f in self.notches or ()):
+        if any(not 0 < f < 1 for row in (self.notches or (), *self.size_notches.values()) for f in row):
             raise InputError(f"seam {self.name!r}: notches {self.notches}; each must be a fraction between 0 and 1")
+
+    def of_size(self, size: str) -> Seam:
+        """Return the seam with the notches of one size."""
+        return replace(self, notches=self.size_notches[size]) if size in self.size_notches else self
 
     def reach(self, length: float, whole: float) -> float:
         """Return the length along the second side opposite to `length` along the first, of `whole`."""
