@@ -61,6 +61,7 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "units": "m",
         "name": garment.name,
         "sample_size": garment.garment.sample,
+        "words": dict(garment.garment.words),
         "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
         "cut_list": {
             size: {cloth: [asdict(entry) for entry in rows] for cloth, rows in cut_list(pieces).items()}

@@ -209,6 +209,7 @@ class PatternEntry(Entry):
 
     name: Name
     sample_size: Text
+    words: dict[Text, Text] = Field(default_factory=dict)
     sizes: dict[Text, Annotated[dict[Name, PieceEntry], Field(min_length=1)]] = Field(min_length=1)
     stitches: list[StitchEntry]
     seams: list[SeamEntry]

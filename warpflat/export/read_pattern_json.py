@@ -100,6 +100,7 @@ def _garment(data: PatternEntry) -> DraftedGarment:
             if stitch.kind == "seam"
         ],
         sample_size=data.sample_size,
+        words=data.words,
     )
     reports = tuple(
         SeamReport(

@@ -52,6 +52,7 @@ class PatternOptions:
         units: of lengths in printed words, "mm", "cm" or "in".
         names: by piece what is printed instead of its name.
         shrinkage: of the shell's cloth; its pieces are drawn larger.
+        words: what is printed instead of English words and names.
         lining, interfacing: what these cloths are called; none without a name.
     """
 
@@ -65,6 +66,7 @@ class PatternOptions:
     units: str = "cm"
     names: Mapping[str, str] = field(default_factory=dict)
     shrinkage: Shrinkage = field(default_factory=Shrinkage)
+    words: Mapping[str, str] = field(default_factory=dict)
     lining: str = ""
     interfacing: str = ""
 
@@ -266,7 +268,7 @@ def _in_words(pattern: Pattern, options: PatternOptions) -> Pattern:
         size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in of_size)
         for size, of_size in pattern.pieces.items()
     }
-    return replace(pattern, pieces=pieces)
+    return replace(pattern, pieces=pieces, words=options.words)
 
 
 def _quality(drafted: DraftedGarment) -> dict[str, Any]:

@@ -40,6 +40,7 @@ from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
 from warpflat.pattern.truing import CornerReport, true_corners
+from warpflat.pattern.words import printed_in
 
 __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 
@@ -67,6 +68,11 @@ def draft_garment(
     Raises:
         InputError: an unknown size, or a half piece that reaches across its fold.
     """
+    with printed_in(garment.words):
+        return _drafted(garment, tolerance, sizes, true=true)
+
+
+def _drafted(garment: Garment, tolerance: float | None, sizes: Sequence[str] | None, *, true: bool) -> DraftedGarment:
     chosen = garment.sizes if sizes is None else tuple(sizes)
     for size in chosen:
         garment.piece(garment.pieces[garment.sizes[0]][0].name, size)

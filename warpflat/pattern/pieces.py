@@ -17,6 +17,7 @@ from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.seam_difference import eased_length
+from warpflat.pattern.words import translate_name
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
@@ -215,7 +216,7 @@ class Piece:
     @property
     def printed_name(self) -> str:
         """What stands on paper."""
-        return self.title or self.name.replace("_", " ")
+        return self.title or translate_name(self.name.replace("_", " "))
 
     @property
     def on_fold(self) -> bool:
@@ -313,12 +314,14 @@ class Garment:
         pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
+        words: what is printed instead of English words and names (see `warpflat.pattern.words`).
     """
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
+    words: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):

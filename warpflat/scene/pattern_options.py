@@ -10,6 +10,7 @@ if TYPE_CHECKING:
     from warpflat.scene.schema import ClothTable, MarkerTable, PatternTable
 from warpflat.garment.pattern_files import PatternOptions
 from warpflat.pattern.shrinkage import Shrinkage
+from warpflat.pattern.words import language_words
 
 __all__ = ["pattern_options"]
 
@@ -41,6 +42,7 @@ def pattern_options(
         cloth=cloth,
         units=table.units,
         names=table.names,
+        words={**language_words(table.language), **table.words},
         marker_seconds=5 if marker is None else marker.seconds,
         shrinkage=Shrinkage()
         if cut_from is None

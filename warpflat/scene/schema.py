@@ -230,6 +230,10 @@ class PatternTable(Table):
     """Units of lengths in printed words."""
     names: dict[str, Annotated[str, Field(min_length=1, max_length=60)]] = Field(default_factory=dict)
     """What is printed instead of a piece's name: front_bodice = "Vorderteil"."""
+    language: Literal["en", "de"] = "en"
+    """Language of what is printed."""
+    words: dict[str, Annotated[str, Field(min_length=1, max_length=200)]] = Field(default_factory=dict)
+    """Other printed words, by the English phrase or name: "side" = "Seitennaht"."""
     tolerance_mm: Annotated[float, Field(ge=0.01, le=5)] | None = None
     """How far a drawn curve may lie from the mesh's border; 0.1 mm, or more on a ragged one, if not given."""
     sizes: list[str] = Field(default_factory=list)
