@@ -53,6 +53,8 @@ HEADINGS = {
     "OutputTable": "`[output]`",
     "PatternTable": "`[pattern]`",
     "MarkerTable": "`[marker]`",
+    "PocketTable": "`[[pockets]]`",
+    "ClothTable": "`[cloth]`",
     "OpeningTable": "`[[openings]]`",
     "FinishingTable": "`[[finishing]]`",
     "FabricTable": "`[fabric]`",

@@ -306,6 +306,25 @@ class Drawing(Entry):
     """Why no pattern was drawn."""
 
 
+class CutPiece(Entry):
+    """A piece that is cut from a cloth."""
+
+    piece: str
+    title: str
+    """As it is printed."""
+    quantity: int
+    on_fold: bool
+    mirrored: int
+    """How many of them are cut turned over."""
+
+
+class ClothCut(Entry):
+    """What is cut from one cloth."""
+
+    name: str
+    pieces: list[CutPiece]
+
+
 class Corner(Entry):
     """A place where an edge runs on across a seam or a dart, or meets a fold."""
 
@@ -425,6 +444,7 @@ class Metrics(Entry):
     pattern: Drawing | None = None
     corners: list[Corner] | None = None
     walked: list[WalkedSeam] | None = None
+    cloths: list[ClothCut] | None = None
     marker: Marker | None = None
     drape: Drape | None = None
     files: dict[str, dict[str, str]] | None = None

@@ -233,3 +233,35 @@ def test_a_given_creation_time_gives_the_same_bytes(tmp_path, monkeypatch):
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "yesterday")
     with pytest.raises(InputError, match="SOURCE_DATE_EPOCH"):
         write_dxf(dress, tmp_path / "c.dxf")
+
+
+def test_grade_rules_move_every_numbered_point_to_its_place_in_each_size(dress, tmp_path):
+    write_dxf(dress, tmp_path / "dress.dxf", created=CREATED, rul=tmp_path / "dress.rul")
+    document = ezdxf.readfile(tmp_path / "dress.dxf")
+    text = (tmp_path / "dress.rul").read_text()
+    (sizes,) = re.findall(r"SIZE LIST: (.+)", text)
+    (sample,) = re.findall(r"SAMPLE SIZE: (\S+)", text)
+    moves = {
+        int(number): np.array(re.findall(r"(-?[\d.]+), *(-?[\d.]+)", body), dtype=float)
+        for number, body in re.findall(r"RULE: DELTA (\d+)\n([^R]+?)(?=RULE|END)", text)
+    }
+    assert sizes.split() == list(SIZES)
+    assert np.array_equal(moves[1], np.zeros((3, 2)))
+    graded = 0
+    for piece in dress.pieces[sample]:
+        block = document.blocks.get(block_name(piece, set()))
+        for layer in ("2", "4", "13"):
+            for numbered in block.query(f'TEXT[layer=="{layer}"]'):
+                at, row = np.array(tuple(numbered.dxf.insert)[:2]), moves[int(numbered.dxf.text.removeprefix("# "))]
+                for size, move in zip(sizes.split(), row, strict=True):
+                    other = next(p for p in dress.pieces[size] if p.name == piece.name)
+                    there = document.blocks.get(block_name(other, set()))
+                    if layer == "2":
+                        (boundary,) = there.query('POLYLINE[layer=="1"]')
+                        away = LinearRing(vertices(boundary)).distance(Point(at + move))
+                    else:
+                        away = np.linalg.norm(points(there, layer) - at - move, axis=1).min()
+                    assert away < 0.02, (piece.name, size, layer)
+                    graded += 1
+    assert graded > 300
+    assert "GRADE RULE TABLE: Sample dress" in [e.dxf.text for e in document.modelspace().query("TEXT")]

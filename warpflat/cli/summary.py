@@ -42,6 +42,8 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
     if metrics.get("rings"):
         lines.append(_clipped(rings_line(metrics["rings"])))
+    if len(metrics.get("cloths", ())) > 1:
+        lines.append(_cloths_line(metrics["cloths"]))
     if "drape" in metrics:
         lines.append(_drape_line(metrics["drape"]))
     ordered = sorted(files, key=lambda name: _OPENED_FIRST.index(name) if name in _OPENED_FIRST else len(_OPENED_FIRST))
@@ -77,6 +79,15 @@ def _pieces_line(pieces: Mapping[str, Mapping[str, Any]]) -> str:
         f"energy {energy_words(sum(piece['strain_energy_j'] for piece in pieces.values()))}",
     ]
     return _clipped(f"pieces: {len(pieces)}; {', '.join(parts)}")
+
+
+def _cloths_line(cloths: Sequence[Mapping[str, Any]]) -> str:
+    """Return what is cut from each cloth."""
+    parts = [
+        f"{cloth['name']}: " + ", ".join(f"{piece['title']} {piece['quantity']}" for piece in cloth["pieces"])
+        for cloth in cloths
+    ]
+    return _clipped(f"cut from {'; '.join(parts)}")
 
 
 def _girths_line(girths: Mapping[str, Mapping[str, float]]) -> str:

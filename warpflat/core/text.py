@@ -13,6 +13,7 @@ __all__ = [
     "format_count",
     "name_without_number",
     "one_line",
+    "other_side",
     "plain_letters",
     "quote_value",
     "size_words",
@@ -46,6 +47,12 @@ def without_side(name: str) -> str:
     """Return a name without its side, left or right: the shoulder of "shoulder left"; underscores become spaces."""
     words = name.replace("_", " ").split(" ")
     return " ".join(word for word in words if word not in ("left", "right")) or name
+
+
+def other_side(name: str) -> str:
+    """Return a name with left and right exchanged."""
+    swapped = {"left": "right", "right": "left"}
+    return " ".join(swapped.get(word, word) for word in name.split(" "))
 
 
 def control_in(text: str, allowed: str = "") -> str:

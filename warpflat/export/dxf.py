@@ -23,7 +23,9 @@ from warpflat.core.atomic_files import atomic_path
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import turning_angles
 from warpflat.core.text import control_in, plain_letters
+from warpflat.export.grade_rules import grade_rules, write_rul
 from warpflat.export.letters import titles
+from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
@@ -52,8 +54,11 @@ def write_dxf(
     units: str = "metric",
     sizes: Sequence[str] | None = None,
     created: datetime | None = None,
+    rul: str | os.PathLike[str] | None = None,
 ) -> None:
     """Write all pieces, one block per piece and size, in one file (a graded nest where there are several sizes).
+
+    The sample size of a nest has the numbers of its grade rules beside its points ("# 7"), and the rules are a table of their own.
 
     Args:
         garment: drafted.
@@ -62,6 +67,7 @@ def write_dxf(
         units: "metric" (millimetres) or "english" (inches).
         sizes: those to write; None writes all.
         created: date and time for the file's text; None takes SOURCE_DATE_EPOCH, or the present.
+        rul: the table of grade rules that is written for a nest; None writes none, nor any numbers.
 
     Raises:
         InputError: unknown dialect, units or size.
@@ -75,7 +81,8 @@ def write_dxf(
     chosen = tuple(garment.pieces) if sizes is None else tuple(sizes)
     for size in chosen:
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
-    scale = UNITS[units]
+    scale, created = UNITS[units], created or _now()
+    rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
     document = _new_document()
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
@@ -88,10 +95,15 @@ def write_dxf(
             name = block_name(piece, taken, title)
             block = document.blocks.new(name, base_point=(0, 0))
             _write_piece(block, piece, title, scale, validation=dialect == "astm")
+            for point in rules.points.get(piece.name, ()) if rules is not None and piece.size == rules.sample else ():
+                _text(block, f"# {point.rule}", point.at, scale, point.layer, 0.003)
             space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
-    _write_style(space, garment, units, scale, created or _now())
+    table = _ascii(garment.name)[:20]
+    _write_style(space, garment, units, scale, created, table="" if rules is None else table)
     with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
         gerber_D6673.export_stream(document, stream)
+    if rules is not None and rul is not None:
+        write_rul(rules, rul, name=table, dialect=dialect, units=units, scale=scale, created=created)
 
 
 def _now() -> datetime:
@@ -212,7 +224,7 @@ def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
 def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: float) -> None:
     """Write the system texts where the label has its room; notes may run on to the right."""
     texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
-    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {piece.piece.fabric}"]
+    texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {' / '.join(cloths_of(piece))}"]
     texts += ["ANNOTATION: " + text.replace("\n", " ") for text, _ in piece.label.lines[2:3]]
     low, high = piece.label.box.min(axis=0), piece.label.box.max(axis=0)
     widest = max(text_width(text, 1.0) for text in texts)
@@ -222,7 +234,9 @@ def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: flo
         _text(block, text, np.array([low[0], high[1] - ROW * height * (row + 0.8)]), scale, "1", height)
 
 
-def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime) -> None:
+def _write_style(
+    space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime, *, table: str
+) -> None:
     """Write the texts that describe the whole file."""
     texts = [
         f"STYLE NAME: {garment.name}",
@@ -230,6 +244,7 @@ def _write_style(space: Modelspace, garment: DraftedGarment, units: str, scale: 
         f"CREATION TIME: {created:%H:%M}",
         "AUTHOR: warpflat",
         f"SAMPLE SIZE: {garment.garment.sample}",
+        *([f"GRADE RULE TABLE: {table}"] if table else []),
         f"UNITS: {units.upper()}",
         "PRODUCT: warpflat",
         f"VERSION: {__version__}",

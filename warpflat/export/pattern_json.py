@@ -5,12 +5,14 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
 from warpflat._version import __version__
 from warpflat.core.atomic_files import atomic_path
+from warpflat.pattern.cut_list import cut_list
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.pieces import SeamSide
 
@@ -59,7 +61,12 @@ def pattern_json(garment: DraftedGarment) -> dict[str, Any]:
         "units": "m",
         "name": garment.name,
         "sample_size": garment.garment.sample,
+        "words": dict(garment.garment.words),
         "sizes": {size: {piece.name: _piece(piece) for piece in pieces} for size, pieces in garment.pieces.items()},
+        "cut_list": {
+            size: {cloth: [asdict(entry) for entry in rows] for cloth, rows in cut_list(pieces).items()}
+            for size, pieces in garment.pieces.items()
+        },
         "stitches": stitches,
         "seams": [
             {
@@ -91,6 +98,10 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
     return {
         "fabric": piece.piece.fabric,
         "quantity": piece.piece.quantity,
+        "role": piece.piece.role,
+        "also": dict(piece.piece.also),
+        "enlarged": list(piece.enlarged),
+        "marks": sorted(piece.piece.marks),
         "paired": piece.piece.paired,
         "title": piece.piece.title,
         "printed_units": piece.piece.units,

@@ -148,6 +148,12 @@ class PieceEntry(Entry):
 
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
+    role: Literal["shell", "facing", "strip", "waistband", "lining", "pocket"] = "shell"
+    also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
+    enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
+        default=[1.0, 1.0]
+    )
+    marks: list[Name] = Field(default_factory=list)
     paired: bool
     title: Text = ""
     printed_units: Literal["mm", "cm", "in"] = "cm"
@@ -203,6 +209,7 @@ class PatternEntry(Entry):
 
     name: Name
     sample_size: Text
+    words: dict[Text, Text] = Field(default_factory=dict)
     sizes: dict[Text, Annotated[dict[Name, PieceEntry], Field(min_length=1)]] = Field(min_length=1)
     stitches: list[StitchEntry]
     seams: list[SeamEntry]

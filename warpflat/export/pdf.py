@@ -31,6 +31,7 @@ from warpflat.pattern.layout import Placed, Sheet, lay_out, nests, occupied_poin
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, Words, font_file
 from warpflat.pattern.sewing_order import seam_letters
 from warpflat.pattern.tile_nesting import nest_on_tiles
+from warpflat.pattern.words import printed_in, translate
 
 if TYPE_CHECKING:
     from reportlab.pdfgen.canvas import Canvas
@@ -80,6 +81,11 @@ def write_pdf(
     Raises:
         InputError: unknown paper or size.
     """
+    with printed_in(garment.garment.words):
+        return _write(garment, path, paper, sizes)
+
+
+def _write(garment: DraftedGarment, path: str | os.PathLike[str], paper: str, sizes: Sequence[str] | None) -> Tiling:
     from reportlab.pdfgen.canvas import Canvas
 
     if paper not in PAPERS:
@@ -299,7 +305,8 @@ def _tile(canvas: Any, tiling: Tiling, row: int, column: int, title: str) -> Non
         _joining_marks(canvas, tiling, row, column)
     canvas.setFillColor("#555555")
     canvas.setFont(FONT, 7)
-    page = f"{title}  -  sheet {tiling.name(row, column)}  -  {paper.name}, print at 100 %"
+    sheet = translate("sheet {name}", name=tiling.name(row, column))
+    page = f"{title}  -  {sheet}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
     canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, page)
     canvas.showPage()
 

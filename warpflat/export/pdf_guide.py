@@ -10,11 +10,13 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.export.pdf_legend import page_footer
 from warpflat.pattern.cloth_needed import WIDTHS, cloth_needed
+from warpflat.pattern.cut_list import cloths_of, cut_list
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
-from warpflat.pattern.label import cutting_words
+from warpflat.pattern.label import cutting_words, printed_size
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width, wrap_text
 from warpflat.pattern.measures import cloth_words, length_words
 from warpflat.pattern.sewing_order import piece_titles, sewing_steps, sewn_seams
+from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from warpflat.export.pdf_tiling import Paper
@@ -44,7 +46,7 @@ class _Page:
 
     def end(self) -> None:
         """End the page."""
-        page_footer(self.canvas, self.garment.name, self.paper, "cutting and sewing")
+        page_footer(self.canvas, self.garment.name, self.paper, translate("cutting and sewing"))
         self.canvas.showPage()
         self.y = self.paper.height - self.paper.margin - 0.004
 
@@ -95,6 +97,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
     size, units = whole.garment.sample, whole.garment.units
     size = size if size in printed.pieces else next(iter(printed.pieces))
     _pieces(page, printed.pieces[size], units)
+    _cut_list(page, printed.pieces[size])
     _cloth(page, whole, units)
     _steps(page, whole, size)
     _seams(page, whole, size, units)
@@ -102,7 +105,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
         f"{piece.piece.printed_name}: {note}." for piece in printed.pieces[size] for note in piece.notes
     )
     if notes:
-        page.heading("Notes", 3 * LINE)
+        page.heading(translate("Notes"), 3 * LINE)
     for note in notes:
         page.paragraph(note)
     page.end()
@@ -111,7 +114,7 @@ def guide_pages(canvas: Any, whole: DraftedGarment, printed: DraftedGarment, pap
 def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
     """Draw the pieces, small, with what to cut of each."""
     titles = piece_titles([piece.piece for piece in pieces])
-    page.heading("Cut", THUMBNAIL[1] + 0.02)
+    page.heading(translate("Cut"), THUMBNAIL[1] + 0.02)
     highest = max(float(np.ptp(piece.cut_line, axis=0).max()) for piece in pieces)
     scale = min(THUMBNAIL[1] / highest, 0.06)
     step = page.width / IN_ROW
@@ -124,14 +127,39 @@ def _pieces(page: _Page, pieces: Sequence[DraftedPiece], units: str) -> None:
             _thumbnail(page.canvas, piece, np.array([middle, top - THUMBNAIL[1] / 2]), scale)
         page.y = top - THUMBNAIL[1] - LINE
         for number, piece in enumerate(row):
-            lines = [f"{start + number + 1}  {titles[piece.name]}", cutting_words(piece.piece), piece.piece.fabric]
+            lines = [
+                f"{start + number + 1}  {titles[piece.name]}",
+                cutting_words(piece.piece),
+                " / ".join(cloths_of(piece)),
+            ]
             y = page.y
             for k, line in enumerate(lines):
                 page.text(page.left + number * step + 0.001, line, 7.5, bold=k == 0, width=step - 0.002)
                 page.y -= 0.0038
             page.y = y
         page.y -= 3 * 0.0038
-    page.paragraph(f"Allowances are included: {_allowances(pieces, units)}. Lay every grain arrow along the selvedge.")
+    page.paragraph(
+        translate(
+            "Allowances are included: {allowances}. Lay every grain arrow along the selvedge.",
+            allowances=_allowances(pieces, units),
+        )
+    )
+
+
+def _cut_list(page: _Page, pieces: Sequence[DraftedPiece]) -> None:
+    """Write what is cut from each cloth, where there are several."""
+    cloths = cut_list(pieces)
+    if len(cloths) < 2:
+        return
+    page.heading(translate("From each cloth"), (1 + len(cloths)) * LINE)
+    for cloth, entries in cloths.items():
+        words = [
+            translate(
+                f"{{title}} {{count}}{' on fold' if entry.on_fold else ''}", title=entry.title, count=entry.quantity
+            )
+            for entry in entries
+        ]
+        page.paragraph(", ".join(words), indent=0.030, lead=cloth)
 
 
 def _allowances(pieces: Sequence[DraftedPiece], units: str) -> str:
@@ -141,7 +169,8 @@ def _allowances(pieces: Sequence[DraftedPiece], units: str) -> str:
             if edge.kind in ("seam", "hem") and edge.width > 0:
                 found.setdefault((edge.kind, round(edge.width, 4)), [])
     return ", ".join(
-        f"{kind}s {length_words(width, units)}" for kind, width in sorted(found, key=lambda k: (k[0] == "hem", k))
+        translate(f"{kind}s {{width}}", width=length_words(width, units))
+        for kind, width in sorted(found, key=lambda k: (k[0] == "hem", k))
     )
 
 
@@ -176,15 +205,17 @@ def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: floa
 
 def _cloth(page: _Page, whole: DraftedGarment, units: str) -> None:
     """Write how much cloth each size takes at the usual widths."""
-    page.heading("Cloth needed", 3 * LINE)
-    head = ["", *(cloth_words(width, units, of_width=True) + " wide" for width in WIDTHS)]
+    page.heading(translate("Cloth needed"), 3 * LINE)
+    head = ["", *(translate("{width} wide", width=cloth_words(width, units, of_width=True)) for width in WIDTHS)]
     rows = []
     for size in whole.pieces:
         for fabric, lengths in cloth_needed(whole, size).items():
-            words = ["too narrow" if length is None else cloth_words(length, units) for length in lengths]
-            rows.append([" ".join(part for part in (fabric, f"size {size}" if size else "") if part), *words])
+            words = [translate("too narrow") if length is None else cloth_words(length, units) for length in lengths]
+            rows.append([" ".join(part for part in (fabric, printed_size(size) if size else "") if part), *words])
     page.table(head, rows, (0.34, 0.22, 0.22, 0.22))
-    page.paragraph("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
+    page.paragraph(
+        translate("Pieces laid flat on one layer, both ways up the grain. Take more for nap, prints and shrinkage.")
+    )
 
 
 def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
@@ -192,7 +223,7 @@ def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
     seams = sewn_seams(whole, size)
     if not seams:
         return
-    page.heading("Seams" + (f", size {size}" if len(whole.pieces) > 1 else ""), 3 * LINE)
+    page.heading(translate("Seams") + (f", {printed_size(size)}" if len(whole.pieces) > 1 else ""), 3 * LINE)
     rows = [
         [
             seam.letter,
@@ -204,13 +235,16 @@ def _seams(page: _Page, whole: DraftedGarment, size: str, units: str) -> None:
         ]
         for seam in seams
     ]
-    page.table(("", "seam", "side", "length", "sewn to", "length"), rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
+    head = ["", *(translate(word) for word in ("seam", "piece", "length", "sewn to", "length"))]
+    page.table(head, rows, (0.05, 0.27, 0.24, 0.1, 0.24, 0.1))
 
 
 def _steps(page: _Page, whole: DraftedGarment, size: str) -> None:
     """Write the order of sewing."""
     steps = sewing_steps(whole, size)
-    page.heading("Sewing order", 3 * LINE)
-    page.paragraph("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+    page.heading(translate("Sewing order"), 3 * LINE)
+    page.paragraph(
+        translate("Right sides together. Letters stand beside the notches; notches with the same letter meet.")
+    )
     for number, step in enumerate(steps, 1):
         page.paragraph(step, indent=0.006, lead=str(number))

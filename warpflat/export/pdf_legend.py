@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.text import format_count
 from warpflat.export.pdf_tiling import LEGEND_SIZE
 from warpflat.export.svg import STYLE
 from warpflat.pattern.drafted import DraftedGarment
-from warpflat.pattern.label import fit_label
+from warpflat.pattern.label import fit_label, printed_size
 from warpflat.pattern.layout import Sheet
 from warpflat.pattern.lettering import BOLD, CAPITALS, FONT, text_width
 from warpflat.pattern.sewing_order import piece_titles
+from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from warpflat.export.pdf_tiling import Paper, Tiling
@@ -39,7 +39,7 @@ _KEY = (
     ("dart_fold", "fold of a dart"),
     ("internal", "level or line of the body"),
     ("grain", "grain: along the warp"),
-    ("drill", "tip of a dart: mark it"),
+    ("drill", "point to mark: dart, button, pocket"),
     ("notch", "notch: clip; letter of its seam"),
 )
 
@@ -51,11 +51,17 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
     x, top = float(at[0]), float(at[1]) + LEGEND_SIZE[1]
     _text(canvas, x, top - 0.008, garment.name.replace("_", " "), 18, bold=True)
     if any(sizes):
-        _text(canvas, x, top - 0.016, f"Size{'s' if len(sizes) > 1 else ''} {', '.join(sizes)}", 11)
-    _text(canvas, x, top - 0.025, "Print at 100 % (actual size). Do not fit to the page.", 10, bold=True)
-    _text(canvas, x, top - 0.031, f"Paper: {paper}. Measure both squares before you cut anything.", 8)
+        _text(canvas, x, top - 0.016, _sizes_words(sizes), 11)
+    _text(canvas, x, top - 0.025, translate("Print at 100 % (actual size). Do not fit to the page."), 10, bold=True)
+    _text(
+        canvas,
+        x,
+        top - 0.031,
+        translate("Paper: {paper}. Measure both squares before you cut anything.", paper=paper),
+        8,
+    )
     _square(canvas, x + 0.001, top - 0.037 - TEST_MM, TEST_MM, "5 cm")
-    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, "1 inch")
+    _square(canvas, x + 0.058, top - 0.037 - TEST_INCHES, TEST_INCHES, translate("1 inch"))
     y = top - 0.037
     for role, meaning in _KEY:
         y -= 0.0052
@@ -67,14 +73,23 @@ def draw_legend(canvas: Any, at: FloatArray, garment: DraftedGarment, sizes: Seq
         if role == "drill":
             canvas.circle((x + 0.1265) * POINT, y * POINT, 0.002 * POINT)
             canvas.line((x + 0.1265) * POINT, (y - 0.003) * POINT, (x + 0.1265) * POINT, (y + 0.003) * POINT)
-        _text(canvas, x + 0.139, y - 0.0009, meaning, 7)
+        _text(canvas, x + 0.139, y - 0.0009, translate(meaning), 7)
     if len(sizes) > 1:
         for index, size in enumerate(sizes):
             column, row = divmod(index, 4)
             y = top - 0.097 - 0.006 * row
             dashes = SIZE_DASHES[index % len(SIZE_DASHES)]
             _sample(canvas, x + 0.001 + 0.045 * column, y, SIZE_COLOURS[index % len(SIZE_COLOURS)], 0.5, dashes)
-            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, f"size {size}", 8)
+            _text(canvas, x + 0.023 + 0.045 * column, y - 0.0012, translate("size {size}", size=size), 8)
+
+
+def _sizes_words(sizes: Sequence[str]) -> str:
+    """Return the words for the sizes of a pattern."""
+    if len(sizes) == 1:
+        words = printed_size(sizes[0])
+    else:
+        words = translate("sizes {sizes}", sizes=", ".join(sizes))
+    return words[0].upper() + words[1:]
 
 
 def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], sheet: Sheet, tiling: Tiling) -> None:
@@ -85,14 +100,18 @@ def legend_page(canvas: Any, garment: DraftedGarment, sizes: Sequence[str], shee
     # Unused room for the sizes' lines is not left empty.
     y = float(low[1]) - 0.004 + (0.026 if len(sizes) == 1 else 0.0)
     lines = [
-        "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that",
-        f"the half diamonds meet, and glue. {format_count(len(tiling.tiles), 'sheet')}; empty ones are left out.",
+        translate(
+            "Cut each sheet along its left and upper line. Lay it on the lines of its left and upper neighbours, so that"
+        ),
+        translate(
+            "the half diamonds meet, and glue. {sheets} sheets; empty ones are left out.", sheets=len(tiling.tiles)
+        ),
     ]
     for line in lines:
         _text(canvas, float(low[0]), y, line, 7.5)
         y -= 0.0042
     _overview(canvas, sheet, tiling, float(low[0]), paper.margin + 0.004, LEGEND_SIZE[0], y - paper.margin - 0.010)
-    page_footer(canvas, garment.name, paper, "print this page first and measure both squares")
+    page_footer(canvas, garment.name, paper, translate("print this page first and measure both squares"))
     canvas.showPage()
 
 
@@ -160,7 +179,7 @@ def page_footer(canvas: Any, name: str, paper: Paper, words: str) -> None:
     """Write what a page is of at its foot."""
     canvas.setFillColor("#555555")
     canvas.setFont(FONT, 7)
-    line = f"{name.replace('_', ' ')}  -  {words}  -  {paper.name}, print at 100 %"
+    line = f"{name.replace('_', ' ')}  -  {words}  -  {translate('{paper}, print at 100 %', paper=paper.name)}"
     canvas.drawCentredString(paper.width / 2 * POINT, (paper.margin - 0.0055) * POINT, line)
 
 

@@ -100,6 +100,7 @@ def _garment(data: PatternEntry) -> DraftedGarment:
             if stitch.kind == "seam"
         ],
         sample_size=data.sample_size,
+        words=data.words,
     )
     reports = tuple(
         SeamReport(
@@ -137,6 +138,11 @@ def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         size=size,
         fabric=data.fabric,
         quantity=data.quantity,
+        role=data.role,
+        also=data.also,
+        marks={
+            hole.name: _to_mesh(np.array([hole.at]), frame)[0] for hole in data.drill_holes if hole.name in data.marks
+        },
         paired=data.paired,
         title=data.title,
         units=data.printed_units,
@@ -160,6 +166,7 @@ def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
         grain=grain,
         label=_label(data.label),
         notes=tuple(data.notes),
+        enlarged=(data.enlarged[0], data.enlarged[1]),
     )
 
 

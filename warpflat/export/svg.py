@@ -19,6 +19,7 @@ from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
+from warpflat.pattern.words import printed_in
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
 
@@ -70,7 +71,9 @@ def write_svg(
     sheet = lay_out(groups, width=width)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
     for placed in sheet.placed:
-        for index, drawing in enumerate(draw_nest(placed.pieces)):
+        with printed_in(garment.garment.words):
+            drawings = draw_nest(placed.pieces)
+        for index, drawing in enumerate(drawings):
             shift = np.column_stack([np.eye(2), placed.offset])
             page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None)
     page.write(path)

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.polyline import arc_lengths, points_at_lengths
 from warpflat.core.text import find_unused_name, without_side
+from warpflat.garment.facings import Stand, with_facings, with_stand_facings
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
+from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["FINISHES", "Finishing", "finish_edges"]
@@ -30,6 +30,7 @@ class Finishing:
         width: [m].
         share: length of a band over that of its edge; it is stretched as it is sewn.
         overlap: by how much a waistband runs past one end [m].
+        shaped: whether a waistband is cut from the upper strip of the pieces, as curved as they are, not straight.
     """
 
     kind: str
@@ -37,6 +38,7 @@ class Finishing:
     width: float
     share: float = 1.0
     overlap: float = 0.0
+    shaped: bool = False
 
     @property
     def name(self) -> str:
@@ -44,13 +46,16 @@ class Finishing:
         return {"waistband": "waistband", "band": f"{self.edge}_band"}.get(self.kind, f"{self.edge}_{self.kind}")
 
 
-def finish_edges(pattern: Garment, finishing: Sequence[Finishing], *, gaps: Collection[str] = ()) -> Garment:
+def finish_edges(
+    pattern: Garment, finishing: Sequence[Finishing], *, gaps: Collection[str] = (), stands: Sequence[Stand] = ()
+) -> Garment:
     """Return a pattern with the pieces that finish its edges, and the seams that join them.
 
     Args:
         pattern: with all its openings.
         finishing: what is wanted.
         gaps: names of seams that an opening leaves open at their upper end; a band ends there.
+        stands: button stands; what no facing of an edge beside them takes along gets one of its own.
 
     Raises:
         InputError: no free edge has the name, or a facing cannot be drawn there.
@@ -62,12 +67,17 @@ def finish_edges(pattern: Garment, finishing: Sequence[Finishing], *, gaps: Coll
             raise InputError(f"finishing[{number}]: no free edge {wish.edge!r}; {nearest(wish.edge, known)}")
         try:
             if wish.kind == "facing":
-                pattern = _with_facings(pattern, wish, found, gaps)
+                pattern = with_facings(pattern, found, wish.width, gaps=gaps, stands=stands)
+            elif wish.shaped:
+                pattern = with_shaped_waistband(pattern, found, wish.width, gaps=gaps)
             else:
                 pattern = _with_strip(pattern, wish, free_chain(pattern, found, gaps))
         except InputError as error:
             raise InputError(f"finishing[{number}]: {error}") from None
-    return pattern
+    sewn = {(side.piece, side.edge) for seam in pattern.seams for row in seam.sides for side in row}
+    edges = {piece.name: {edge.name for edge in piece.edges} for piece in pattern.pieces[pattern.sample]}
+    left = [each for each in stands if each.edge in edges[each.piece] and (each.piece, each.edge) not in sewn]
+    return with_stand_facings(pattern, left)
 
 
 def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
@@ -117,96 +127,5 @@ def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: 
     lines = {"fold line": np.array([[0.0, wish.width], [whole, wish.width]])} if folded else {}
     return Piece(
         name=name, size=like.size, fabric=like.fabric, quantity=quantity, edges=edges, internal_lines=lines, grain=grain,
-        paired=False,
+        paired=False, role="waistband" if wish.kind == "waistband" else "strip",
     )  # fmt: skip
-
-
-def _with_facings(
-    pattern: Garment, wish: Finishing, places: Sequence[tuple[str, str]], gaps: Collection[str]
-) -> Garment:
-    """Return a pattern with a facing along each of some free edges, joined as the pieces themselves are."""
-    names: dict[tuple[str, str], str] = {}
-    taken = {piece.name for piece in pattern.pieces[pattern.sample]}
-    for piece, edge in places:
-        names[piece, edge] = find_unused_name(f"{piece}_{edge}_facing".replace(" ", "_"), taken)
-        taken.add(names[piece, edge])
-    pieces = {
-        size: (*row, *(_facing(pattern.piece(piece, size), edge, wish.width, name) for (piece, edge), name in names.items()))
-        for size, row in pattern.pieces.items()
-    }  # fmt: skip
-    seams, called = list(pattern.seams), {seam.name for seam in pattern.seams}
-    parts = {
-        (piece, neighbour): name
-        for (piece, edge), name in names.items()
-        for neighbour in _neighbours(pattern.piece(piece, pattern.sample), edge)
-    }
-    for (piece, edge), name in names.items():
-        words = find_unused_name(name.replace("_", " "), called)
-        sides = (SeamSide(piece=piece, edge=edge),), (SeamSide(piece=name, edge=edge),)
-        seams.append(Seam(name=words, sides=sides))
-        called.add(words)
-    # Beside a zip that runs out into the edge the facing's ends are turned in.
-    for seam in (seam for seam in pattern.seams if seam.name not in gaps):
-        both = [row[0] for row in seam.sides]
-        if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
-            first, second = (replace(side, piece=parts[side.piece, side.edge]) for side in both)
-            words = find_unused_name(f"{seam.name} of {wish.edge} facing", called)
-            seams.append(Seam(name=words, sides=((first,), (second,))))
-            called.add(words)
-    return replace(pattern, pieces=pieces, seams=seams)
-
-
-def _neighbours(piece: Piece, name: str) -> tuple[str, str]:
-    """Return the names of the edges before and after one."""
-    names = [edge.name for edge in piece.edges]
-    at = names.index(name)
-    return names[at - 1], names[(at + 1) % len(names)]
-
-
-def _facing(piece: Piece, name: str, width: float, title: str) -> Piece:
-    """Return the facing of an edge: its line, as much of both neighbours as it is wide, and the line at that distance.
-
-    Raises:
-        InputError: a dart ends in the edge, or the facing would not lie within the piece.
-    """
-    import shapely
-
-    edge, (before, after) = piece.edge(name), (piece.edge(each) for each in _neighbours(piece, name))
-    if "dart" in (before.kind, after.kind):
-        raise InputError(f"a dart ends in {piece.name}.{name}: give it a band or a binding instead of a facing")
-    if min(before.length, after.length) <= width:
-        raise InputError(f"the edges beside {piece.name}.{name} are shorter than the facing is wide")
-    last, first = _start(after.points, width), _start(before.points[::-1], width)[::-1]
-    inner = np.asarray(shapely.LineString(edge.points).offset_curve(width).coords)[::-1]
-    body = shapely.Polygon(piece.outline)
-    # Near the corners the line leads to where the neighbours end.
-    near = np.minimum(*(np.linalg.norm(inner - end, axis=1) for end in (last[-1], first[0])))
-    inner = inner[(near > 0.25 * width) & shapely.contains(body, shapely.points(inner))]
-    inner = np.vstack([last[-1:], inner, first[:1]])
-    edges = [
-        replace(edge, vertices=None),
-        replace(after, points=last, vertices=None),
-        Edge(name="inner edge", points=inner, kind="cut"),
-        replace(before, points=first, vertices=None),
-    ]
-    try:
-        return Piece(
-            name=title, size=piece.size, fabric=piece.fabric, quantity=piece.quantity, edges=edges, paired=piece.paired,
-            grain=_grain(edges, piece),
-        )  # fmt: skip
-    except InputError:
-        raise InputError(f"no facing {1e3 * width:.0f} mm wide can be drawn along {piece.name}.{name}") from None
-
-
-def _start(points: FloatArray, length: float) -> FloatArray:
-    """Return the first part of a line, of a given length [m]."""
-    at = arc_lengths(points)
-    return np.vstack([points[at < length - 1e-6], points_at_lengths(points, np.array([length]))])
-
-
-def _grain(edges: Sequence[Edge], piece: Piece) -> FloatArray:
-    """Return a grain line of the piece's direction in the middle of a facing's outline."""
-    grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
-    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
-    middle = np.concatenate([edges[0].points, edges[2].points]).mean(axis=0)
-    return middle + np.outer([-0.02, 0.02], along)

@@ -24,6 +24,7 @@ from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths, wearer_fit
 from warpflat.garment.openings import Opening, opened_rings
+from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
@@ -51,6 +52,7 @@ class Garment:
         wished: the ease of its seams; None if it was not sewn.
         openings: along its seams.
         finishing: of its free edges, in the pattern.
+        pockets: in the pattern.
     """
 
     name: str
@@ -61,6 +63,7 @@ class Garment:
     wished: SeamRatios | None = None
     openings: Sequence[Opening] = ()
     finishing: Sequence[Finishing] = ()
+    pockets: Sequence[Pocket] = ()
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())

@@ -1,4 +1,4 @@
-"""Openings on a pattern: the notch at a zip's end, its line, and the edges of slits and vents."""
+"""Openings on a pattern: a zip's line and the notch at its end, the edges of slits and vents, button stands, keyholes."""
 
 from __future__ import annotations
 
@@ -11,10 +11,11 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.core.text import find_unused_name
+from warpflat.garment.button_stand import bust_depth, button_depths, with_button_stand
 from warpflat.garment.openings import Opening, OpeningPart
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
-__all__ = ["mark_openings"]
+__all__ = ["mark_openings", "with_notches"]
 
 # How far inside the sewing line the line of a zip is drawn [m].
 _INSIDE = 0.004
@@ -31,7 +32,8 @@ def mark_openings(pattern: Garment, openings: Sequence[Opening], placed: Placed)
     """Return a pattern with its openings drawn.
 
     A zip is a line along its edges with its name, and a notch at its end. A slit or a vent is an edge of its own, which
-    is not sewn and has an allowance of its width.
+    is not sewn and has an allowance of its width. Where it buttons, a piece runs beyond its edge, which is not sewn. A keyhole is
+    drawn on its piece.
 
     Args:
         pattern: pieces and seams, without mirror images.
@@ -46,11 +48,16 @@ def mark_openings(pattern: Garment, openings: Sequence[Opening], placed: Placed)
             begin, end = _reach(opening, part)
             if end <= begin:
                 continue
+            if opening.kind == "keyhole":
+                pattern = _with_keyhole(pattern, opening, part.piece)
+                continue
             seam = next((each for each in pattern.seams if each.name == part.seam), None)
             if seam is None:
                 raise InputError(f"openings[{number}]: the pattern has no seam {part.seam!r} of its own")
             if opening.kind == "zip":
                 pattern = _with_zip(pattern, seam, opening, end if end < part.whole else None, number, placed)
+            elif opening.kind == "buttons":
+                pattern = _with_buttons(pattern, seam, opening, number, placed)
             else:
                 pattern = _with_slit(pattern, seam, opening, number, placed)
     return pattern
@@ -79,15 +86,29 @@ def _with_zip(
             ]
     if end is None:
         return replace(pattern, pieces=pieces)
-    whole = _part_of(placed, pattern.sample, number, seam.name).whole
-    share = end / whole
-    if not _starts_on_top(pattern, seam):
-        share = 1.0 - share
+    by_size = {}
+    for size in pieces:
+        part = _part_of(placed, size, number, seam.name)
+        share = _reach(opening, part)[1] / part.whole
+        by_size[size] = with_notches(
+            seam.of_size(size), [share if _starts_on_top(pattern, seam) else 1.0 - share], part.whole
+        )
+    own = replace(seam, notches=by_size[pattern.sample], size_notches=by_size)
+    return replace(pattern, pieces=pieces, seams=[own if each.name == seam.name else each for each in pattern.seams])
+
+
+def with_notches(seam: Seam, shares: Sequence[float], whole: float) -> tuple[float, ...]:
+    """Return the notches of a seam (shares of its length) with some more, which its own keep clear of.
+
+    Args:
+        seam: given notches, or none: then they are spaced as on any seam.
+        shares: of the new ones.
+        whole: length of the seam [m].
+    """
     count = max(1, round(whole / _SPACING))
     own = seam.notches if seam.notches is not None else [(k + 0.42) / count for k in range(count)]
-    notches = tuple(sorted([share, *(each for each in own if abs(each - share) * whole > _CLEAR)]))
-    seams = [replace(each, notches=notches) if each.name == seam.name else each for each in pattern.seams]
-    return replace(pattern, pieces=pieces, seams=seams)
+    kept = [each for each in own if np.abs(each - np.asarray(shares)).min() * whole > _CLEAR]
+    return tuple(sorted([*shares, *kept]))
 
 
 def _starts_on_top(pattern: Garment, seam: Seam) -> bool:
@@ -122,6 +143,74 @@ def _between(line: FloatArray, begin: float, end: float) -> FloatArray:
     at = arc_lengths(line)
     ends = points_at_lengths(line, np.array([begin, end]))
     return np.vstack([ends[:1], line[(at > begin + 1e-6) & (at < end - 1e-6)], ends[1:]])
+
+
+def _with_buttons(pattern: Garment, seam: Seam, opening: Opening, number: int, placed: Placed) -> Garment:
+    """Return a pattern with a button stand on both sides of a seam, which is sewn only below it."""
+    sides = {(side.piece, side.edge) for row in seam.sides for side in row}
+    if any(len(row) > 1 for row in seam.sides) or opening.start > 0.0 or opening.buttons is None:
+        raise InputError(f"openings[{number}]: buttons begin at the upper end of a seam between two edges")
+    pieces, counts = dict(pattern.pieces), list[int]()
+    # The sample size first: the others have as many buttons.
+    for size in sorted(pieces, key=lambda each: each != pattern.sample):
+        part = _part_of(placed, size, number, seam.name)
+        whole = sum(each.whole for each in placed[size][number])
+        name, edge = next(iter(sides))
+        piece = pattern.piece(name, size)
+        bust = bust_depth(piece, edge, _runs_down(piece, piece.edge(edge).points))
+        length = min(opening.length, whole)
+        depths = button_depths(opening.buttons, length, None if bust is None else part.before + bust, *counts)
+        counts = [len(depths)]
+        own = depths[(depths >= part.before) & (depths < part.before + part.whole)] - part.before
+        for name, edge in sides:
+            pieces[size] = [
+                with_button_stand(each, edge, opening, length - part.before, own) if each.name == name else each
+                for each in pieces[size]
+            ]
+    at = pattern.piece(*(next(iter(sides))[0], pattern.sample)).edge(next(iter(sides))[1]).length
+    still_sewn = opening.length < at
+    seams = [each for each in pattern.seams if each.name != seam.name or still_sewn]
+    return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _with_keyhole(pattern: Garment, opening: Opening, name: str) -> Garment:
+    """Return a pattern with a keyhole drawn on one piece: its slit, its round end, its button and loop."""
+    pieces = {
+        size: [_keyhole(piece, opening) if piece.name == name else piece for piece in row]
+        for size, row in pattern.pieces.items()
+    }
+    return replace(pattern, pieces=pieces)
+
+
+def _keyhole(piece: Piece, opening: Opening) -> Piece:
+    import shapely
+
+    folds = {edge.name: edge.points for edge in piece.edges}
+    line = piece.internal_lines.get(opening.line, folds.get(opening.line))
+    if line is None:
+        raise InputError(f"a keyhole is cut along a line inside its piece; {piece.name} has no {opening.line!r} inside")
+    line = line if _runs_down(piece, line) else line[::-1]
+    slit = _between(line, 0.0, opening.length)
+    along = (slit[-1] - slit[0]) / np.linalg.norm(slit[-1] - slit[0])
+    across, radius = np.array([along[1], -along[0]]), 0.5 * opening.width
+    turn = np.radians(np.linspace(-150.0, 150.0, 33))
+    centre = slit[-1] - radius * along
+    ring = centre + radius * (np.cos(turn)[:, None] * along + np.sin(turn)[:, None] * across)
+    half = radius * np.sin(np.radians(30.0))
+    shapes = {"keyhole": slit[[0, -1]], "keyhole end": ring}
+    for number, (sign, end) in enumerate(((-1.0, ring[0]), (1.0, ring[-1]))):
+        shapes[f"keyhole side {number + 1}"] = np.array([slit[0] + sign * half * across, end])
+    body = shapely.Polygon(piece.outline).buffer(1e-6)
+    lines = dict(piece.internal_lines)
+    for key, points in shapes.items():
+        inside = [
+            part for part in shapely.get_parts(shapely.LineString(points).intersection(body)) if part.length > 1e-3
+        ]
+        if inside:
+            lines[key] = np.asarray(max(inside, key=lambda part: part.length).coords)
+    button = slit[0] + 0.010 * along + (half + 0.008) * across
+    marks = {**piece.marks, "button": button} if body.contains(shapely.Point(button)) else dict(piece.marks)
+    return replace(piece, internal_lines=lines, marks=marks)
 
 
 def _with_slit(pattern: Garment, seam: Seam, opening: Opening, number: int, placed: Placed) -> Garment:

@@ -1,7 +1,8 @@
-"""Openings: zips, slits and vents along the seams of a form, from the upper or the lower end of their line."""
+"""Openings along the lines of a form, from their upper or lower end: zips, buttons, slits, vents and keyholes."""
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,9 +24,37 @@ if TYPE_CHECKING:
     from warpflat.mannequin.layout import Layout
     from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["CENTRES", "Opening", "OpeningPart", "one_sided", "opened_rings", "part_at_centres", "place_opening"]
+__all__ = [
+    "CENTRES",
+    "Buttons",
+    "Opening",
+    "OpeningPart",
+    "one_sided",
+    "opened_rings",
+    "part_at_centres",
+    "place_opening",
+]
 
 CENTRES = ("centre front", "centre back")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Buttons:
+    """The buttons of a stand, and its facing.
+
+    Attributes:
+        diameter: of a button [m].
+        spacing: about how far apart they are [m]; one lies on the bust line, where a front gapes first.
+        count: how many; None as many as the spacing gives.
+        facing: "grown-on" (the stand is folded) or "separate" (a piece of its own).
+        facing_width: from the edge of the stand [m].
+    """
+
+    diameter: float = 0.018
+    spacing: float = 0.085
+    count: int | None = None
+    facing: str = "grown-on"
+    facing_width: float = 0.06
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,12 +62,14 @@ class Opening:
     """A stretch of a seam that can be opened, or is never closed.
 
     Attributes:
-        kind: "zip" from the upper end of the line; "slit" or "vent" from its lower end.
-        line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there.
-        length: [m].
+        kind: "zip", "buttons" or "keyhole" from the upper end of the line; "slit" or "vent" from its lower end.
+        line: of the seam, as "centre back" or "side left"; pieces that run across a centre line are parted there, except
+            by a keyhole, which is cut into the piece.
+        length: [m]; infinite for buttons all along the line.
         start: how far from that end it begins [m].
         style: of a zip, "invisible" or "lapped".
-        width: of a vent's flap [m].
+        width: of a vent's flap, of the button stand beyond its line, or of a keyhole's round end [m].
+        buttons: of a button stand.
     """
 
     kind: str
@@ -47,11 +78,17 @@ class Opening:
     start: float = 0.0
     style: str = "invisible"
     width: float = 0.04
+    buttons: Buttons | None = None
 
     @property
     def from_below(self) -> bool:
         """Whether it is measured from the lower end of its line."""
-        return self.kind != "zip"
+        return self.kind in ("slit", "vent")
+
+    @property
+    def parts_pieces(self) -> bool:
+        """Whether pieces that run across its line are parted there."""
+        return self.kind != "keyhole"
 
     @property
     def opens_the_top(self) -> bool:
@@ -87,7 +124,7 @@ class OpeningPart:
 def part_at_centres(layout: Layout, form: Form, openings: Sequence[Opening]) -> Form:
     """Return a form whose pieces are parted along the centre lines that have openings; a piece "back" becomes two."""
     pieces = dict(form.pieces)
-    for line in dict.fromkeys(opening.line for opening in openings if opening.line in CENTRES):
+    for line in dict.fromkeys(opening.line for opening in openings if opening.line in CENTRES and opening.parts_pieces):
         parted: dict[str, PieceRecipe] = {}
         for name, recipe in pieces.items():
             bricks = select_bricks(layout, recipe.bricks)
@@ -124,6 +161,10 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
     for name, piece in form.pieces.items():
         if piece.fold == opening.line:
             found.append((opening.line, name, np.asarray(piece.edges[opening.line])))
+        elif not opening.parts_pieces and opening.line in piece.surface.lines:
+            found.append((opening.line, name, np.asarray(piece.surface.lines[opening.line])))
+    if opening.kind == "keyhole":
+        found = found[:1]
     if not found:
         folds = {piece.fold for piece in form.pieces.values() if piece.fold}
         raise InputError(f"no seam {opening.line!r}; {nearest(opening.line, {s.name for s in form.seams} | folds)}")
@@ -138,7 +179,7 @@ def place_opening(form: FormResult, opening: Opening, positions: Mapping[str, Fl
         parts.append(OpeningPart(seam=seam_name, piece=piece_name, vertices=ids, before=before, whole=whole))
         before += whole
     end = opening.start + opening.length
-    if end > before:
+    if math.isfinite(end) and end > before:
         raise InputError(f"ends {1e3 * end:.0f} mm along {opening.line!r}, which is {1e3 * before:.0f} mm long")
     return parts
 
@@ -162,11 +203,15 @@ def opened_rings(
     levels = {level: set(mannequin.layout.lines[level].tolist()) for level in RING_LEVELS}
     found: dict[str, float] = {}
     for opening in openings:
-        begin, end = opening.start, opening.start + opening.length
         parts, passed = place_opening(form, opening, positions), dict[str, float]()
+        whole = sum(part.whole for part in parts)
+        begin, end = opening.start, min(opening.start + opening.length, whole)
         first = int(form.pieces[parts[0].piece].grid_vertices[parts[0].vertices[0]])
         # Where the opening runs out into an edge, that end is open.
         runs_out = begin == 0.0 and first in edges
+        if runs_out and end == whole:
+            # Open from edge to edge, as a coat: twice its length is more than any ring needs.
+            end *= 2.0
         for part in parts:
             grid = form.pieces[part.piece].grid_vertices[part.vertices]
             places = part.before + arc_lengths(positions[part.piece][part.vertices])

@@ -11,6 +11,8 @@ from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import format_count
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.linings import add_interfacing, add_lining
+from warpflat.pattern.shrinkage import Shrinkage, enlarged
 
 if TYPE_CHECKING:
     from warpflat.flattening.result import Flattening
@@ -49,6 +51,9 @@ class PatternOptions:
         marker_seconds: time for the nesting.
         units: of lengths in printed words, "mm", "cm" or "in".
         names: by piece what is printed instead of its name.
+        shrinkage: of the shell's cloth; its pieces are drawn larger.
+        words: what is printed instead of English words and names.
+        lining, interfacing: what these cloths are called; none without a name.
     """
 
     formats: Sequence[str] = FORMATS
@@ -60,6 +65,10 @@ class PatternOptions:
     marker_seconds: int = 5
     units: str = "cm"
     names: Mapping[str, str] = field(default_factory=dict)
+    shrinkage: Shrinkage = field(default_factory=Shrinkage)
+    words: Mapping[str, str] = field(default_factory=dict)
+    lining: str = ""
+    interfacing: str = ""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -163,7 +172,7 @@ def export_patterns(
         InputError: there is no pattern, an unknown format, dialect, paper or size, sizes of "json", or the folder
             cannot be written.
     """
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.atomic_files import file_in, output_folder
     from warpflat.core.manifest import record_file
     from warpflat.export.read_pattern_json import read_pattern_json
 
@@ -182,6 +191,8 @@ def export_patterns(
             _write(drafted, folder, format, name=drafted.name, dialect=dialect, paper=paper, sizes=sizes)
             for format in formats
         ]
+        if "dxf" in formats and len(drafted.pieces if sizes is None else sizes) > 1:
+            files.append(file_in(folder, drafted.name, ".rul").name)
         for file in files:
             record_file(folder, drafted.name, file)
     return files
@@ -193,7 +204,7 @@ def _write_pattern(
     """Make, draft and write a pattern; geometry that defeats it becomes a note, and `not_drawn` in the metrics."""
     from shapely.errors import ShapelyError
 
-    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.atomic_files import file_in, output_folder
     from warpflat.pattern.walked import walk_seams
 
     if not options.formats and options.cloth is None:
@@ -201,6 +212,8 @@ def _write_pattern(
     report_activity("drafting the pattern")
     try:
         pattern, notes = make()
+        pattern = add_lining(pattern, options.lining) if options.lining else pattern
+        pattern = add_interfacing(pattern, options.interfacing) if options.interfacing else pattern
         drafted, remarks = _draft(_in_words(pattern, options), options.tolerance)
     except (InputError, ShapelyError, ArithmeticError, ValueError) as error:
         why = " ".join(str(error).split())
@@ -211,8 +224,10 @@ def _write_pattern(
         *(f"{piece.name}: {note}" for pieces in drafted.pieces.values() for piece in pieces for note in piece.notes),
     )
     walked = walk_seams(drafted)
+    drafted = enlarged(drafted, options.shrinkage, next(iter(pattern)).fabric)
     metrics: dict[str, Any] = {
         "pattern": _quality(drafted),
+        "cloths": _cloths(drafted),
         "corners": [asdict(corner) for corner in drafted.corners],
         "walked": [
             {key: getattr(seam, key) for key in ("name", "size", "distance_mm", "difference_mm", "notch_mm")}
@@ -225,6 +240,8 @@ def _write_pattern(
             for kind in FORMATS
             if kind in options.formats
         ]
+        if "dxf" in options.formats and len(drafted.pieces) > 1:
+            files.append(file_in(folder, name, ".rul").name)
         if options.cloth is not None:
             marked, remarks, plan = _marker(drafted, folder, name, options.cloth, options.marker_seconds)
             files += marked
@@ -251,7 +268,7 @@ def _in_words(pattern: Pattern, options: PatternOptions) -> Pattern:
         size: tuple(replace(piece, title=options.names.get(piece.name, ""), units=options.units) for piece in of_size)
         for size, of_size in pattern.pieces.items()
     }
-    return replace(pattern, pieces=pieces)
+    return replace(pattern, pieces=pieces, words=options.words)
 
 
 def _quality(drafted: DraftedGarment) -> dict[str, Any]:
@@ -264,6 +281,14 @@ def _quality(drafted: DraftedGarment) -> dict[str, Any]:
         "seam_difference_per_50mm_mm": max(near, default=None),
         "seams_that_differ": sorted({seam.name for seam in drafted.seams if not seam.matches}),
     }
+
+
+def _cloths(drafted: DraftedGarment) -> list[dict[str, Any]]:
+    """Return what is cut from each cloth in the sample size."""
+    from warpflat.pattern.cut_list import cut_list
+
+    rows = cut_list(drafted.pieces[drafted.garment.sample])
+    return [{"name": cloth, "pieces": [asdict(entry) for entry in entries]} for cloth, entries in rows.items()]
 
 
 def _draft(pattern: Pattern, tolerance: float | None) -> tuple[DraftedGarment, tuple[str, ...]]:
@@ -306,7 +331,7 @@ def _write(
     file = file_in(folder, name if kind in ("dxf", "svg") else "pattern", f".{kind}")
     report_activity(f"writing {file.name}")
     if kind == "dxf":
-        write_dxf(drafted, file, dialect=dialect, sizes=sizes)
+        write_dxf(drafted, file, dialect=dialect, sizes=sizes, rul=file_in(folder, name, ".rul"))
     elif kind == "svg":
         write_svg(drafted, file, sizes=sizes, nested=True)
     elif kind == "pdf":

@@ -18,6 +18,7 @@ from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
+from warpflat.garment.facings import STAND, Stand
 from warpflat.garment.finishing import finish_edges
 from warpflat.garment.form_plan import (
     EdgePlan,
@@ -28,7 +29,8 @@ from warpflat.garment.form_plan import (
 )
 from warpflat.garment.mark_openings import mark_openings
 from warpflat.garment.mirror_pieces import MirrorPair, find_mirror_pairs, sew_mirror_pairs
-from warpflat.garment.openings import one_sided, place_opening
+from warpflat.garment.openings import Opening, one_sided, place_opening
+from warpflat.garment.pockets import add_pockets
 from warpflat.mannequin.seam_names import name_seams
 from warpflat.pattern.from_mesh import inner_stretches
 from warpflat.pattern.label import default_grain
@@ -110,7 +112,23 @@ def pattern_of_garment(
     zips = [
         row[0].seam for row, each in zip(placed[pattern.sample], sample.openings, strict=True) if each.opens_the_top
     ]
-    return finish_edges(pattern, sample.finishing, gaps=zips), notes
+    pattern = finish_edges(pattern, sample.finishing, gaps=zips, stands=_stands(pattern, sample.openings))
+    return add_pockets(pattern, sample.pockets), notes
+
+
+def _stands(pattern: Garment, openings: Sequence[Opening]) -> list[Stand]:
+    """Return the outer edges of the button stands of a pattern, with their facings."""
+    return [
+        Stand(
+            piece=piece.name, edge=edge.name, width=opening.buttons.facing_width,
+            grown_on=opening.buttons.facing == "grown-on",
+        )
+        for opening in openings
+        if opening.buttons is not None
+        for piece in pattern.pieces[pattern.sample]
+        for edge in piece.edges
+        if edge.name == f"{opening.line} {STAND}"
+    ]  # fmt: skip
 
 
 def _laid_upon_each_other(garments: Mapping[str, FlatGarment]) -> dict[str, FlatGarment]:

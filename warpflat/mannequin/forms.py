@@ -21,6 +21,7 @@ from warpflat.mannequin.darts import FormDart, PlacedDart, place_darts
 from warpflat.mannequin.ease import ease_from
 from warpflat.mannequin.form_seams import FormSeam, find_seams
 from warpflat.mannequin.layout import RING_LEVELS
+from warpflat.mannequin.neckline import Neckline, widen_neck
 from warpflat.mannequin.outside import push_outside
 from warpflat.mannequin.pieces import FormPiece, cut_pieces
 
@@ -62,6 +63,7 @@ class Form:
         blend: another form and its weight from 0 to 1: the surface between this form's and the other's.
         darts: slits in its pieces.
         ease: by level, how much more than around the body a tape reads around the garment [cm]; negative for knits.
+        neckline: wider than the base of the neck; None lies on it.
 
     Raises:
         InputError: a piece's name that cannot name a file, or two that would be one file on some system.
@@ -74,6 +76,7 @@ class Form:
     blend: tuple[Form, float] | None = None
     darts: tuple[FormDart, ...] = ()
     ease: Mapping[str, float] = field(default_factory=dict)
+    neckline: Neckline | None = None
 
     def __post_init__(self) -> None:
         files: dict[str, str] = {}
@@ -139,13 +142,13 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
         name: of the form.
         data: keys ``pieces`` (by name, which names a file, too: ``bricks``, ``datum``, ``open``), ``profiles`` (by level, see
             :class:`Adjustment`), ``ruled`` (pairs of levels), ``blend`` (``with``: a form's name, ``weight``), ``ease`` (see
-            :func:`ease_from`), ``like`` (a shipped form whose pieces and profiles are taken over where this one gives none).
+            :func:`ease_from`), ``neckline`` (see :class:`Neckline`), ``like`` (a shipped form, taken over where this one gives nothing).
 
     Raises:
         InputError: for an unknown key, a value of the wrong kind, or a piece's name that cannot name a file.
     """
     where = f"form {name}"
-    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease"}, where)
+    _check_keys(data, {"pieces", "profiles", "ruled", "blend", "like", "ease", "neckline"}, where)
     base = shipped_form(str(data["like"])) if "like" in data else None
     pieces = _pieces_from(data.get("pieces", {}), where)
     if base and "pieces" not in data:
@@ -162,7 +165,12 @@ def form_from_mapping(name: str, data: Mapping[str, Any]) -> Form:
     if "blend" in data:
         blend = _blend_from(data["blend"], where)
     ease = ease_from(data.get("ease", {}), where, base=base.ease if base else {})
-    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend, ease=ease)
+    neckline = base.neckline if base else None
+    if "neckline" in data:
+        values, ranges = _table(data["neckline"], f"{where}: neckline"), Neckline.ranges()
+        _check_keys(values, set(ranges), f"{where}: neckline")
+        neckline = Neckline(**{k: _number(v, f"{where}: neckline: {k}", *ranges[k]) for k, v in values.items()})
+    return Form(name=name, pieces=pieces, profiles=profiles, ruled=ruled, blend=blend, ease=ease, neckline=neckline)
 
 
 def _pieces_from(value: object, where: str) -> dict[str, PieceRecipe]:
@@ -220,6 +228,8 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
     faces = layout.faces_of([brick for own in bricks.values() for brick in own])
     vertices = _surface(layout, vertices, form, np.unique(layout.faces[faces]))
+    if form.neckline is not None:
+        vertices = widen_neck(layout, vertices, form.neckline)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedGarment
 from warpflat.pattern.marker import unfold_piece
 from warpflat.pattern.tile_nesting import nest_on_strip
@@ -25,10 +26,10 @@ def cloth_needed(garment: DraftedGarment, size: str) -> dict[str, tuple[float | 
     shapes: dict[str, list[shapely.Polygon]] = {}
     for piece in garment.pieces[size]:
         whole = shapely.Polygon(unfold_piece(piece))
-        own = shapes.setdefault(piece.piece.fabric, [])
         mirrored = shapely.transform(whole, lambda points: points * [-1.0, 1.0])
-        pairs = piece.piece.paired and not piece.piece.on_fold and piece.piece.quantity % 2 == 0
-        own += [mirrored if pairs and k % 2 else whole for k in range(piece.piece.quantity)]
+        for cloth, quantity in cloths_of(piece).items():
+            pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
+            shapes.setdefault(cloth, []).extend(mirrored if pairs and k % 2 else whole for k in range(quantity))
     return {
         fabric: tuple(nest_on_strip(row, width=width - 2 * SELVEDGE, gap=GAP) for width in WIDTHS)
         for fabric, row in shapes.items()

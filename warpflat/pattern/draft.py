@@ -40,6 +40,7 @@ from warpflat.pattern.pieces import Edge, Garment, Hole, Piece, Seam
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Side, Wedge
 from warpflat.pattern.truing import CornerReport, true_corners
+from warpflat.pattern.words import printed_in
 
 __all__ = ["draft_garment", "draft_half", "draft_piece", "nest_label", "relabelled"]
 
@@ -67,6 +68,11 @@ def draft_garment(
     Raises:
         InputError: an unknown size, or a half piece that reaches across its fold.
     """
+    with printed_in(garment.words):
+        return _drafted(garment, tolerance, sizes, true=true)
+
+
+def _drafted(garment: Garment, tolerance: float | None, sizes: Sequence[str] | None, *, true: bool) -> DraftedGarment:
     chosen = garment.sizes if sizes is None else tuple(sizes)
     for size in chosen:
         garment.piece(garment.pieces[garment.sizes[0]][0].name, size)
@@ -79,7 +85,8 @@ def draft_garment(
         pieces = {
             piece.name: _draft(piece, garment.name, edges[piece.name], tolerance) for piece in garment.pieces[size]
         }
-        notches = seam_notches([*garment.seams, *cut_darts(pieces)], pieces)
+        seams = [seam.of_size(size) for seam in garment.seams]
+        notches = seam_notches([*seams, *cut_darts(pieces)], pieces)
         drafted[size] = tuple(
             replace(piece, notches=piece.notches + tuple(notches.get(name, ()))) for name, piece in pieces.items()
         )
@@ -146,7 +153,10 @@ def _draft(piece: Piece, garment: str, edges: tuple[DraftedEdge, ...], tolerance
         edges=edges,
         cut_line=cut.points,
         darts=drafted_darts,
-        drill_holes=_drill_holes(drafted_darts, fisheyes),
+        drill_holes=(
+            *_drill_holes(drafted_darts, fisheyes),
+            *(DrillHole(name=name, at=_moved(at[None], frame)[0]) for name, at in piece.marks.items()),
+        ),
         notches=dart_notches(piece, _wedges(darts), cut),
         internal_lines=internal,
         cutouts=cutouts,

@@ -119,6 +119,7 @@ class DraftedPiece:
         grain: 2 by 2 [m], from and to, upwards.
         label: its text and place.
         notes: what the cutter should know, one sentence each.
+        enlarged: by what it is drawn larger across and along its grain, for cloth that shrinks.
     """
 
     piece: Piece
@@ -134,6 +135,7 @@ class DraftedPiece:
     grain: FloatArray
     label: Label
     notes: tuple[str, ...]
+    enlarged: tuple[float, float] = (1.0, 1.0)
 
     @property
     def name(self) -> str:

@@ -18,6 +18,7 @@ from warpflat.pattern.drafted import DraftedEdge, DraftedPiece, Notch
 from warpflat.pattern.drafted_darts import fisheye_legs
 from warpflat.pattern.label import Label
 from warpflat.pattern.lettering import Words, text_width
+from warpflat.pattern.words import translate, translate_name
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
@@ -298,7 +299,7 @@ def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, Float
             lines.append((edge.name, edge.line, True))
     lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]
     called = {name for name, _, _ in lines}
-    return [(name_without_number(name, called), line, inwards) for name, line, inwards in lines]
+    return [(translate_name(name_without_number(name, called)), line, inwards) for name, line, inwards in lines]
 
 
 def _name_obstacles(piece: DraftedPiece) -> list[Geometry]:
@@ -391,7 +392,7 @@ def _fold_bracket(edge: DraftedEdge, joints: Sequence[FloatArray] = ()) -> tuple
         angle += np.pi
     height = min(0.0035, length / 20)
     places = [a + share * (b - a) + (depth / 2) * inwards for share in (0.5, 0.4, 0.6, 0.3, 0.7, 0.2, 0.8)]
-    tries = [Words(text="PLACE ON FOLD", at=at, height=height, angle=angle) for at in places]
+    tries = [Words(text=translate("PLACE ON FOLD"), at=at, height=height, angle=angle) for at in places]
     lines = shapely.union_all([shapely.LineString(joint) for joint in joints])
     words = next((w for w in tries if not joints or lines.distance(_text_box(w)) > CLEAR), tries[0])
     return strokes, [words]
@@ -405,8 +406,9 @@ def _list_sizes(label: Label, size: str, sizes: str) -> list[Words]:
     """Return the label's words with all sizes in place of its own, no wider than the label is."""
     words = label.words()
     for index, row in enumerate(words):
-        if row.text == f"Size {size}":
-            text = f"Sizes {sizes}"
+        own, all_sizes = translate("size {size}", size=size), translate("sizes {sizes}", sizes=sizes)
+        if row.text == own[0].upper() + own[1:]:
+            text = all_sizes[0].upper() + all_sizes[1:]
             height = row.height * min(1.0, label.width / text_width(text, row.height))
             words[index] = replace(row, text=text, height=height)
     return words

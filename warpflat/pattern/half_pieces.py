@@ -61,6 +61,9 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     images = tips * mirror + [2 * axis, 0]
     if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
         return False
+    marks = np.array([hole.at for hole in piece.drill_holes]).reshape(-1, 2)
+    if any(np.linalg.norm(marks - mark, axis=1).min() > INNER for mark in marks * mirror + [2 * axis, 0]):
+        return False
     lines = list(piece.internal_lines.values())
     return all(min(strays(line * mirror + [2 * axis, 0], other) for other in lines) <= INNER for line in lines)
 
@@ -117,13 +120,20 @@ def _half(piece: DraftedPiece, garment: DraftedGarment, side: float) -> DraftedP
         edges=[edge.edge for edge in edges],
         darts=darts,
         internal_lines=_kept_lines(piece.internal_lines, axis, side, shift),
+        marks={
+            hole.name: hole.at + shift
+            for hole in piece.drill_holes
+            if hole.name in piece.piece.marks and side * (hole.at[0] - axis) > -ON_AXIS
+        },
+        role=piece.piece.role,
+        also=piece.piece.also,
         paired=piece.piece.paired,
         title=piece.piece.title,
         units=piece.piece.units,
     )
     notches = _kept_notches(piece, garment.garment.seams, side, names, [(e.name, e.line - shift) for e in edges[:-1]])
     notches = tuple(replace(n, at=n.at + shift, base=tuple(base + shift for base in n.base)) for n in notches)
-    return draft_half(half, garment.name, tuple(edges), notches, piece.notes)
+    return replace(draft_half(half, garment.name, tuple(edges), notches, piece.notes), enlarged=piece.enlarged)
 
 
 def _kept_notches(

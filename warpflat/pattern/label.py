@@ -13,11 +13,21 @@ from warpflat.core.text import size_words
 from warpflat.pattern.lettering import Words, text_width, wrap_text
 from warpflat.pattern.measures import length_words
 from warpflat.pattern.pieces import Piece
+from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
 
-__all__ = ["LEADING", "Label", "cutting_words", "default_grain", "fit_label", "label_lines", "place_label"]
+__all__ = [
+    "LEADING",
+    "Label",
+    "cutting_words",
+    "default_grain",
+    "fit_label",
+    "label_lines",
+    "place_label",
+    "printed_size",
+]
 
 
 #: Height of capitals [m]: the piece's name, the other lines; and the distance of lines as a multiple of it.
@@ -96,11 +106,14 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
     """Return what a label says: name, size, how to cut the piece, cloth, included allowances, garment."""
     lines = [piece.printed_name.upper()]
     if piece.size:
-        words = size_words(piece.size)
+        words = printed_size(piece.size)
         lines.append(words[0].upper() + words[1:])
     lines.append(cutting_words(piece) + (f" - {piece.fabric}" if piece.fabric else ""))
+    lines += [
+        f"{cutting_words(replace(piece, quantity=count, also={}))} - {cloth}" for cloth, count in piece.also.items()
+    ]
     if allowances := _allowance_words(piece):
-        lines.append(f"Includes {allowances}")
+        lines.append(translate("Includes {allowances}", allowances=allowances))
     title = garment.replace("_", " ")
     if title.upper() != lines[0]:
         lines.append(title)
@@ -110,10 +123,15 @@ def label_lines(piece: Piece, garment: str) -> tuple[str, ...]:
 def cutting_words(piece: Piece) -> str:
     """Return how often a piece is cut, and how."""
     if piece.on_fold:
-        return f"Cut {piece.quantity} on fold"
+        return translate("Cut {count} on fold", count=piece.quantity)
     if piece.quantity % 2 == 0 and piece.paired:
-        return f"Cut {piece.quantity}, {piece.quantity // 2} mirrored"
-    return f"Cut {piece.quantity}"
+        return translate("Cut {count}, {mirrored} mirrored", count=piece.quantity, mirrored=piece.quantity // 2)
+    return translate("Cut {count}", count=piece.quantity)
+
+
+def printed_size(size: str) -> str:
+    """Return the words for a size as they are printed."""
+    return translate("size {size}", size=size) if size_words(size) != size else translate(size)
 
 
 def _allowance_words(piece: Piece) -> str:
@@ -125,7 +143,8 @@ def _allowance_words(piece: Piece) -> str:
         if values:
             # The unit once: "6/10 mm".
             numbers = [value.removesuffix(f" {piece.units}") for value in values]
-            words.append(f"{kind} {'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}")
+            widths = f"{'/'.join(numbers) if piece.units != 'in' else ', '.join(numbers)} {piece.units}"
+            words.append(translate(f"{kind} {{widths}}", widths=widths))
     return ", ".join(words)
 
 

@@ -11,9 +11,11 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import size_words
+from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
-from warpflat.pattern.label import Label, fit_label
+from warpflat.pattern.label import Label, fit_label, printed_size
 from warpflat.pattern.pieces import unknown_size
+from warpflat.pattern.words import printed_in, translate
 
 __all__ = ["Cloth", "Copy", "Marker", "make_marker"]
 
@@ -145,7 +147,8 @@ def make_marker(
         tries.append([(piece, False) for piece, _ in copies])
     share = max(1, seconds // len(tries))
     plans = [_nest(garment.name, plan, cloth, share, seed) for plan in tries]
-    placements = [_named(copy) for copy in min(plans, key=_length)]
+    with printed_in(garment.garment.words):
+        placements = [_named(copy) for copy in min(plans, key=_length)]
     marker = Marker(
         name=garment.name,
         fabric=fabric,
@@ -257,13 +260,12 @@ def _copies(garment: DraftedGarment, fabric: str, sizes: Mapping[str, int]) -> l
         if count < 1:
             raise InputError(f"{count} garments of size {size}; it must be 1 or more")
         for piece in garment.pieces[size]:
-            if fabric and piece.piece.fabric != fabric:
-                continue
-            total = piece.piece.quantity * count
-            pairs = piece.piece.paired and not piece.piece.on_fold and piece.piece.quantity % 2 == 0
+            quantity = cloths_of(piece).get(fabric, 0) if fabric else piece.piece.quantity
+            total = quantity * count
+            pairs = piece.piece.paired and not piece.piece.on_fold and quantity % 2 == 0
             copies += [(piece, pairs and k % 2 == 1) for k in range(total)]
     if not copies:
-        known = {piece.piece.fabric for pieces in garment.pieces.values() for piece in pieces}
+        known = {cloth for pieces in garment.pieces.values() for piece in pieces for cloth in cloths_of(piece)}
         raise InputError(f"no piece is of fabric {fabric!r}; {nearest(fabric, known)}")
     return copies
 
@@ -314,8 +316,8 @@ def _named(copy: Copy) -> Copy:
 
     piece = copy.piece
     rows = [(piece.piece.printed_name, NAME)]
-    rows += [(size_words(piece.size), MORE)] if piece.size else []
-    rows += [("mirrored", MORE)] if copy.mirrored else []
+    rows += [(printed_size(piece.size), MORE)] if piece.size else []
+    rows += [(translate("mirrored"), MORE)] if copy.mirrored else []
     lines = [*copy.fold_lines, copy.grain, *copy.notches]
     for clearance in CLEARANCES:
         keep_off = [shapely.LineString(line).buffer(clearance) for line in lines]

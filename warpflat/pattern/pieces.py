@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -17,6 +17,7 @@ from warpflat.core.polyline import polyline_length
 from warpflat.core.text import size_words
 from warpflat.pattern.measures import UNITS
 from warpflat.pattern.seam_difference import eased_length
+from warpflat.pattern.words import translate_name
 from warpflat.surface.overlap import OVERLAP, overlap_width, overlapping
 
 if TYPE_CHECKING:
@@ -38,6 +39,7 @@ __all__ = [
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
 EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
+ROLES = ("shell", "facing", "strip", "waistband", "lining", "pocket")
 
 #: Ends of neighbouring edges that are closer than this [m] are one corner.
 SAME_POINT = 1e-6
@@ -161,6 +163,9 @@ class Piece:
         internal_lines: #P by 2 [m] by name: feature lines, placement lines; drawn, not cut.
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
+        marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
+        role: "shell", or what it is derived as: "facing", "strip", "waistband", "lining", "pocket".
+        also: cloths from which it is cut too, and how often, as interfacing.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.
         units: of lengths in printed words, one of :data:`warpflat.pattern.measures.UNITS`.
@@ -175,6 +180,9 @@ class Piece:
     internal_lines: Mapping[str, FloatArray] = field(default_factory=dict)
     grain: FloatArray | None = None
     holes: Sequence[Hole] = ()
+    marks: Mapping[str, FloatArray] = field(default_factory=dict)
+    role: str = "shell"
+    also: Mapping[str, int] = field(default_factory=dict)
     paired: bool = True
     title: str = ""
     units: str = "cm"
@@ -186,7 +194,9 @@ class Piece:
             check_label(self.title, "a piece's printed name")
         if self.units not in UNITS:
             raise InputError(f"{where}: unknown units {self.units!r}; {nearest(self.units, UNITS)}")
-        if self.quantity < 1:
+        if self.role not in ROLES:
+            raise InputError(f"{where}: unknown role {self.role!r}; {nearest(self.role, ROLES)}")
+        if min(self.quantity, *self.also.values(), self.quantity) < 1:
             raise InputError(f"{where}: quantity is {self.quantity}; it must be at least 1")
         object.__setattr__(self, "edges", tuple(self.edges))
         object.__setattr__(self, "darts", tuple(self.darts))
@@ -206,7 +216,7 @@ class Piece:
     @property
     def printed_name(self) -> str:
         """What stands on paper."""
-        return self.title or self.name.replace("_", " ")
+        return self.title or translate_name(self.name.replace("_", " "))
 
     @property
     def on_fold(self) -> bool:
@@ -260,6 +270,7 @@ class Seam:
         ease: length of the second side over the first, minus 1: 0.03 eases 3 % more of the second side in.
         eased: shares of the first side's length between which the second is longer; all along it if not given.
         notches: fractions of the first side's length in (0, 1) that get notches on both sides; None places them by length.
+        size_notches: by size, fractions instead of `notches`, where a notch stands for a length, as the end of a zip.
         double: double notches; None means double where a back takes part and no front does.
     """
 
@@ -268,6 +279,7 @@ class Seam:
     ease: float = 0.0
     eased: tuple[float, float] = (0.0, 1.0)
     notches: tuple[float, ...] | None = None
+    size_notches: Mapping[str, tuple[float, ...]] = field(default_factory=dict)
     double: bool | None = None
 
     def __post_init__(self) -> None:
@@ -281,8 +293,12 @@ class Seam:
             raise InputError(
                 f"seam {self.name!r}: eased between {self.eased}; two shares from 0 to 1, rising, are needed"
             )
-        if any(not 0 < f < 1 for f in self.notches or ()):
+        if any(not 0 < f < 1 for row in (self.notches or (), *self.size_notches.values()) for f in row):
             raise InputError(f"seam {self.name!r}: notches {self.notches}; each must be a fraction between 0 and 1")
+
+    def of_size(self, size: str) -> Seam:
+        """Return the seam with the notches of one size."""
+        return replace(self, notches=self.size_notches[size]) if size in self.size_notches else self
 
     def reach(self, length: float, whole: float) -> float:
         """Return the length along the second side opposite to `length` along the first, of `whole`."""
@@ -298,12 +314,14 @@ class Garment:
         pieces: by size, in the order in which sizes are listed; each size has pieces of the same names.
         seams: by name of piece and edge.
         sample_size: the size that files of one size show; None takes the middle one.
+        words: what is printed instead of English words and names (see `warpflat.pattern.words`).
     """
 
     name: str
     pieces: Mapping[str, Sequence[Piece]]
     seams: Sequence[Seam] = ()
     sample_size: str | None = None
+    words: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.pieces or not all(self.pieces.values()):

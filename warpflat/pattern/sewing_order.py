@@ -6,9 +6,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from string import ascii_uppercase
 
-from warpflat.core.text import without_side
+from warpflat.core.text import other_side, without_side
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.pieces import Piece, Seam, SeamSide
+from warpflat.pattern.words import translate, translate_name
 
 __all__ = ["SewnSeam", "piece_titles", "seam_letters", "sewing_steps", "sewn_seams"]
 
@@ -24,6 +25,8 @@ _STAGES: tuple[tuple[str, tuple[str, ...]], ...] = (
     ("Join at the waist", ("waist", "hip", "abdomen", "underbust")),
     ("Set the sleeves in", ("armhole",)),
     ("Attach the collar", ("neck", "collar")),
+    ("Join the linings", ("lining",)),
+    ("Join facings, bands and bindings, and sew them to their edges", ("facing", "band", "binding", "waistband")),
 )
 
 
@@ -53,7 +56,9 @@ class SewnSeam:
 def piece_titles(pieces: Sequence[Piece]) -> dict[str, str]:
     """Return what each piece is called: one that is cut in pairs has no side."""
     titles = {
-        piece.name: without_side(piece.name) if _in_pairs(piece) and not piece.title else piece.printed_name
+        piece.name: translate_name(without_side(piece.name))
+        if _in_pairs(piece) and not piece.title
+        else piece.printed_name
         for piece in pieces
     }
     plain = list(titles.values())
@@ -78,7 +83,7 @@ def sewn_seams(garment: DraftedGarment, size: str) -> tuple[SewnSeam, ...]:
         found.append(
             SewnSeam(
                 letter=_letter(number),
-                name=without_side(seam.name) if len(group) > 1 else seam.name,
+                name=translate_name(without_side(seam.name) if len(group) > 1 else seam.name),
                 sides=(_words(seam.sides[0], titles), _words(seam.sides[1], titles)),
                 length_mm=lengths.get(seam.name, (0.0, 0.0)),
                 ease=seam.ease,
@@ -104,20 +109,22 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     steps = []
     darts = [f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece))]
     if darts:
-        steps.append(f"Sew the darts, from the edge to the tip, and press them: {'; '.join(darts)}.")
+        steps.append(
+            translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="; ".join(darts))
+        )
     seams = sewn_seams(garment, size)
     for stage in sorted({seam.stage for seam in seams}):
         own = [seam for seam in seams if seam.stage == stage]
-        what = _STAGES[stage][0] if stage < len(_STAGES) else "Sew"
+        what = translate(_STAGES[stage][0] if stage < len(_STAGES) else "Sew")
         parts = [f"{seam.letter} ({_join(seam)}{_eased(seam)})" for seam in own]
-        steps.append(f"{what}, notch to notch: {', '.join(parts)}.")
+        steps.append(translate("{what}, notch to notch: {seams}.", what=what, seams=", ".join(parts)))
     free = _free_edges(pieces, garment.garment.seams, titles, ("seam",))
     if free:
-        steps.append(f"Finish the raw edges with a facing, a band or binding: {free}.")
+        steps.append(translate("Finish the raw edges with a facing, a band or binding: {edges}.", edges=free))
     hems = _free_edges(pieces, garment.garment.seams, titles, ("hem",))
     if hems:
-        steps.append(f"Turn up and sew the hems: {hems}.")
-    return tuple(steps)
+        steps.append(translate("Turn up and sew the hems: {edges}.", edges=hems))
+    return (*steps, *_button_steps(pieces, titles))
 
 
 def _mirror_groups(seams: Sequence[Seam]) -> list[list[Seam]]:
@@ -140,6 +147,20 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
     return 0
 
 
+def _button_steps(pieces: Sequence[DraftedPiece], titles: Mapping[str, str]) -> list[str]:
+    """Return the steps for buttons."""
+    own = {titles[piece.name]: sum(name.startswith("button") for name in piece.piece.marks) for piece in pieces}
+    return [
+        translate(
+            "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.",
+            count=count,
+            title=title,
+        )
+        for title, count in own.items()
+        if count > 1
+    ]
+
+
 def _letter(number: int) -> str:
     """Return A, B, ... Z, AA, AB, ..."""
     letters = ""
@@ -156,7 +177,9 @@ def _words(side: Sequence[SeamSide], titles: Mapping[str, str]) -> str:
 
 def _join(seam: SewnSeam) -> str:
     first, second = seam.sides
-    return f"{seam.name}: {first} to {second}" if first != second else f"{seam.name} of the {first}"
+    if first == second:
+        return translate("{seam} of the {first}", seam=seam.name, first=first)
+    return translate("{seam}: {first} to {second}", seam=seam.name, first=first, second=second)
 
 
 def _eased(seam: SewnSeam) -> str:
@@ -164,12 +187,13 @@ def _eased(seam: SewnSeam) -> str:
         return ""
     longer = seam.sides[1] if seam.ease > 0 else seam.sides[0]
     share = seam.ease if seam.ease > 0 else 1.0 / (1.0 + seam.ease) - 1.0
-    return f", {'gather' if share > 0.15 else 'ease in'} the {longer}"
+    return translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
 
 
 def _dart_names(piece: DraftedPiece) -> list[str]:
     names = [without_side(dart.dart.name) for dart in piece.darts]
-    return list(dict.fromkeys([*names, *(without_side(name) for name in piece.fisheyes)]))
+    names += [without_side(name) for name in piece.fisheyes]
+    return [translate_name(name) for name in dict.fromkeys(names)]
 
 
 def _free_edges(
@@ -177,14 +201,17 @@ def _free_edges(
 ) -> str:
     """Return the edges of some kinds that are in no seam, by name, with their pieces."""
     sewn = {(part.piece, part.edge) for seam in seams for side in seam.sides for part in side}
+    # A strip that is cut twice is drawn for one side.
+    sewn |= {(piece, other_side(edge)) for piece, edge in sewn}
     found: dict[str, list[str]] = {}
     for piece in pieces:
         for edge in piece.piece.edges:
             if edge.kind in kinds and (piece.name, edge.name) not in sewn:
-                own = found.setdefault(without_side(edge.name), [])
+                own = found.setdefault(translate_name(without_side(edge.name)), [])
                 own += [] if titles[piece.name] in own else [titles[piece.name]]
     return "; ".join(f"{name} ({', '.join(own)})" for name, own in found.items())
 
 
 def _listed(names: Sequence[str]) -> str:
-    return " and ".join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]
+    both = f" {translate('and')} "
+    return both.join([", ".join(names[:-1]), names[-1]]) if len(names) > 1 else names[0]

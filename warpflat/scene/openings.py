@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 
+from warpflat.garment.constraints import Constraint, Straight
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.finishing import FINISHES, Finishing
-from warpflat.garment.openings import CENTRES, Opening
-from warpflat.scene.schema import FinishingTable, OpeningTable
+from warpflat.garment.openings import CENTRES, Buttons, Opening
+from warpflat.garment.pockets import Pocket
+from warpflat.mannequin.forms import FormResult
+from warpflat.scene.schema import FinishingTable, OpeningTable, PocketTable
 
-__all__ = ["scene_finishing", "scene_openings", "sewn_centres"]
+__all__ = ["scene_finishing", "scene_openings", "scene_pockets", "sewn_centres", "straight_stands"]
 
-# Allowance of a slit and flap of a vent [mm], where none is given.
-_WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0}
+# Allowance of a slit, flap of a vent, button stand beyond its line, round end of a keyhole [mm], where none is given.
+_WIDTH_MM = {"zip": 0.0, "slit": 15.0, "vent": 40.0, "buttons": 20.0, "keyhole": 12.0}
 
 
 def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
@@ -22,12 +26,34 @@ def scene_openings(tables: Sequence[OpeningTable]) -> list[Opening]:
         Opening(
             kind=table.kind,
             line=table.seam,
-            length=1e-3 * table.length_mm,
+            length=math.inf if table.length_mm is None else 1e-3 * table.length_mm,
             start=1e-3 * table.start_mm,
             style=table.style,
             width=1e-3 * (_WIDTH_MM[table.kind] if table.width_mm is None else table.width_mm),
+            buttons=_buttons(table) if table.kind == "buttons" else None,
         )
         for table in tables
+    ]
+
+
+def _buttons(table: OpeningTable) -> Buttons:
+    return Buttons(
+        diameter=1e-3 * table.button_mm,
+        spacing=1e-3 * table.spacing_mm,
+        count=table.count,
+        facing=table.facing,
+        facing_width=1e-3 * table.facing_mm,
+    )
+
+
+def straight_stands(form: FormResult, openings: Sequence[Opening]) -> list[Constraint]:
+    """Return the constraints that lay the edges of button stands straight along the grain; a fold is so anyway."""
+    return [
+        Straight(piece=name, line=opening.line, along="warp")
+        for opening in openings
+        if opening.kind == "buttons"
+        for name, piece in form.pieces.items()
+        if opening.line in piece.edges and piece.fold != opening.line
     ]
 
 
@@ -40,6 +66,23 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
             width=FINISHES[table.kind] if table.width_mm is None else 1e-3 * table.width_mm,
             share=table.share,
             overlap=1e-3 * table.overlap_mm,
+            shaped=table.shaped,
+        )
+        for table in tables
+    ]
+
+
+def scene_pockets(tables: Sequence[PocketTable]) -> list[Pocket]:
+    """Return the pockets that a scene wants."""
+    return [
+        Pocket(
+            kind=table.kind,
+            where=table.piece if table.kind == "patch" else table.seam,
+            width=1e-3 * table.width_mm,
+            height=1e-3 * table.height_mm,
+            line=table.line,
+            below=1e-3 * table.below_mm,
+            from_centre=1e-3 * table.from_centre_mm,
         )
         for table in tables
     ]
@@ -47,5 +90,5 @@ def scene_finishing(tables: Sequence[FinishingTable]) -> list[Finishing]:
 
 def sewn_centres(rules: EdgeRules, openings: Sequence[Opening]) -> EdgeRules:
     """Return rules by which a half piece has a seam instead of the fold at the centre lines that have openings."""
-    lines = {opening.line: "seam" for opening in openings if opening.line in CENTRES}
+    lines = {opening.line: "seam" for opening in openings if opening.line in CENTRES and opening.parts_pieces}
     return replace(rules, kinds={**lines, **rules.kinds})

@@ -7,14 +7,18 @@ from typing import TYPE_CHECKING
 from warpflat.garment.edge_rules import EdgeRules
 
 if TYPE_CHECKING:
-    from warpflat.scene.schema import MarkerTable, PatternTable
+    from warpflat.scene.schema import ClothTable, MarkerTable, PatternTable
 from warpflat.garment.pattern_files import PatternOptions
+from warpflat.pattern.shrinkage import Shrinkage
+from warpflat.pattern.words import language_words
 
 __all__ = ["pattern_options"]
 
 
-def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternOptions:
-    """Return the pattern options of a scene's tables `pattern` and `marker`.
+def pattern_options(
+    table: PatternTable, marker: MarkerTable | None, cut_from: ClothTable | None = None
+) -> PatternOptions:
+    """Return the pattern options of a scene's tables `pattern`, `marker` and `cloth`.
 
     Raises:
         InputError: a gap that is wide against the cloth.
@@ -38,5 +42,11 @@ def pattern_options(table: PatternTable, marker: MarkerTable | None) -> PatternO
         cloth=cloth,
         units=table.units,
         names=table.names,
+        words={**language_words(table.language), **table.words},
         marker_seconds=5 if marker is None else marker.seconds,
+        shrinkage=Shrinkage()
+        if cut_from is None
+        else Shrinkage(warp=cut_from.shrinkage_warp, weft=cut_from.shrinkage_weft),
+        lining="" if cut_from is None else cut_from.lining,
+        interfacing="" if cut_from is None else cut_from.interfacing,
     )

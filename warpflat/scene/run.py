@@ -95,7 +95,7 @@ def _run_surface(
     settings = scene.settings
     scene_relax_options(scene)  # a mistake is reported before anything is made
     with errors_named(scene.where):
-        drawing = pattern_options(settings.pattern, settings.marker)
+        drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         seams = scene_surface_seams(settings.seams, scene.name)
     sequence = cuts or scene_cuts(scene, device=device)
     _check_edges(scene, sequence, drawing)

@@ -30,7 +30,7 @@ from warpflat.scene.drape import write_drape
 from warpflat.scene.form_cuts import cut_form, cut_of_dart
 from warpflat.scene.frames import Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
-from warpflat.scene.openings import scene_finishing, scene_openings, sewn_centres
+from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
 from warpflat.scene.write import SceneResult, review_files
@@ -117,7 +117,8 @@ class GarmentPlan:
                 **self.settings,
             )
             finishing = scene_finishing(self.scene.settings.finishing)
-            return replace(garment, openings=tuple(self.openings), finishing=finishing)
+            pockets = scene_pockets(self.scene.settings.pockets)
+            return replace(garment, openings=tuple(self.openings), finishing=finishing, pockets=pockets)
 
 
 def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
@@ -135,7 +136,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     report_activity("building the mannequin")
     mannequin, form = scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
-        drawing = pattern_options(settings.pattern, settings.marker)
+        drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         openings = scene_openings(settings.openings)
         if settings.half:
             drawing = replace(drawing, rules=sewn_centres(drawing.rules, openings))
@@ -156,6 +157,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
             {name: piece.surface.lines for name, piece in form.pieces.items()},
             {name: piece.fold for name, piece in form.pieces.items() if piece.fold},
         )
+    constraints += [each for each in straight_stands(form, openings) if each not in constraints]
     return GarmentPlan(
         scene=scene,
         mannequin=mannequin,

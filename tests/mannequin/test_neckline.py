@@ -1,0 +1,59 @@
+"""Necklines wider than the base of the neck."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from warpflat.core.errors import InputError
+from warpflat.garment.rings import find_rings, ring_line
+from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.forms import form_from_mapping, shipped_form
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.neckline import Neckline
+
+
+def neck_length(mannequin: Mannequin, form) -> float:
+    made = mannequin.form(form)
+    rings = find_rings(mannequin, made, {name: piece.surface.vertices for name, piece in made.pieces.items()})
+    return next(length for ring, length in rings if ring_line(mannequin, ring) == "neck")
+
+
+@pytest.mark.parametrize("size", ["EU 36", "JIS 5AR", "men 56"])
+def test_neck_of_a_t_shirt_passes_the_head_at_a_jerseys_limit(size: str):
+    mannequin = Mannequin.from_size(size, resolution_mm=20.0)
+    shirt = shipped_form("tshirt")
+    assert 1.15 * neck_length(mannequin, replace(shirt, neckline=None)) < mannequin.extremity("head")
+    assert 1.15 * neck_length(mannequin, shirt) > mannequin.extremity("head")
+
+
+def test_neckline_lies_on_the_form_and_leaves_the_rest_in_place():
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=20.0)
+    plain = mannequin.form(form_from_mapping("top", {"like": "bodice"}))
+    wide = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": {"side_cm": 2, "front_cm": 6}}))
+    layout = mannequin.layout
+    faces = layout.faces.astype(np.int64)
+    middles = len(plain.vertices) + np.arange(len(faces))
+    triangles = np.concatenate([np.column_stack([faces[:, [k, (k + 1) % 4]], middles]) for k in range(4)])
+    surface = Closest(np.vstack([plain.vertices, plain.vertices[faces].mean(axis=1)]), triangles)
+    moved = np.flatnonzero(np.any(wide.vertices != plain.vertices, axis=1))
+    assert len(moved) > 100
+    # The shoulder seam is a line of the mesh; all else is brought back to its faces.
+    assert surface(wide.vertices[moved])[2].max() < 1e-6
+    still = np.concatenate([layout.arms["left"][0], layout.rings[layout.level_row["bust"]]])
+    assert np.array_equal(wide.vertices[still], plain.vertices[still])
+    mirror = layout.mirror[moved]
+    assert np.abs(wide.vertices[mirror] * [-1, 1, 1] - wide.vertices[moved]).max() < 1e-6
+    front = layout.front[-1, layout.front.shape[1] // 2]
+    assert np.linalg.norm(wide.vertices[front] - plain.vertices[front]) == pytest.approx(0.06, abs=3e-3)
+
+
+def test_neckline_that_cannot_be_is_named():
+    mannequin = Mannequin.from_size("EU 38", resolution_mm=30.0)
+    with pytest.raises(InputError, match="neckline: side_cm = 9: a number from 0 to 8"):
+        form_from_mapping("top", {"like": "bodice", "neckline": {"side_cm": 9}})
+    narrow = replace(shipped_form("bodice"), neckline=Neckline(side_cm=12.0))
+    with pytest.raises(InputError, match=r"side_cm is 12, but the shoulder is \d+\.\d cm long"):
+        mannequin.form(narrow)

@@ -1,0 +1,55 @@
+"""Printed words in other languages."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import pytest
+from sample_dress import sample_dress
+
+from warpflat.export.pattern_json import pattern_json
+from warpflat.export.pdf import write_pdf
+from warpflat.export.read_pattern_json import pattern_from_json
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.words import language_words, printed_in, translate, translate_name
+from warpflat.pattern.words_german import PHRASES
+
+
+def test_longest_run_of_a_name_is_replaced():
+    assert translate_name("front_neck_facing") == "front_neck_facing"
+    with printed_in(language_words("de")):
+        assert translate_name("front_neck_facing") == "Vorderteil Halsbeleg"
+        assert translate_name("side left") == "Seite links"
+        assert translate_name("unheard of") == "unheard of"
+    assert translate("Cut {count}", count=2) == "Cut 2"
+
+
+def test_every_phrase_has_the_places_of_the_english_one():
+    for phrase, german in PHRASES.items():
+        assert sorted(re.findall(r"{\w+}", phrase)) == sorted(re.findall(r"{\w+}", german)), phrase
+
+
+def test_wrong_places_leave_the_english_phrase():
+    with printed_in({"Cut {count}": "{number}x"}):
+        assert translate("Cut {count}", count=2) == "Cut 2"
+
+
+def test_pages_and_labels_are_german_and_so_are_those_of_a_file_read_back(tmp_path):
+    pypdf = pytest.importorskip("pypdf")
+    drafted = draft_garment(replace(sample_dress(("38",)), words=language_words("de")))
+    read = pattern_from_json(pattern_json(drafted))
+    for number, garment in enumerate((drafted, read)):
+        write_pdf(garment, tmp_path / f"{number}.pdf")
+        text = "\n".join(page.extract_text() for page in pypdf.PdfReader(tmp_path / f"{number}.pdf").pages)
+        for words in (
+            "Größe 38",
+            "im Stoffbruch",
+            "Nähreihenfolge",
+            "Schulternähte schließen",
+            "IM STOFFBRUCH",
+            "Blatt A1",
+        ):
+            assert words in text, words
+        for words in ("Cut ", "Sew ", "Sewing", "Size ", "on fold", "notch to notch"):
+            assert words not in text, words

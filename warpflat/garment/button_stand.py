@@ -1,0 +1,167 @@
+"""Button stands: cloth beyond the centre line, marked buttonholes and buttons."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, points_at_lengths
+from warpflat.core.text import find_unused_name
+from warpflat.garment.facings import STAND, STAND_END
+from warpflat.garment.openings import Buttons, Opening
+from warpflat.pattern.pieces import FOLD_STRAIGHT, Edge, Piece
+
+__all__ = ["bust_depth", "button_depths", "with_button_stand"]
+
+# The first button lies this far below the edge, beside half of its own width [m], and the last at least this share of
+# the spacing above the lower end.
+_BELOW, _LEFT_BELOW = 0.010, 0.6
+# A buttonhole is longer than the button is wide [m], and reaches so far beyond the centre, where the button's shank lies.
+_THICKNESS, _SHANK = 0.003, 0.003
+# Half the length of the bars at the ends of a buttonhole [m].
+_BAR = 0.004
+
+
+def button_depths(buttons: Buttons, length: float, bust: float | None, count: int | None = None) -> FloatArray:
+    """Return how far below the upper edge the buttons lie [m].
+
+    Args:
+        buttons: what is wanted.
+        length: of the opening [m].
+        bust: depth of the bust line, on which a button lies [m]; None where it crosses none.
+        count: of another size, to which this one keeps.
+
+    Raises:
+        InputError: there is no room for two buttons.
+    """
+    first, count = 0.5 * buttons.diameter + _BELOW, buttons.count or count
+    if count is not None:
+        spacing = (length - first) / max(count - 1 + _LEFT_BELOW, 1.0)
+    else:
+        spacing = buttons.spacing
+        if bust is not None and bust - first > 0.5 * spacing:
+            spacing = (bust - first) / round((bust - first) / spacing)
+        count = int((length - first) / spacing - _LEFT_BELOW) + 1
+    if count < 2 or spacing <= buttons.diameter:
+        raise InputError(f"no room for buttons {1e3 * buttons.diameter:.0f} mm wide on {1e3 * length:.0f} mm")
+    return np.asarray(first + spacing * np.arange(count))
+
+
+def with_button_stand(piece: Piece, name: str, opening: Opening, end: float, depths: FloatArray) -> Piece:
+    """Return a piece that runs beyond one of its edges, with its buttons marked.
+
+    The upper and the lower end of the stand are mirror images of the edges there, so that they lie upon the other
+    half's where it is buttoned.
+
+    Args:
+        piece: one half.
+        name: of its straight edge.
+        opening: width of the stand, and its buttons.
+        end: length of the stand, from the upper end of the edge [m].
+        depths: of the buttons of this piece, from the upper end of the edge [m].
+
+    Raises:
+        InputError: the edge is not straight.
+    """
+    edges, names = list(piece.edges), [edge.name for edge in piece.edges]
+    at = names.index(name)
+    edge, before, after = edges[at], edges[at - 1], edges[(at + 1) % len(edges)]
+    grain = np.array([0.0, 1.0]) if piece.grain is None else piece.grain[1] - piece.grain[0]
+    down = bool((edge.points[-1] - edge.points[0]) @ grain < 0.0)
+    top, low = (edge.points[0], edge.points[-1]) if down else (edge.points[-1], edge.points[0])
+    along = (low - top) / np.linalg.norm(low - top)
+    out = np.array([along[1], -along[0]]) if down else np.array([-along[1], along[0]])
+    stray = float(np.abs((edge.points - top) @ out).max())
+    if stray > FOLD_STRAIGHT:
+        raise InputError(
+            f"{piece.name}.{name} strays {1e3 * stray:.1f} mm from straight and cannot have a button stand; constrain it, "
+            f'[[constraints]] line = "{name}", straight = "warp"'
+        )
+    whole = end > edge.length - 1e-6
+    upper, lower = (before, after) if down else (after, before)
+    reach = _mirrored(upper.points[::-1] if down else upper.points, top, out, opening.width)
+    if whole:
+        foot = _mirrored(lower.points if down else lower.points[::-1], low, out, opening.width)
+    else:
+        corner = top + end * along
+        foot = np.array([corner, corner + opening.width * out])
+    stand = Edge(name=f"{name} {STAND}", points=_turned([reach[-1], foot[-1]], down))
+    own = {
+        upper.name: replace(
+            upper,
+            vertices=None,
+            points=np.vstack([upper.points, reach[1:]] if down else [reach[::-1], upper.points[1:]]),
+        )
+    }
+    new = [stand]
+    if whole:
+        own[lower.name] = replace(
+            lower, vertices=None, points=np.vstack([foot[::-1], lower.points[1:]] if down else [lower.points, foot[1:]])
+        )
+    else:
+        rest = edge.points[np.argsort((edge.points - top) @ along)]
+        rest = np.vstack([foot[0], rest[(rest - top) @ along > end + 1e-6]])
+        step = Edge(name=f"{name} {STAND_END}", points=_turned(foot[::-1], down))
+        new = [stand, step, replace(edge, points=_turned(rest, down), vertices=None)]
+    edges[at : at + 1] = new if down else new[::-1]
+    edges = [own.get(each.name, each) for each in edges]
+    lines = _inside(piece, name, top, top + min(end, edge.length) * along)
+    return _marked(replace(piece, edges=edges, internal_lines=lines), opening, top, along, out, depths)
+
+
+def _turned(points: FloatArray | list[FloatArray], down: bool) -> FloatArray:
+    """Return points that run downwards in the direction of the outline."""
+    points = np.asarray(points)
+    return points if down else points[::-1]
+
+
+def _mirrored(points: FloatArray, corner: FloatArray, out: FloatArray, width: float) -> FloatArray:
+    """Return the mirror image of a line that begins in a corner, up to a distance beyond it (#P by 2 [m])."""
+    away = np.maximum.accumulate(np.maximum(0.0, (corner - points) @ out))
+    if away[-1] < width:
+        raise InputError(f"an edge beside the button stand is narrower than its {1e3 * width:.0f} mm")
+    image = points + 2.0 * np.outer((corner - points) @ out, out)
+    length = float(np.interp(width, away, arc_lengths(points)))
+    end = points_at_lengths(image, np.array([length]))
+    kept = image[arc_lengths(points) < length - 1e-6]
+    # The stand is as wide everywhere.
+    end += (width - (end - corner) @ out)[:, None] * out
+    return np.vstack([corner, kept[1:], end])
+
+
+def _inside(piece: Piece, name: str, top: FloatArray, low: FloatArray) -> dict[str, FloatArray]:
+    """Return the lines inside with that of the former edge."""
+    lines = dict(piece.internal_lines)
+    return {find_unused_name(name, lines): np.array([top, low]), **lines}
+
+
+def _marked(
+    piece: Piece, opening: Opening, top: FloatArray, along: FloatArray, out: FloatArray, depths: FloatArray
+) -> Piece:
+    """Return a piece with a mark for each button, and a line for each buttonhole across the stand."""
+    assert opening.buttons is not None
+    lines, marks = dict(piece.internal_lines), dict(piece.marks)
+    for depth in depths:
+        centre = top + depth * along
+        marks[find_unused_name("button", marks)] = centre
+        ends = centre + np.outer([_SHANK, _SHANK - opening.buttons.diameter - _THICKNESS], out)
+        lines[find_unused_name("buttonhole", lines)] = ends
+        for end in ends:
+            lines[find_unused_name("buttonhole end", lines)] = end + np.outer([-_BAR, _BAR], along)
+    return replace(piece, internal_lines=lines, marks=marks)
+
+
+def bust_depth(piece: Piece, name: str, top_first: bool) -> float | None:
+    """Return how far from the upper end of an edge its piece's bust line meets it [m]; None where it does not."""
+    import shapely
+
+    points = piece.edge(name).points
+    edge = shapely.LineString(points if top_first else points[::-1])
+    for line in (line for key, line in piece.internal_lines.items() if key.startswith("bust")):
+        for end in line[[0, -1]]:
+            if edge.distance(shapely.Point(end)) < 1e-3:
+                return float(edge.project(shapely.Point(end)))
+    return None

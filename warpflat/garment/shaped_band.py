@@ -1,0 +1,150 @@
+"""Shaped waistbands: the upper strip of a skirt or trousers as pieces of their own, curved as the body is."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.text import find_unused_name
+from warpflat.garment.facings import INNER, facing_edges
+from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
+
+__all__ = ["with_shaped_waistband", "without_strip"]
+
+
+def without_strip(piece: Piece, strip: Sequence[Edge], inner: str) -> Piece:
+    """Return a piece without the strip along one of its borders.
+
+    Args:
+        piece: whole.
+        strip: the outline of the strip, as :func:`warpflat.garment.facings.facing_edges` gives it.
+        inner: name of the edge that takes the strip's place.
+
+    Raises:
+        InputError: hardly anything of a neighbouring edge is left.
+    """
+    names = [edge.name for edge in strip]
+    at = names.index(INNER)
+    covered, after, before = names[: at - 1], strip[at - 1], strip[at + 1]
+    edges = []
+    for edge in piece.edges:
+        if edge.name == covered[0]:
+            edges.append(Edge(name=inner, points=strip[at].points[::-1]))
+        elif edge.name in (after.name, before.name):
+            part = after if edge.name == after.name else before
+            if edge.length - part.length < 0.005:
+                raise InputError(
+                    f"{piece.name}: strips meet at {edge.name!r}; make them narrower, or bind one of the edges"
+                )
+            edges.append(replace(edge, points=_rest(edge, part, at_start=edge.name == after.name), vertices=None))
+        elif edge.name not in covered:
+            edges.append(edge)
+    try:
+        return replace(piece, edges=edges)
+    except InputError:
+        raise InputError(f"{piece.name}: nothing can be drawn beside {covered[0]!r}; take a narrower strip") from None
+
+
+def _rest(edge: Edge, part: Edge, *, at_start: bool) -> FloatArray:
+    """Return the points of an edge without the part that a strip has of it."""
+    points, other = (edge.points, part.points) if at_start else (edge.points[::-1], part.points[::-1])
+    at = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    rest = np.vstack([other[-1:], points[at > part.length + 1e-9]])
+    return rest if at_start else rest[::-1]
+
+
+def with_shaped_waistband(
+    pattern: Garment, places: Sequence[tuple[str, str]], width: float, *, gaps: Collection[str] = ()
+) -> Garment:
+    """Return a pattern whose upper strip is a waistband of its own, each piece cut for its outside and its inside.
+
+    Args:
+        pattern: with all its openings.
+        places: pieces and edges.
+        width: of the band [m].
+        gaps: names of seams that an opening leaves open at their upper end.
+
+    Raises:
+        InputError: a dart ends in an edge, or the band is too wide.
+    """
+    pieces = {size: list(row) for size, row in pattern.pieces.items()}
+    seams, called = [], {seam.name for seam in pattern.seams}
+    names = {name: f"{name}_waistband" for name, _ in places}
+    cut = dict[tuple[str, str], tuple[str, bool]]()
+    for name, edge in places:
+        for row in pieces.values():
+            at = next(k for k, piece in enumerate(row) if piece.name == name)
+            strip = facing_edges(row[at], (edge,), width)
+            rest = _inside(without_strip(row[at], strip, f"{edge} seam"))
+            row.append(_band(row[at], strip, names[name]))
+            row[at] = rest
+        whole = pattern.piece(name, pattern.sample)
+        order = [each.name for each in whole.edges]
+        place = order.index(edge)
+        cut[name, order[place - 1]] = names[name], False
+        cut[name, order[(place + 1) % len(order)]] = names[name], True
+        words = find_unused_name(names[name].replace("_", " "), called)
+        called.add(words)
+        first, second = (
+            SeamSide(piece=name, edge=f"{edge} seam"),
+            SeamSide(piece=names[name], edge=INNER, reversed=True),
+        )
+        seams.append(Seam(name=words, sides=((first,), (second,))))
+    for seam in pattern.seams:
+        both = [row[0] for row in seam.sides]
+        if seam.name in gaps or any(len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides):
+            continue
+        sides = [replace(side, piece=cut[side.piece, side.edge][0]) for side in both]
+        words = find_unused_name(f"{seam.name} of the waistband", called)
+        called.add(words)
+        seams.append(Seam(name=words, sides=((sides[0],), (sides[1],))))
+    kept = [_with_moved_notches(pattern, seam, cut, width) for seam in pattern.seams]
+    return replace(pattern, pieces=pieces, seams=[*kept, *seams])
+
+
+def _band(piece: Piece, strip: Sequence[Edge], title: str) -> Piece:
+    """Return a part of the band, cut twice as often as its piece: the outside and its facing."""
+    edges = [replace(edge, kind="seam", allowance=None) if edge.name == INNER else edge for edge in strip]
+    middle = np.concatenate([edge.points for edge in edges]).mean(axis=0)
+    grain = np.array([[0.0, 0.0], [0.0, 1.0]]) if piece.grain is None else piece.grain
+    along = (grain[1] - grain[0]) / np.linalg.norm(grain[1] - grain[0])
+    try:
+        return Piece(
+            name=title, size=piece.size, fabric=piece.fabric, quantity=2 * piece.quantity, edges=edges, role="waistband",
+            paired=piece.paired and piece.quantity % 2 == 0, grain=middle + np.outer([-0.015, 0.015], along),
+        )  # fmt: skip
+    except InputError:
+        raise InputError(f"no waistband can be drawn along {piece.name}.{strip[0].name}: make it narrower") from None
+
+
+def _inside(piece: Piece) -> Piece:
+    """Return a piece with the parts of its lines that lie inside it."""
+    import shapely
+
+    body, lines = shapely.Polygon(piece.outline).buffer(1e-6), {}
+    for name, line in piece.internal_lines.items():
+        parts = shapely.get_parts(shapely.LineString(line).intersection(body))
+        parts = [part for part in parts if part.geom_type == "LineString" and part.length > 1e-3]
+        if parts:
+            lines[name] = np.asarray(max(parts, key=lambda part: part.length).coords)
+    return replace(piece, internal_lines=lines)
+
+
+def _with_moved_notches(
+    pattern: Garment, seam: Seam, cut: dict[tuple[str, str], tuple[str, bool]], width: float
+) -> Seam:
+    """Return a seam whose given notches keep their places on the cloth where its upper end is cut off."""
+    side = seam.sides[0][0]
+    if seam.notches is None or (side.piece, side.edge) not in cut or len(seam.sides[0]) > 1:
+        return seam
+    # The strip lies at the start of the edge after the waist, and at the end of the one before it.
+    at_start, by_size = cut[side.piece, side.edge][1] != side.reversed, {}
+    for size in pattern.pieces:
+        length = pattern.piece(side.piece, size).edge(side.edge).length
+        places = [share * length - (width if at_start else 0.0) for share in seam.of_size(size).notches or ()]
+        by_size[size] = tuple(p / (length - width) for p in places if 0.0 < p < length - width)
+    return replace(seam, notches=by_size[pattern.sample], size_notches=by_size)

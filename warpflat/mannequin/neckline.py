@@ -1,0 +1,145 @@
+"""Necklines wider and deeper than the neck base: the neck's row slides on the form's own surface, and its neighbours follow."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.polyline import arc_lengths, nearest_on_polyline, points_at_lengths
+from warpflat.mannequin.closest import Closest
+from warpflat.mannequin.layout import Layout
+from warpflat.mannequin.sheet import sheet_laplacian
+
+__all__ = ["Neckline", "widen_neck"]
+
+# Steps by which a point of the front view finds its depth.
+_ROUNDS = 25
+
+
+@dataclass(frozen=True, kw_only=True)
+class Neckline:
+    """How far a neckline lies from the base of the neck, along the form.
+
+    Attributes:
+        side_cm: along the shoulder seams [cm].
+        front_cm, back_cm: along the centre lines [cm].
+    """
+
+    side_cm: float = 0.0
+    front_cm: float = 0.0
+    back_cm: float = 0.0
+
+    @staticmethod
+    def ranges() -> dict[str, tuple[float, float]]:
+        """Return the least and the greatest valid value of every number."""
+        return {"side_cm": (0.0, 8.0), "front_cm": (0.0, 15.0), "back_cm": (0.0, 15.0)}
+
+
+def widen_neck(layout: Layout, vertices: FloatArray, neckline: Neckline) -> FloatArray:
+    """Return a form's vertices (#V by 3 [m]) with the neck's row moved to a wider neckline on the same surface.
+
+    Seen from the front, each quarter of the neckline is that of an ellipse from the centre line, which it meets at right angles,
+    to the shoulder seam. What lies between it, the armholes and the bust follows smoothly.
+
+    Raises:
+        InputError: the neckline takes a whole shoulder seam.
+    """
+    ids, laplacian, local = sheet_laplacian(layout, layout.level_row["bust"])
+    quads = layout.faces[np.isin(layout.faces, ids).all(axis=1)]
+    surface = _Surface(vertices, quads)
+    out = vertices.copy()
+    neck, seams, centres = layout.neck[0], [], []
+    for side in ("left", "right"):
+        seam = layout.yokes[f"front-{side}"][-1]
+        seams.append(seam if seam[0] in neck else seam[::-1])
+        out[seams[-1]] = _along_seam(vertices[seams[-1]], 0.01 * neckline.side_cm)
+    for row, column, depth in (
+        (layout.front, 0, neckline.front_cm),
+        (layout.back, layout.rings.shape[1] // 2, neckline.back_cm),
+    ):
+        middle = row.shape[1] // 2
+        centres.append(np.concatenate([row[:0:-1, middle], layout.rings[::-1, column]]))
+        out[row[-1, middle]] = points_at_lengths(vertices[centres[-1]], [0.01 * depth])[0]
+        for seam in seams:
+            quarter = _quarter(neck, row[-1, middle], seam[0])
+            share = arc_lengths(vertices[quarter]) / arc_lengths(vertices[quarter])[-1]
+            centre, shoulder = out[quarter[0]], out[quarter[-1]]
+            turn = 0.5 * np.pi * share[:, None]
+            ellipse = centre + (shoulder - centre) * np.hstack([np.sin(turn), 1.0 - np.cos(turn)])[:, [0, 1, 1]]
+            out[quarter[1:-1]] = surface.seen_at(ellipse[1:-1])
+    fixed = np.unique(
+        np.concatenate(
+            [neck, *seams, layout.rings[layout.level_row["bust"]], *(arm[0] for arm in layout.arms.values())]
+        )
+    )
+    moved = np.setdiff1d(ids, fixed)
+    shift = _filled(out - vertices, ids, laplacian, local, fixed)
+    out[moved] = surface.nearest(vertices[moved] + shift[moved])
+    for line in centres:
+        # What lies on the centre stays on it.
+        for vertex in np.intersect1d(line, moved):
+            out[vertex] = nearest_on_polyline(vertices[vertex] + shift[vertex], vertices[line])
+    return out
+
+
+class _Surface:
+    """A quad mesh that points are brought back to; four triangles around the middle of each quad keep mirror images alike."""
+
+    def __init__(self, vertices: FloatArray, quads: IntArray) -> None:
+        middles = len(vertices) + np.arange(len(quads))
+        self.vertices = np.vstack([vertices, vertices[quads].mean(axis=1)])
+        self.triangles = np.concatenate(
+            [np.column_stack([quads[:, [k, (k + 1) % 4]], middles]) for k in range(4)]
+        ).astype(np.int64)
+        self.closest = Closest(self.vertices, self.triangles)
+
+    def nearest(self, points: FloatArray) -> FloatArray:
+        """Return the nearest points of the surface (#P by 3 [m])."""
+        triangle, weights, _ = self.closest(points)
+        return np.asarray((self.vertices[self.triangles[triangle]] * weights[:, :, None]).sum(axis=1))
+
+    def seen_at(self, points: FloatArray) -> FloatArray:
+        """Return the points of the surface that are seen from the front where these are, the nearest in depth."""
+        found = points
+        for _ in range(_ROUNDS):
+            found = self.nearest(np.column_stack([points[:, :2], found[:, 2]]))
+        return found
+
+
+def _quarter(neck: IntArray, start: int, end: int) -> IntArray:
+    """Return the shorter way along the closed row of the neck from one of its vertices to another."""
+    first, last = (int(np.flatnonzero(neck == vertex)[0]) for vertex in (start, end))
+    ways = (np.arange((last - first) % len(neck) + 1), -np.arange((first - last) % len(neck) + 1))
+    return np.asarray(neck[(first + min(ways, key=len)) % len(neck)])
+
+
+def _along_seam(points: FloatArray, start: float) -> FloatArray:
+    """Return points of a shoulder seam that begins later [m]; its outer end stays.
+
+    Raises:
+        InputError: nothing of it is left.
+    """
+    at = arc_lengths(points)
+    if start > at[-1] - 0.02:
+        raise InputError(f"form: neckline: side_cm is {100 * start:g}, but the shoulder is {100 * at[-1]:.1f} cm long")
+    return points_at_lengths(points, start + (at[-1] - start) * at / at[-1])
+
+
+def _filled(
+    shift: FloatArray, ids: IntArray, laplacian: object, local: NDArray[np.int64], known: IntArray
+) -> FloatArray:
+    """Return the shift of a whole sheet, harmonic between the vertices whose shift is known."""
+    from scipy.sparse.linalg import spsolve
+
+    fixed = np.zeros(len(ids), dtype=bool)
+    fixed[local[known]] = True
+    operator = laplacian.tocsr()  # type: ignore[attr-defined]
+    free = np.flatnonzero(~fixed)
+    right = -(operator[free][:, fixed] @ shift[ids[fixed]])
+    out = shift.copy()
+    out[ids[free]] = spsolve(operator[free][:, free].tocsc(), right)
+    return out
