@@ -11,8 +11,12 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.colours import linear_rgb
 from warpflat.export.geometry import area_vectors, vertex_normals
 
-__all__ = ["coloured_mesh"]
+__all__ = ["before_tone_mapping", "coloured_mesh"]
 
+# The tone mapping of three.js (ACES, the fit of Stephen Hill), through which viser shows whatever it shows.
+_ACES_IN = np.array([[0.59719, 0.35458, 0.04823], [0.07600, 0.90834, 0.01566], [0.02840, 0.13383, 0.83777]])
+_ACES_OUT = np.array([[1.60475, -0.53108, -0.07367], [-0.10208, 1.10813, -0.00605], [-0.00327, -0.07276, 1.07602]])
+_EXPOSURE = 0.6
 _FLOAT, _UNSIGNED, _VERTICES, _INDICES = 5126, 5125, 34962, 34963
 
 
@@ -25,8 +29,7 @@ def coloured_mesh(positions: FloatArray, triangles: IntArray, colours: FloatArra
         colours: #V by 3, sRGB, 0 to 1.
         lit: whether light falls on it; otherwise it has exactly these colours.
     """
-    # glTF has linear colours.
-    arrays = {"POSITION": positions.astype("<f4"), "COLOR_0": linear_rgb(colours).astype("<f4")}
+    arrays = {"POSITION": positions.astype("<f4"), "COLOR_0": before_tone_mapping(colours).astype("<f4")}
     if lit:
         normals = vertex_normals(area_vectors(positions, triangles), triangles, len(positions))
         arrays["NORMAL"] = normals.astype("<f4")
@@ -65,3 +68,13 @@ def coloured_mesh(positions: FloatArray, triangles: IntArray, colours: FloatArra
     return b"".join(
         [head, struct.pack("<I4s", len(text), b"JSON"), text, struct.pack("<I4s", len(body), b"BIN\0"), body]
     )
+
+
+def before_tone_mapping(colours: FloatArray) -> FloatArray:
+    """Return the linear colours that are shown as these sRGB colours (#V by 3), so that a map has the colours of its scale."""
+    shown = np.linalg.solve(_ACES_OUT, linear_rgb(colours).T).clip(0.0, 0.99)
+    # The curve is y = (v² + a v - b) / (c v² + d v + e), and v the greater root.
+    square, first = 1.0 - 0.983729 * shown, 0.0245786 - 0.4329510 * shown
+    last = -(0.000090537 + 0.238081 * shown)
+    before = (-first + np.sqrt(first**2 - 4.0 * square * last)) / (2.0 * square)
+    return np.asarray(_EXPOSURE * np.linalg.solve(_ACES_IN, before).T)

@@ -11,6 +11,7 @@ import traceback
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 import viser
@@ -30,7 +31,6 @@ from warpflat.studio.session import Session
 from warpflat.studio.solve import Solution
 from warpflat.studio.stage import Shown, Stage
 from warpflat.studio.worker import Worker
-from warpflat.surface.triangles import triangulate
 
 __all__ = ["Page"]
 
@@ -59,7 +59,8 @@ class Page:
         self._drawn: tuple[object, ...] = ()
         self._body: Mannequin | None = None
         self._seen = False  # whether a camera has been set upon the first picture
-        self._dirty, self._closed = threading.Event(), False
+        self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
+        self._dirty, self._closed, self._told = threading.Event(), False, True
         self._stage = Stage(self.server)
         actions = Actions(
             choose_map=self._choose_map,
@@ -86,6 +87,7 @@ class Page:
     def _changed(self) -> None:
         if not self.session.activity:
             self._frames = {}
+        self._told = True
         self._dirty.set()
 
     def _take(self, name: str, frame: PieceFrame) -> None:
@@ -117,21 +119,25 @@ class Page:
             self._kind = "energy"
             self._panel.set_map("energy")
         kind = self._kind if self._kind != "drape" or drape is not None else "energy"
-        pieces = self._pieces(solution, live, kind, drape)
         state = (solution, kind, drape, *live.values())
         if state != self._drawn:
-            if not live or self._scale is None or self._scale.kind != kind:
-                self._scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(
-                    kind, [piece.frame for piece in pieces.values()]
-                )  # fmt: skip
-                self._panel.show_scale(self._scale)
-            if not live:
-                self._stage.lay_out(pieces)
-            self._stage.draw(pieces, self._scale, tentative=self.session.preview is not None)
+            self._drawn = state
+            self._draw_pieces(self._pieces(solution, live, kind, drape), kind, drape, at_rest=not live)
             if not live and solution is not None:
                 self._after_rest(solution)
-            self._drawn = state
-        self._update_panel()
+        if self._told:
+            self._told = False
+            self._update_panel()
+
+    def _draw_pieces(self, pieces: Mapping[str, Shown], kind: str, drape: Drape | None, *, at_rest: bool) -> None:
+        """Draw pieces; while they are being relaxed the scale and their places on the table stay."""
+        if at_rest or self._scale is None or self._scale.kind != kind:
+            frames = [piece.frame for piece in pieces.values()]
+            self._scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
+            self._panel.show_scale(self._scale)
+        if at_rest:
+            self._stage.lay_out(pieces)
+        self._stage.draw(pieces, self._scale, tentative=self.session.preview is not None)
 
     def _pieces(
         self, solution: Solution | None, live: Mapping[str, PieceFrame], kind: str, drape: Drape | None
@@ -162,9 +168,7 @@ class Page:
         self._stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
         body = None if solution.plan is None else solution.plan.mannequin
         if body is not self._body:
-            surface = None if body is None else body.surface()
-            triangles = None if surface is None else triangulate(surface.faces)[0]
-            self._stage.draw_body(None if surface is None else surface.vertices, triangles)
+            self._stage.draw_body(None if body is None else body.surface())
             self._body = body
         if not self._seen:
             self._seen = True
@@ -173,15 +177,24 @@ class Page:
 
     def _update_panel(self) -> None:
         solution = self.session.solution
-        lines = [] if solution is None else [(p, line) for p in solution.pieces for line in cuttable_lines(solution, p)]
+        known = self._cuttable(solution)
+        lines = [(piece, line) for piece, own in known.items() for line in own]
         if self._picked not in lines:
             self._picked = None
         self._panel.update(lines=lines, picked=self._picked)
         marked = None
         if self._picked is not None and solution is not None:
             piece, line = self._picked
-            marked = solution.pieces[piece].surface, cuttable_lines(solution, piece)[line]
+            marked = solution.pieces[piece].surface, known[piece][line]
         self._stage.mark(marked, self._points)
+
+    def _cuttable(self, solution: Solution | None) -> dict[str, dict[str, IntArray]]:
+        """Return by piece the lines that can be cut."""
+        if solution is None:
+            return {}
+        if self._lines[0] is not solution:
+            self._lines = solution, {name: cuttable_lines(solution, name) for name in solution.pieces}
+        return self._lines[1]
 
     def _greet(self, client: viser.ClientHandle) -> None:
         """Set the camera of a page that has been opened, and follow it."""
@@ -196,7 +209,7 @@ class Page:
             self._add_point(hit, solution)
         elif hit.piece in solution.pieces:
             surface = solution.pieces[hit.piece].surface
-            line = nearest_line(hit.point, surface.vertices, cuttable_lines(solution, hit.piece))
+            line = nearest_line(hit.point, surface.vertices, self._cuttable(solution)[hit.piece])
             if line is None:
                 self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
             else:
@@ -238,6 +251,7 @@ class Page:
         self._kind = kind
         if kind == "drape":
             self.session.ask_drape()
+        self._told = True
         self._dirty.set()
 
 
@@ -262,9 +276,24 @@ def _serve(host: str, port: int) -> viser.ViserServer:
     # It greets on standard output, which is for results.
     with contextlib.redirect_stdout(io.StringIO()):
         server = viser.ViserServer(host=host, port=port, label="warpflat studio", verbose=False)
+    _refuse_other_sites(server)
     # A page that anybody may open through a foreign machine is nothing that a click should make.
     server.request_share_url = lambda *_, **__: None
     server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
     server.gui.main_panel.dock_right()
     server.gui.main_panel.set_width(340)
     return server
+
+
+def _refuse_other_sites(server: viser.ViserServer) -> None:
+    """Close connections that a page of another site has opened: a browser lets any page talk to this machine."""
+    websocket = server._websock_server
+
+    async def check(connection: Any) -> None:
+        live = websocket._live_connections[connection.client_id]
+        headers = live.request.headers
+        origin = headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != headers.get("Host"):
+            await live.close(1008, "the studio talks to its own page only")
+
+    websocket.on_client_connect(check)

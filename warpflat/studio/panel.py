@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
+import numpy as np
+
 from warpflat.core.errors import InputError
 from warpflat.fabric.library import load_library
 from warpflat.mannequin.ease import EASE_PRESETS
@@ -72,7 +74,7 @@ class Panel:
         self._head.content = _head(session)
         self._made.visible = session.preview is not None
         self._result.content = _preview(session)
-        self._fabric.value = _fabric(session.scene, self._fabric.options)
+        self._fabric.value = _one_of(session.fabric_name(), self._fabric.options)
         self._grain.value = float(session.scene.settings.grain_angle)
         if session.scene.settings.mannequin is not None:
             self._update_body(session.scene)
@@ -167,9 +169,7 @@ class Panel:
         _chosen(self._mode, lambda value: self._actions.choose_mode(value == "two points"))
         _chosen(self._line, lambda value: self._actions.choose_line(self._lines.get(value)))
         _chosen(self._part, lambda value: self._actions.try_again((0.01 * value[0], 0.01 * value[1])))
-        _buttons(
-            self._made, {"Apply": self._session.apply, "Leave it": lambda: self._actions.choose_line(None)}
-        )
+        _buttons(self._made, {"Apply": self._session.apply, "Leave it": lambda: self._actions.choose_line(None)})
 
     def _map(self) -> None:
         with self._gui.add_folder("Map"):
@@ -231,10 +231,6 @@ def _one_of(value: Any, options: Sequence[str]) -> str:
     return value if isinstance(value, str) and value in options else _OWN
 
 
-def _fabric(scene: Scene, options: Sequence[str]) -> str:
-    return _one_of(scene.settings.fabric, options)
-
-
 def _head(session: Session) -> str:
     """Return what is known of the pattern, and the last mistake."""
     solution, scene = session.shown, session.scene
@@ -274,7 +270,7 @@ def _preview(session: Session) -> str:
         return ""
     verb = "releases" if preview.released >= 0.0 else "costs"
     words = f"<b>{escape(str(preview.cut['name']))}</b> {verb} <b>{joules(abs(preview.released))}</b>"
-    words += f" ({-100.0 * preview.share:+.1f} %)"
+    words += f" ({-100.0 * preview.share:+.1f} %)".replace("-", "−")
     if preview.opening is not None:
         words += f", opens <b>{1e3 * preview.opening:.1f} mm</b>"
     return f"<div id='studio-preview' style='padding:0.3em 0.9em'>{words}</div>"
@@ -285,8 +281,6 @@ def _legend(scale: Scale) -> str:
     if scale.is_blank:
         return "<div style='padding:0.3em 0.9em'>nothing to be seen: the cloth lies without strain</div>"
     steps = [scale.low + (scale.high - scale.low) * k / 16.0 for k in range(17)]
-    import numpy as np
-
     stops = ",".join(f"rgb({r:.0f},{g:.0f},{b:.0f})" for r, g, b in 255.0 * scale.colours(np.array(steps)))
     ends = [scale.low, 0.5 * (scale.low + scale.high), scale.high]
     ticks = "".join(f"<span>{value:.3g}</span>" for value in ends)

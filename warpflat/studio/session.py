@@ -110,6 +110,7 @@ class Session:
         self._steps, self._at = [Step(what="scene", scene=scene)], 0
         self.error = self.note = self.activity = ""
         self.preview: Preview | None = None
+        self._fabric: tuple[Scene, str] | None = None
         self.saved: Saved | None = None
 
     @property
@@ -335,8 +336,11 @@ class Session:
             return False
 
     def fabric_name(self) -> str:
-        """Return the name of the scene's fabric."""
-        return scene_fabric(self.scene).name
+        """Return the name of the scene's fabric in the library, where the scene may have an alias."""
+        scene = self.scene
+        if self._fabric is None or self._fabric[0] is not scene:
+            self._fabric = scene, scene_fabric(scene).name
+        return self._fabric[1]
 
     def _go(self, by: int) -> None:
         with self._lock:

@@ -141,19 +141,19 @@ class Stage:
             node, "10 cm", position=(x + 0.11, y, 0.0), anchor="center-left", font_screen_scale=0.9
         )
 
-    def draw_body(self, vertices: FloatArray | None, triangles: IntArray | None) -> None:
+    def draw_body(self, body: Surface | None) -> None:
         """Draw the body around the garment; None takes it away."""
         old = self._nodes.pop("/form/body", None)
         if old is not None:
             old.remove()
-        if vertices is None or triangles is None:
+        if body is None:
             return
         low, high = self._boxes[0] - [[_BEYOND], [-_BEYOND]]
-        middle = vertices[triangles].mean(axis=1)
-        near = ((middle > low) & (middle < high)).all(axis=1)
-        normals = vertex_normals(area_vectors(vertices, triangles), triangles, len(vertices))
+        middle = body.vertices[body.faces].mean(axis=1)
+        near, _ = triangulate(body.faces[((middle > low) & (middle < high)).all(axis=1)])
+        # A little smaller than it is, so that cloth that lies on it is seen.
         self._nodes["/form/body"] = self._scene.add_mesh_simple(
-            "/form/body", (vertices - 0.004 * normals).astype(np.float32), triangles[near], color=_SKIN, side="double",
+            "/form/body", _above(body.vertices, body.faces, -0.004).astype(np.float32), near, color=_SKIN, side="double",
             cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
 
