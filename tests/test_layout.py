@@ -37,7 +37,8 @@ ROOMS = {
     "review": "core surface export",
     "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review",
     "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
-    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene batch",
+    "studio": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",
+    "cli": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene batch studio",
     "kernels": "",
 }
 

@@ -25,6 +25,7 @@ from warpflat.cli.options import BAD_INPUT, DONE, EXIT_CODES
 from warpflat.cli.review import review
 from warpflat.cli.run import run
 from warpflat.cli.signals import INTERRUPTED, Stopped, signal_message, stop_on_signals
+from warpflat.cli.studio import studio
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import is_out_of_memory, memory_limit
 from warpflat.core.text import one_line
@@ -69,6 +70,7 @@ def cli(context: click.Context) -> None:
       warpflat cuts scenes/bodice.toml                    which cut would release how much energy
       warpflat batch scenes/batch_sizes.toml              many bodies and fabrics
       warpflat review out/dome                            one page to review a run
+      warpflat studio scenes/bodice.toml                  a page in the browser to edit a scene
       warpflat fabrics                                    what cloths there are
       warpflat fabrics denim                              where its values come from
     """
@@ -76,7 +78,7 @@ def cli(context: click.Context) -> None:
         click.echo(context.get_help())
 
 
-for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review):
+for _command in (run, flatten, batch, drape, mannequin, compare, fabrics, cuts, export, review, studio):
     cli.add_command(_command)
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import re
 import sys
 import types
 from collections.abc import Iterator, Mapping, Sequence
@@ -20,7 +22,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-__all__ = ["Table", "check_table", "read_toml", "tables_as_toml"]
+__all__ = ["Table", "check_table", "document_as_toml", "read_toml", "tables_as_toml"]
 
 Model = TypeVar("Model", bound=BaseModel)
 
@@ -226,3 +228,40 @@ def _toml(value: Any) -> str:
     if isinstance(value, Sequence):
         return f"[{', '.join(_toml(each) for each in value)}]"
     return f"{value:.6g}"
+
+
+def document_as_toml(tables: Mapping[str, Any]) -> str:
+    """Return nested tables as a TOML file, every number with all its digits."""
+    return "\n".join(_document_lines(tables, ())) + "\n"
+
+
+def _document_lines(table: Mapping[str, Any], place: tuple[str, ...]) -> Iterator[str]:
+    """Yield the lines of a table: its plain values, its tables, its arrays of tables."""
+    below: list[tuple[str, Any]] = []
+    for key, value in table.items():
+        if isinstance(value, Mapping) or (value and _is_array_of_tables(value)):
+            below.append((key, value))
+        else:
+            yield f"{_key(key)} = {_exact(value)}"
+    for key, value in below:
+        inner = (*place, key)
+        name = ".".join(map(_key, inner))
+        for head, one in [(f"[{name}]", value)] if isinstance(value, Mapping) else [(f"[[{name}]]", v) for v in value]:
+            yield ""
+            yield head
+            yield from _document_lines(one, inner)
+
+
+def _is_array_of_tables(value: Any) -> bool:
+    return isinstance(value, list) and all(isinstance(each, Mapping) for each in value)
+
+
+def _key(key: str) -> str:
+    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else json.dumps(key, ensure_ascii=False)
+
+
+def _exact(value: Any) -> str:
+    """Return a value on one line; JSON's texts are TOML's, too."""
+    if isinstance(value, Sequence) and not isinstance(value, str):
+        return f"[{', '.join(map(_exact, value))}]"
+    return json.dumps(value, ensure_ascii=False) if isinstance(value, str | bool) else repr(value)

@@ -7,7 +7,7 @@ from typing import Any
 
 from warpflat.core.arrays import FloatArray
 from warpflat.model.network import SpringNetwork
-from warpflat.model.strain import worn_strain
+from warpflat.model.strain import WornStrain, worn_strain
 from warpflat.solver.convergence import Energies
 from warpflat.solver.relaxation import Relaxation
 from warpflat.solver.remainder import Remainder
@@ -89,9 +89,13 @@ class Progress:
         """Return a copy of the layout, #V by 2 [m]."""
         return self._state.positions()[self._state.vertex_ranges[self._piece]]
 
+    def worn_strain(self) -> WornStrain:
+        """Return worn strain, stress and strain energy per face."""
+        return worn_strain(self._network, self.positions())
+
     def face_energy_density(self) -> FloatArray:
         """Return the strain energy per flat area of each face, #F [J/m2]."""
-        return worn_strain(self._network, self.positions()).energy_density
+        return self.worn_strain().energy_density
 
     @property
     def _network(self) -> SpringNetwork:

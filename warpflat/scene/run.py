@@ -244,8 +244,13 @@ def _flatten(
     )
 
 
-def scene_cuts(scene: Scene, *, device: str | None = None) -> CutSequence:
+def scene_cuts(scene: Scene, *, device: str | None = None, surface: Surface | None = None) -> CutSequence:
     """Plan the cuts of a scene and work their paths into its surface; those of `auto_cut` are looked for.
+
+    Args:
+        scene: with a surface.
+        device: Warp device, before the scene's own.
+        surface: the scene's, if it has been read before.
 
     Raises:
         InputError: the surface, a line or a cut is wrong.
@@ -253,7 +258,7 @@ def scene_cuts(scene: Scene, *, device: str | None = None) -> CutSequence:
     from warpflat.scene.cuts import plan_automatic_cuts, plan_cuts
 
     settings = scene.settings
-    surface = scene_surface(scene)
+    surface = surface or scene_surface(scene)
     with errors_named(scene.where):
         sequence = plan_cuts(surface, settings.cuts)
         if settings.auto_cut is not None:

@@ -121,12 +121,15 @@ class GarmentPlan:
             return replace(garment, openings=tuple(self.openings), finishing=finishing, pockets=pockets)
 
 
-def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
+def plan_garment(
+    scene: Scene, *, device: str | None = None, built: tuple[Mannequin, FormResult] | None = None
+) -> GarmentPlan:
     """Check what a scene asks of its garment.
 
     Args:
         scene: with a form on a mannequin.
         device: Warp device, before the scene's own.
+        built: the scene's mannequin and form, if they have been built before.
 
     Raises:
         InputError: the body, the form, the fabric, a seam, a constraint, an edge of the pattern or a setting is wrong.
@@ -134,7 +137,7 @@ def plan_garment(scene: Scene, *, device: str | None = None) -> GarmentPlan:
     settings = scene.settings
     relax, fabric = scene_relax_options(scene), scene_fabric(scene)
     report_activity("building the mannequin")
-    mannequin, form = scene_form(scene)
+    mannequin, form = built or scene_form(scene)
     with errors_named(f"{scene.where}: pattern"):
         drawing = pattern_options(settings.pattern, settings.marker, settings.cloth)
         openings = scene_openings(settings.openings)

@@ -1,0 +1,73 @@
+"""`warpflat studio`: a scene is edited on a page in the browser."""
+
+from __future__ import annotations
+
+import time
+from importlib.util import find_spec
+from pathlib import Path
+
+import click
+
+from warpflat.cli.options import DONE, EXIT_CODES, ComputingCommand
+
+__all__ = ["studio"]
+
+# What is edited where no scene is given.
+_BLOCK = {
+    "fabric": "woven",
+    "form": "basic_block",
+    "shape": "darts",
+    "ease": "close",
+    "mannequin": {"size": "EU 38"},
+}
+
+
+@click.command(cls=ComputingCommand, epilog=EXIT_CODES)
+@click.argument("scene", type=click.Path(path_type=Path), required=False)
+@click.option(
+    "--host", default="127.0.0.1", show_default=True, help="Address to serve on; 0.0.0.0 is open to everybody."
+)
+@click.option("--port", type=click.IntRange(1, 65535), default=8220, show_default=True, help="Port to serve on.")
+@click.option(
+    "--out",
+    type=click.Path(path_type=Path),
+    default=Path("out"),
+    metavar="DIR",
+    help="Where runs are saved.  [default: out]",
+)
+@click.option("--open/--no-open", "show", default=True, help="Open the page in the browser.  [default: open]")
+def studio(scene: Path | None, host: str, port: int, out: Path, show: bool) -> int:
+    """Edit a scene on a page in the browser: body, form, cloth, ease, grain and cuts, with the pattern beside it.
+
+    Saving writes a scene file beside the one that was opened, under a name of its own, and runs it from scratch. Without a
+    SCENE it begins with the basic block of size EU 38. Ctrl-C ends the studio.
+
+    It needs viser: pip install "warpflat[studio]".
+
+    \b
+    Examples:
+      warpflat studio scenes/bodice.toml
+      warpflat studio
+    """
+    from warpflat.cli.run import start_warp_silently
+    from warpflat.core.errors import InputError
+    from warpflat.scene.load import load_scene, make_scene
+
+    if find_spec("viser") is None:
+        raise InputError('the studio needs viser: pip install "warpflat[studio]"')
+    made = load_scene(scene) if scene else make_scene(_BLOCK, name="block", folder=Path(), where="studio")
+    start_warp_silently()
+    from warpflat.studio.page import Page
+
+    page = Page(made, host=host, port=port, out=out)
+    click.echo(f"{page.url}  (Ctrl-C ends the studio)")
+    if show:
+        import webbrowser
+
+        webbrowser.open(page.url)
+    try:
+        while True:
+            time.sleep(3600.0)
+    finally:
+        page.close()
+    return DONE

@@ -1,0 +1,1 @@
+"""The studio: a scene is edited on a page in the browser, and every edit is solved at once."""

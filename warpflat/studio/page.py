@@ -1,0 +1,299 @@
+"""The page: a viser server that shows a session and passes on what is done there."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import socket
+import threading
+import time
+import traceback
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import numpy as np
+import viser
+
+from warpflat.core.arrays import IntArray
+from warpflat.core.errors import InputError
+from warpflat.draping.result import Drape
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.scene.load import Scene
+from warpflat.studio.cut_tables import cut_along, cut_between, cuttable_lines
+from warpflat.studio.frame import PieceFrame
+from warpflat.studio.maps import Scale, drape_gaps, drape_scale, piece_scale
+from warpflat.studio.panel import Actions, Panel
+from warpflat.studio.pick import Hit, nearest_line
+from warpflat.studio.save import free_name
+from warpflat.studio.session import Session
+from warpflat.studio.solve import Solution
+from warpflat.studio.stage import Shown, Stage
+from warpflat.studio.worker import Worker
+
+__all__ = ["Page"]
+
+# Seconds between two pictures: at most ten a second, and the newest wins.
+_BETWEEN = 0.1
+
+
+class Page:
+    """A studio in the browser."""
+
+    def __init__(self, scene: Scene, *, host: str, port: int, out: Path) -> None:
+        """Serve a scene's studio.
+
+        Raises:
+            InputError: the port is taken.
+        """
+        self._worker = Worker()
+        self.session = Session(scene, self._worker, out=out, on_change=self._changed, on_frame=self._take)
+        self.server = _serve(host, port)
+        self.url = f"http://{host}:{self.server.get_port()}"
+        self._kind = "energy"
+        self._scale: Scale | None = None
+        self._two_points, self._points = False, list[Hit]()
+        self._picked: tuple[str, str] | None = None
+        self._frames: dict[str, PieceFrame] = {}
+        self._drawn: tuple[object, ...] = ()
+        self._body: Mannequin | None = None
+        self._seen = False  # whether a camera has been set upon the first picture
+        self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
+        self._dirty, self._closed, self._told = threading.Event(), False, True
+        self._stage = Stage(self.server)
+        actions = Actions(
+            choose_map=self._choose_map,
+            choose_line=self._choose_line,
+            choose_mode=self._choose_mode,
+            try_again=self._try_part,
+            view=self._stage.show_all,
+        )
+        self._panel = Panel(self.server, self.session, actions, name=free_name(scene))
+        self.server.on_client_connect(self._greet)
+        self.server.scene.on_click()(self._click)
+        self._painter = threading.Thread(target=self._paint, name="painter", daemon=True)
+        self._painter.start()
+        self.session.begin()
+
+    def close(self) -> None:
+        """End the studio."""
+        self._closed = True
+        self._dirty.set()
+        self._worker.close()
+        with contextlib.redirect_stdout(io.StringIO()):
+            self.server.stop()
+
+    def _changed(self) -> None:
+        if not self.session.activity:
+            self._frames = {}
+        self._told = True
+        self._dirty.set()
+
+    def _take(self, name: str, frame: PieceFrame) -> None:
+        self._frames = {**self._frames, name: frame}
+        self._dirty.set()
+
+    def _paint(self) -> None:
+        """Draw what is new, at most ten times a second."""
+        while True:
+            self._dirty.wait()
+            if self._closed:
+                return
+            self._dirty.clear()
+            begun = time.monotonic()
+            try:
+                self._draw()
+            except Exception:
+                # The next picture may be a better one; the fault is told where programs tell them.
+                traceback.print_exc()
+            time.sleep(max(0.0, _BETWEEN - (time.monotonic() - begun)))
+
+    def _draw(self) -> None:
+        solution, live = self.session.shown, self._frames
+        if solution is None and not live:
+            self._update_panel()
+            return
+        drape = self.session.step.drape if self.session.preview is None and not live else None
+        if self._kind == "drape" and drape is None and not self.session.activity:
+            self._kind = "energy"
+            self._panel.set_map("energy")
+        kind = self._kind if self._kind != "drape" or drape is not None else "energy"
+        state = (solution, kind, drape, *live.values())
+        if state != self._drawn:
+            self._drawn = state
+            self._draw_pieces(self._pieces(solution, live, kind, drape), kind, drape, at_rest=not live)
+            if not live and solution is not None:
+                self._after_rest(solution)
+        if self._told:
+            self._told = False
+            self._update_panel()
+
+    def _draw_pieces(self, pieces: Mapping[str, Shown], kind: str, drape: Drape | None, *, at_rest: bool) -> None:
+        """Draw pieces; while they are being relaxed the scale and their places on the table stay."""
+        if at_rest or self._scale is None or self._scale.kind != kind:
+            frames = [piece.frame for piece in pieces.values()]
+            self._scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
+            self._panel.show_scale(self._scale)
+        if at_rest:
+            self._stage.lay_out(pieces)
+        self._stage.draw(pieces, self._scale, tentative=self.session.preview is not None)
+
+    def _pieces(
+        self, solution: Solution | None, live: Mapping[str, PieceFrame], kind: str, drape: Drape | None
+    ) -> dict[str, Shown]:
+        """Return what is to be drawn of each piece: as it is being relaxed, or as it is at rest."""
+        angle = float(self.session.scene.settings.grain_angle)
+        frames = {} if solution is None else {n: PieceFrame.of_result(p) for n, p in solution.pieces.items()}
+        if live:
+            # Of another form the pieces before are gone.
+            frames = {**(frames if frames.keys() >= live.keys() else {}), **live}
+        lines = {name: _runs(frame) for name, frame in frames.items()}
+        if kind == "drape" and drape is not None:
+            cloth = drape.cloth
+            return {
+                name: Shown(
+                    frame=frame,
+                    space=drape.positions[cloth.welded[cloth.piece_vertices[name]]],
+                    values=drape_gaps(drape, name),
+                    lines=lines[name],
+                    grain_angle=angle,
+                )
+                for name, frame in frames.items()
+            }
+        return {name: Shown.of_map(frame, kind, lines[name], angle) for name, frame in frames.items()}
+
+    def _after_rest(self, solution: Solution) -> None:
+        """Write what does not change while pieces are being relaxed: names, the body, the camera of the first picture."""
+        self._stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
+        body = None if solution.plan is None else solution.plan.mannequin
+        if body is not self._body:
+            self._stage.draw_body(None if body is None else body.surface())
+            self._body = body
+        if not self._seen:
+            self._seen = True
+            for client in self.server.get_clients().values():
+                self._stage.show_all(client)
+
+    def _update_panel(self) -> None:
+        solution = self.session.solution
+        known = self._cuttable(solution)
+        lines = [(piece, line) for piece, own in known.items() for line in own]
+        if self._picked not in lines:
+            self._picked = None
+        self._panel.update(lines=lines, picked=self._picked)
+        marked = None
+        if self._picked is not None and solution is not None:
+            piece, line = self._picked
+            marked = solution.pieces[piece].surface, known[piece][line]
+        self._stage.mark(marked, self._points)
+
+    def _cuttable(self, solution: Solution | None) -> dict[str, dict[str, IntArray]]:
+        """Return by piece the lines that can be cut."""
+        if solution is None:
+            return {}
+        if self._lines[0] is not solution:
+            self._lines = solution, {name: cuttable_lines(solution, name) for name in solution.pieces}
+        return self._lines[1]
+
+    def _greet(self, client: viser.ClientHandle) -> None:
+        """Set the camera of a page that has been opened, and follow it."""
+        client.camera.on_update(lambda camera: self._stage.face(camera.wxyz))
+        self._stage.show_all(client)
+
+    def _click(self, event: viser.SceneClickEvent) -> None:
+        hit, solution = self._stage.pick(event.ray_origin, event.ray_direction), self.session.solution
+        if hit is None or solution is None:
+            return
+        if self._two_points:
+            self._add_point(hit, solution)
+        elif hit.piece in solution.pieces:
+            surface = solution.pieces[hit.piece].surface
+            line = nearest_line(hit.point, surface.vertices, self._cuttable(solution)[hit.piece])
+            if line is None:
+                self.session.tell('no line runs within 2 cm of the click; click nearer, or pick "two points"')
+            else:
+                self._choose_line((hit.piece, line))
+
+    def _add_point(self, hit: Hit, solution: Solution) -> None:
+        """Take a point; the second one makes a cut."""
+        self._points = [hit] if len(self._points) != 1 else [*self._points, hit]
+        self._picked = None
+        if len(self._points) == 2:
+            self._try(lambda: cut_between(solution, *self._points))
+        else:
+            self.session.drop_preview()
+
+    def _choose_mode(self, two_points: bool) -> None:
+        self._two_points = two_points
+        self._choose_line(None)
+
+    def _choose_line(self, picked: tuple[str, str] | None) -> None:
+        self._picked, self._points = picked, []
+        solution = self.session.solution
+        if picked is None or solution is None:
+            self.session.drop_preview()
+        else:
+            self._try(lambda: cut_along(solution, *picked))
+
+    def _try_part(self, part: tuple[float, float]) -> None:
+        picked, solution = self._picked, self.session.solution
+        if picked is not None and solution is not None:
+            self._try(lambda: cut_along(solution, *picked, part))
+
+    def _try(self, table: Callable[[], dict[str, Any]]) -> None:
+        try:
+            self.session.try_cut(table())
+        except InputError as error:
+            self.session.tell(str(error))
+
+    def _choose_map(self, kind: str) -> None:
+        self._kind = kind
+        if kind == "drape":
+            self.session.ask_drape()
+        self._told = True
+        self._dirty.set()
+
+
+def _runs(frame: PieceFrame) -> dict[str, IntArray]:
+    """Return the lines of a piece that have a length."""
+    return {name: np.asarray(ids) for name, ids in frame.surface.lines.items() if len(ids) > 1}
+
+
+def _serve(host: str, port: int) -> viser.ViserServer:
+    """Start a server on this address and no other.
+
+    Raises:
+        InputError: the port is taken, or the address is not of this machine.
+    """
+    with socket.socket(socket.AF_INET6 if ":" in host else socket.AF_INET) as trial:
+        trial.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        try:
+            trial.bind((host, port))
+        except OSError as error:
+            reason = (error.strerror or str(error)).lower()
+            raise InputError(f"cannot serve on {host}:{port}: {reason}; give another --port, or --host") from None
+    # It greets on standard output, which is for results.
+    with contextlib.redirect_stdout(io.StringIO()):
+        server = viser.ViserServer(host=host, port=port, label="warpflat studio", verbose=False)
+    _refuse_other_sites(server)
+    # A page that anybody may open through a foreign machine is nothing that a click should make.
+    server.request_share_url = lambda *_, **__: None
+    server.gui.configure_theme(control_width="large", show_logo=False, show_share_button=False)
+    server.gui.main_panel.dock_right()
+    server.gui.main_panel.set_width(340)
+    return server
+
+
+def _refuse_other_sites(server: viser.ViserServer) -> None:
+    """Close connections that a page of another site has opened: a browser lets any page talk to this machine."""
+    websocket = server._websock_server
+
+    async def check(connection: Any) -> None:
+        live = websocket._live_connections[connection.client_id]
+        headers = live.request.headers
+        origin = headers.get("Origin")
+        if origin is not None and urlsplit(origin).netloc != headers.get("Host"):
+            await live.close(1008, "the studio talks to its own page only")
+
+    websocket.on_client_connect(check)

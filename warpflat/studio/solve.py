@@ -1,0 +1,161 @@
+"""A scene is solved for the studio; what an edit leaves as it was is kept from the solution before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+
+import numpy as np
+
+from warpflat.cutting.cut_piece import cut
+from warpflat.cutting.cut_plan import CutPlan
+from warpflat.flattening.applied_cut import measure_cut
+from warpflat.flattening.progress import Progress
+from warpflat.flattening.result import Flattening
+from warpflat.garment.darts import measure_darts
+from warpflat.garment.garment import Garment
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.table import mannequin_from_table
+from warpflat.scene.cuts import CutSequence
+from warpflat.scene.form_shaping import settle_shape
+from warpflat.scene.load import Scene, errors_named, expand_variables, scene_relax_options
+from warpflat.scene.run import flatten_scene, scene_cuts
+from warpflat.scene.run_garment import GarmentPlan, plan_garment, scene_form
+from warpflat.scene.surface import scene_surface
+from warpflat.surface.mesh import Surface
+
+__all__ = ["Solution", "solve"]
+
+# What the surface, the body and the form of a scene are made from.
+_OF_SURFACE = ("name", "surface", "lines", "datum", "constraints", "seams")
+_OF_BODY = ("mannequin",)
+_OF_FORM = ("form", "half", "shape", "ease", "cuts", "auto_cut", "openings")
+# What may differ while one cut more is made in a piece that lies there already.
+_CUTS_ONLY = ("cuts", "output", "pattern", "marker")
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Solution:
+    """A scene that has been flattened, cut and sewn.
+
+    Attributes:
+        scene: as it was asked for.
+        pieces: by name.
+        bare: the surface of the scene before its cuts; None of a form.
+        plan, garment: of a form; None of a surface.
+        notes: what was chosen on the way.
+    """
+
+    scene: Scene
+    pieces: Mapping[str, Flattening]
+    bare: Surface | None = None
+    plan: GarmentPlan | None = None
+    garment: Garment | None = None
+    notes: tuple[str, ...] = field(default=())
+
+    @property
+    def strain_energy(self) -> float:
+        """The strain energy of all pieces [J]."""
+        return sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
+
+    @property
+    def at_rest(self) -> bool:
+        """Whether every piece is."""
+        return all(piece.converged for piece in self.pieces.values())
+
+    @property
+    def openings(self) -> dict[str, float]:
+        """How wide each cut or dart opens, by "piece.name" [m]."""
+        if self.garment is not None:
+            form = self.garment.form
+            return {
+                f"{name}.{dart['name']}": float(dart["intake_m"])
+                for name, piece in self.pieces.items()
+                for dart in measure_darts(form, name, piece.positions)
+            }
+        found = {}
+        for name, piece in self.pieces.items():
+            for made in piece.cuts:
+                seams = measure_cut(piece.network.surface, piece.positions, made)["seams"]
+                found[f"{name}.{made.name}"] = max((float(seam["opening_m"]) for seam in seams), default=0.0)
+        return found
+
+
+def solve(
+    scene: Scene, before: Solution | None = None, *, callback: Callable[[str, Progress], bool | None] | None = None
+) -> Solution:
+    """Flatten, cut and sew a scene.
+
+    Args:
+        scene: what to solve.
+        before: the solution of a scene that may have much in common with it.
+        callback: called with a piece's name and its progress; True stops the relaxation, and the result is kept.
+
+    Raises:
+        InputError: as :func:`warpflat.run_scene`.
+    """
+    if scene.settings.mannequin is None:
+        return _solve_surface(scene, before, callback)
+    return _solve_garment(scene, before, callback)
+
+
+def _solve_surface(
+    scene: Scene, before: Solution | None, callback: Callable[[str, Progress], bool | None] | None
+) -> Solution:
+    known = before is not None and before.bare is not None and _alike(scene, before.scene, _OF_SURFACE)
+    bare = before.bare if known and before is not None and before.bare is not None else scene_surface(scene)
+    sequence = scene_cuts(scene, surface=bare)
+    each_step = None if callback is None else partial(callback, scene.name)
+    plan = None if before is None else _one_more_cut(scene, before, sequence)
+    if before is not None and plan is not None:
+        with errors_named(scene.where):
+            result = cut(before.pieces[scene.name], plan, relax=scene_relax_options(scene), callback=each_step)
+    else:
+        result, _ = flatten_scene(scene, sequence, callback=each_step)
+    return Solution(scene=scene, pieces={scene.name: result}, bare=bare, notes=(*result.messages, *sequence.notes))
+
+
+def _one_more_cut(scene: Scene, before: Solution, sequence: CutSequence) -> CutPlan | None:
+    """Return the one cut by which a scene differs from another, if it can be made in the other's piece as that lies there."""
+    piece = before.pieces.get(scene.name)
+    if piece is None or piece.unsewn is not None or sequence.auto is not None:
+        return None
+    others = [key for key in type(scene.settings).model_fields if key not in _CUTS_ONLY]
+    made, faces = len(piece.cuts), piece.surface.faces
+    if (
+        not _alike(scene, before.scene, others)
+        or scene.settings.cuts[:-1] != before.scene.settings.cuts
+        or len(sequence.plans) != made + 1
+        # A path between points has divided faces, and all cuts are made again.
+        or not np.array_equal(sequence.surface.faces, faces)
+    ):
+        return None
+    return sequence.plans[-1]
+
+
+def _solve_garment(
+    scene: Scene, before: Solution | None, callback: Callable[[str, Progress], bool | None] | None
+) -> Solution:
+    settled, notes = settle_shape(scene)
+    plan = None if before is None else before.plan
+    mannequin = plan.mannequin if plan is not None and _alike(scene, plan.scene, _OF_BODY) else _body(scene)
+    if plan is not None and mannequin is plan.mannequin and _alike(settled, plan.scene, _OF_FORM):
+        form = plan.form
+    else:
+        form = scene_form(settled, mannequin)[1]
+    plan = plan_garment(settled, built=(mannequin, form))
+    garment = plan.flatten(callback=callback)
+    return Solution(scene=scene, pieces=garment.pieces, plan=plan, garment=garment, notes=(*notes, *garment.notes))
+
+
+def _body(scene: Scene) -> Mannequin:
+    table = scene.settings.mannequin
+    assert table is not None  # the scene has a form
+    with errors_named(f"{scene.where}: mannequin"):
+        return mannequin_from_table(table, path_of=lambda file: scene.folder / expand_variables(file))
+
+
+def _alike(one: Scene, other: Scene, keys: tuple[str, ...] | list[str]) -> bool:
+    """Return whether some tables of two scenes are the same."""
+    return all(getattr(one.settings, key) == getattr(other.settings, key) for key in keys)
