@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,6 @@ from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.export.geometry import area_vectors, vertex_normals
-from warpflat.flattening.result import Flattening
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Drape"]
@@ -39,16 +38,16 @@ class Drape:
         worn: where it lies.
         body: what it lies on.
         designed: the designed surface.
-        pieces: the flat pieces by name.
         options: friction, tolerance and limits.
+        sources: the files that its surface was read from; none of them is ever replaced.
     """
 
     cloth: SewnCloth
     worn: DrapedCloth
     body: Body
     designed: Body
-    pieces: Mapping[str, Flattening]
     options: DrapeOptions
+    sources: tuple[Path, ...] = ()
 
     @property
     def converged(self) -> bool:

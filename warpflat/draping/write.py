@@ -21,8 +21,7 @@ def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True) -> lis
     Raises:
         InputError: the folder cannot be written.
     """
-    sources = [source for piece in drape.pieces.values() for source in piece.surface.sources]
-    with output_folder(folder, ["drape.png"] if picture else [], sources=sources) as to:
+    with output_folder(folder, ["drape.png"] if picture else [], sources=drape.sources) as to:
         return write_drape_files(drape, to, picture=picture)
 
 
@@ -33,14 +32,15 @@ def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True) -> li
         InputError: the folder cannot be written.
     """
     files = []
-    for name, piece in drape.pieces.items():
-        space = drape.positions[drape.cloth.welded[drape.cloth.piece_vertices[name]]]
+    cloth = drape.cloth
+    for name, rows in cloth.piece_vertices.items():
+        space, faces = drape.positions[cloth.welded[rows]], cloth.flat_faces[cloth.piece_faces[name]]
         surface = Surface(
-            vertices=space, faces=piece.faces, name=name, input_vertices=space,
-            input_index=np.arange(len(space), dtype=np.int32),
+            vertices=space, faces=np.where(faces >= 0, faces - rows.start, -1).astype(np.int32), name=name,
+            input_vertices=space, input_index=np.arange(len(space), dtype=np.int32),
         )  # fmt: skip
         path = file_in(folder, name, ".draped.obj")
-        write_obj(path, surface, piece.positions)
+        write_obj(path, surface, cloth.flat[rows])
         files.append(path.name)
     if picture:
         files.append("drape.png")
