@@ -12,6 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
+from warpflat.draping.lift import Lift
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
@@ -25,9 +26,6 @@ from warpflat.pattern.pieces import Garment, Piece
 from warpflat.surface.connectivity import join_labels
 
 __all__ = ["Placement", "drape_pattern"]
-
-#: Where the points of a piece (#P by 2 [m]) lie on the designed surface, #P by 3 [m].
-Lift = Callable[[FloatArray], FloatArray]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +45,7 @@ class Placement:
 
 def drape_pattern(
     pattern: Garment,
-    body: Mannequin,
+    body: Mannequin | None,
     *,
     fabric: Fabric,
     size: str | None = None,
@@ -64,7 +62,7 @@ def drape_pattern(
 
     Args:
         pattern: pieces and their seams.
-        body: a mannequin, of a size or on a scan.
+        body: a mannequin, of a size or on a scan; None for the designed surface itself.
         fabric: of all pieces.
         size: of the pattern; its sample size if not given.
         placement: where the pieces go.
@@ -89,21 +87,24 @@ def drape_pattern(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
     meshes, welds = mesh_pieces(pieces, seams, spacing)
-    surface = body.surface()
-    solid = Body(surface.vertices, surface.faces, device=wp.get_device(device))
+    where = wp.get_device(device)
     lifted = set(meshes) <= set(placement.lifts)
     if lifted:
         placed = {name: placement.lifts[name](mesh.points) for name, mesh in meshes.items()}
+    elif body is None:
+        raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     else:
         placed = wrap_pieces(meshes, seams, body, at=placement.at, top=placement.top)
     cloth = _sew(pieces, meshes, welds, placed, fabric)
+    surface = None if body is None else body.surface()
+    designed = Body(cloth.designed, cloth.faces, device=where)
+    solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
     if not lifted:
         cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid))
     worn = relax_drape(cloth, solid, options=options, held=held_vertices(cloth, hold), callback=callback)
-    designed = Body(cloth.designed, cloth.faces, device=solid.device) if lifted else solid
     if not lifted:
         # What it should lie on is the body below it.
-        cloth = replace(cloth, designed=solid.nearest(worn.positions)[0])
+        cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
     return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options), notes
 
 

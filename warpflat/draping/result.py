@@ -147,6 +147,7 @@ class Drape:
             "vertices": len(self.positions),
             "friction": self.options.friction,
             "bending_n_m": self.cloth.fabric.bending,
+            "compared_with": "body" if self.designed is self.body else "designed surface",
             "distance_m": _spread(self.distance, areas),
             "misfit_m": _spread(self.misfit, areas),
             "bridged_m": _spread(self.bridged, areas),
