@@ -12,7 +12,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
-from warpflat.draping.lift import Lift
+from warpflat.draping.lift import Lift, whole_lifts
 from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.relax_drape import relax_drape
@@ -88,13 +88,14 @@ def drape_pattern(
         )
     meshes, welds = mesh_pieces(pieces, seams, spacing)
     where = wp.get_device(device)
-    lifted = set(meshes) <= set(placement.lifts)
+    lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
+    lifted = set(meshes) <= set(lifts)
     if lifted:
-        placed = {name: placement.lifts[name](mesh.points) for name, mesh in meshes.items()}
+        placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
     elif body is None:
         raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
     else:
-        placed = wrap_pieces(meshes, seams, body, at=placement.at, top=placement.top)
+        placed = wrap_pieces(meshes, welds, body, at=placement.at, top=placement.top)
     cloth = _sew(pieces, meshes, welds, placed, fabric)
     surface = None if body is None else body.surface()
     designed = Body(cloth.designed, cloth.faces, device=where)
@@ -111,7 +112,7 @@ def drape_pattern(
 def _sew(
     pieces: Mapping[str, Piece],
     meshes: Mapping[str, FlatMesh],
-    welds: Sequence[Weld],
+    welds: Sequence[Sequence[Weld]],
     placed: Mapping[str, FloatArray],
     fabric: Fabric,
 ) -> SewnCloth:
@@ -119,7 +120,7 @@ def _sew(
     counts = [len(mesh.points) for mesh in meshes.values()]
     ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
     begins = dict(zip(meshes, ends[:-1], strict=True))
-    pairs = [(begins[a] + i, begins[b] + j) for (a, i), *others in welds for b, j in others]
+    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
     first, second = (np.array(column, dtype=np.int64) for column in zip(*pairs, strict=True))
     welded = join_labels(ends[-1], first, second)
     space = np.concatenate([placed[name] for name in meshes])

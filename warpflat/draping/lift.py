@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +11,10 @@ from scipy.spatial import cKDTree
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.input_files import note_read
+from warpflat.draping.whole_pieces import MIRRORED
+from warpflat.pattern.pieces import Piece
 
-__all__ = ["Lift", "read_lift"]
+__all__ = ["Lift", "read_lift", "whole_lifts"]
 
 #: The places on a surface (#P by 3 [m]) of points of its pattern (#P by 2 [m]).
 Lift = Callable[[FloatArray], FloatArray]
@@ -59,3 +61,34 @@ def read_lift(path: Path) -> Lift:
         return np.asarray(np.einsum("pc,pcj->pj", weight[rows, best], surface[near[rows, best]]))
 
     return lift
+
+
+def whole_lifts(pieces: Iterable[Piece], lifts: Mapping[str, Lift]) -> dict[str, Lift]:
+    """Return the lifts of whole pieces, as of :func:`warpflat.draping.whole_pieces.whole_pieces`: bodies are mirrored at x = 0."""
+    found: dict[str, Lift] = {}
+    for piece in pieces:
+        if piece.name in lifts:
+            lift = lifts[piece.name]
+            found[piece.name] = _unfolded(piece, lift) if piece.on_fold else lift
+            found[piece.name + MIRRORED] = _turned(lift)
+    return found
+
+
+def _turned(lift: Lift) -> Lift:
+    return lambda points: lift(points * [-1.0, 1.0]) * [-1.0, 1.0, 1.0]
+
+
+def _unfolded(piece: Piece, lift: Lift) -> Lift:
+    start, end = next(edge for edge in piece.edges if edge.kind == "fold").points[[0, -1]]
+    along = (end - start) / np.linalg.norm(end - start)
+
+    def unfolded(points: FloatArray) -> FloatArray:
+        off = points - start
+        # The outline runs counter-clockwise: the half lies on the left of its fold.
+        beyond = along[0] * off[:, 1] - along[1] * off[:, 0] < 0.0
+        image = start + 2.0 * np.outer(off @ along, along) - off
+        found = lift(np.where(beyond[:, None], image, points))
+        found[beyond, 0] *= -1.0
+        return found
+
+    return unfolded

@@ -47,7 +47,7 @@ Weld = list[tuple[str, int]]
 
 def mesh_pieces(
     pieces: Mapping[str, Piece], seams: Sequence[Seam], spacing: float
-) -> tuple[dict[str, FlatMesh], list[Weld]]:
+) -> tuple[dict[str, FlatMesh], list[list[Weld]]]:
     """Mesh pieces so that the vertices of their seams meet.
 
     Each seam is divided once, at the ends of the edges on both its sides and in between, and both sides get these points.
@@ -59,7 +59,7 @@ def mesh_pieces(
         spacing: wished edge [m].
 
     Returns:
-        The meshes by piece, and the vertices that the seams join.
+        The meshes by piece, and for each seam the vertices that it joins, from its start to its end.
 
     Raises:
         InputError: an edge is in two seams, or a piece is too narrow for the spacing.
@@ -82,14 +82,14 @@ def mesh_pieces(
         }
         joints = []
         for number, seam in enumerate(seams):
-            joints += _divide(seam, edges, spacing, finer.get(number, 1), stations)
+            joints.append(_divide(seam, edges, spacing, finer.get(number, 1), stations))
         meshes, missing = {}, set()
         for name, piece in pieces.items():
             own = {edge.name: stations[name, edge.name] for ring in loops[name] for edge in ring}
             meshes[name], lost = _mesh(piece, loops[name], own, spacing)
             missing |= {owner.get((name, edge), (name, edge)) for edge in lost}
         if not missing:
-            return meshes, [[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in joints]
+            return meshes, [[[(p, int(meshes[p].edges[e][k])) for p, e, k in joint] for joint in row] for row in joints]
         for group in missing:
             finer[group] = 2 * finer.get(group, 1)
     narrow = next(iter(missing))

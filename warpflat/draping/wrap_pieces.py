@@ -16,13 +16,12 @@ import numpy as np
 from scipy.sparse import coo_array, csc_array, diags_array
 from scipy.sparse.linalg import splu
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.draping.body import Body
-from warpflat.draping.mesh_pieces import FlatMesh
+from warpflat.draping.mesh_pieces import FlatMesh, Weld
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.pattern.pieces import Seam
 
 __all__ = ["draw_together", "wrap_pieces"]
 
@@ -32,7 +31,8 @@ _WIDTH_OVER_DEPTH = 1.4
 _FAR = 0.25
 # Pieces that hang from the shoulders start this much higher [m].
 _ABOVE = 0.01
-_ROUNDS = 300
+# Rounds at most, and the mean way in one of them after which it is still enough for a start [m].
+_ROUNDS, _STILL = 300, 1e-4
 # The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
 _OFF, _HOLD_OFF, _INERTIA = 0.001, 30.0, 0.02
 
@@ -56,7 +56,7 @@ class _Frame:
 
 def wrap_pieces(
     meshes: Mapping[str, FlatMesh],
-    seams: Sequence[Seam],
+    welds: Sequence[Sequence[Weld]],
     body: Mannequin,
     *,
     at: Mapping[str, str] | None = None,
@@ -66,7 +66,7 @@ def wrap_pieces(
 
     Args:
         meshes: the pieces, upright: y runs up along the body, their right side towards the viewer.
-        seams: between them.
+        welds: for each seam the vertices that it joins.
         body: with its levels.
         at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
         top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
@@ -82,8 +82,9 @@ def wrap_pieces(
     if not trunk:
         raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
     fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
-    plane = _lay_out(meshes, seams, trunk, fronts or trunk[:1])
-    hangs_from_shoulder, width = _girth(plane, meshes, seams)
+    joins = _joins(meshes, welds, set(trunk))
+    plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
+    hangs_from_shoulder, width = _girth(plane, joins)
     points = np.concatenate(list(plane.values()))
     high = float(points[:, 1].max())
     if hangs_from_shoulder and top is None:
@@ -123,20 +124,43 @@ def _around_arm(flat: FloatArray, body: Mannequin, side: str) -> FloatArray:
     return frame.roll(flat - [middle, flat[:, 1].max()], float(np.ptp(flat[:, 0])), 1.0)
 
 
+@dataclass(frozen=True)
+class _Join:
+    """Two pieces and the vertices of each that a seam joins."""
+
+    pieces: tuple[str, str]
+    vertices: tuple[IntArray, IntArray]
+
+    def points(self, points: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the points on both sides (#J by 2)."""
+        return points[self.pieces[0]][self.vertices[0]], points[self.pieces[1]][self.vertices[1]]
+
+
+def _joins(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], trunk: set[str]) -> list[_Join]:
+    """Return what each seam joins of the pieces around the trunk, a piece to itself too."""
+    found = []
+    for seam in welds:
+        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        for (piece, vertex), *others in seam:
+            for other, its in others:
+                if {piece, other} <= trunk:
+                    pairs.setdefault((piece, other), []).append((vertex, its))
+        for names, rows in pairs.items():
+            first, second = np.array(rows, dtype=np.int32).T
+            found.append(_Join(names, (first, second)))
+    return [join for join in found if len(join.vertices[0]) > 1]
+
+
 def _lay_out(
-    meshes: Mapping[str, FlatMesh], seams: Sequence[Seam], trunk: Sequence[str], fronts: Sequence[str]
+    meshes: Mapping[str, FlatMesh], joins: Sequence[_Join], trunk: Sequence[str], fronts: Sequence[str]
 ) -> dict[str, FloatArray]:
     """Shift the trunk's pieces beside each other, each by the seam that reaches highest; the middle of the fronts is at 0."""
-    links: list[tuple[float, str, str, FloatArray]] = []
-    for seam in seams:
-        ends = []
-        for chain in seam.sides:
-            rows = [(s.piece, meshes[s.piece].points[meshes[s.piece].edges[s.edge]]) for s in chain if s.piece in trunk]
-            ends.append(rows)
-        for a, p in ends[0]:
-            for b, q in ends[1]:
-                if a != b:
-                    links.append((float(min(np.ptp(p[:, 1]), np.ptp(q[:, 1]))), a, b, p.mean(axis=0) - q.mean(axis=0)))
+    flat = {name: meshes[name].points for name in trunk}
+    links = []
+    for join in joins:
+        p, q = join.points(flat)
+        if join.pieces[0] != join.pieces[1]:
+            links.append((float(min(np.ptp(p[:, 1]), np.ptp(q[:, 1]))), *join.pieces, (p - q).mean(axis=0)))
     links.sort(key=lambda link: -link[0])
     shift = {fronts[0]: np.zeros(2)}
     while len(shift) < len(trunk):
@@ -152,35 +176,27 @@ def _lay_out(
             raise InputError(
                 f"piece {lost!r} is sewn to no other around the trunk; join it by a seam, or say in [[pieces]] where it is"
             )
-    plane = {name: meshes[name].points + shift[name] for name in trunk}
-    width = max(_girth(plane, meshes, seams)[1], 1e-6)
+    plane = {name: points + shift[name] for name, points in flat.items()}
+    width = max(_girth(plane, joins)[1], 1e-6)
     turn = sum(np.exp(2j * np.pi * plane[name][:, 0] / width).mean() for name in fronts)
     middle = np.angle(turn) * width / (2 * np.pi)
-    return {name: flat - [middle, 0.0] for name, flat in plane.items()}
+    return {name: points - [middle, 0.0] for name, points in plane.items()}
 
 
-def _girth(
-    plane: Mapping[str, FloatArray], meshes: Mapping[str, FlatMesh], seams: Sequence[Seam]
-) -> tuple[bool, float]:
+def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float]:
     """Return whether the pieces hang from seams over the shoulders, and how far apart the edges lie that meet behind the body [m]."""
     points = np.concatenate(list(plane.values()))
     whole, middle = float(np.ptp(points[:, 0])), 0.5 * float(points[:, 1].min() + points[:, 1].max())
-    around, shoulders = [], False
-    for seam in seams:
-        rows = []
-        for chain in seam.sides:
-            inside = [plane[s.piece][meshes[s.piece].edges[s.edge]] for s in chain if s.piece in plane]
-            rows.append(np.concatenate(inside) if inside else np.empty((0, 2)))
-        if not (len(rows[0]) and len(rows[1])):
-            continue
-        apart = abs(float(rows[0][:, 0].mean() - rows[1][:, 0].mean()))
+    around, shoulders = [(0.0, whole)], False
+    for join in joins:
+        rows = join.points(plane)
+        apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
         if apart > _FAR * whole:
-            upright = float(min(np.ptp(rows[0][:, 1]), np.ptp(rows[1][:, 1])))
-            around.append((upright, apart))
+            around.append((float(min(np.ptp(row[:, 1]) for row in rows)), apart))
             level = float(min(row[:, 1].mean() for row in rows))
             flat = all(np.ptp(row[:, 0]) > 0.5 * np.ptp(row[:, 1]) for row in rows)
             shoulders = shoulders or (flat and level > middle)
-    return shoulders, max(around)[1] if around else whole
+    return shoulders, max(around)[1]
 
 
 def _height(body: Mannequin, top: str | float) -> float:
@@ -234,11 +250,18 @@ def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray
         pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
         turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
         right = derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target
-        x = factor.solve(right)
+        before, x = x, factor.solve(right)
+        if np.linalg.norm(x - before, axis=1).mean() < _STILL:
+            break
     return np.asarray(x)
 
 
 def _nearest_isometries(frames: FloatArray) -> FloatArray:
-    """Return the pairs of orthonormal rows nearest to pairs of rows (#C by 2 by 3)."""
-    u, _, v = np.linalg.svd(frames, full_matrices=False)
-    return np.asarray(u @ v)
+    """Return the pairs of orthonormal rows nearest to pairs of rows F (#C by 2 by 3): (F F^T)^(-1/2) F, in closed form."""
+    square = np.einsum("cik,cjk->cij", frames, frames)
+    square[:, [0, 1], [0, 1]] += 1e-12
+    root = np.sqrt(square[:, 0, 0] * square[:, 1, 1] - square[:, 0, 1] ** 2)
+    root = np.maximum(root, 1e-12)[:, None, None] * np.eye(2)
+    # The square root of a symmetric 2 by 2 matrix C is (C + sqrt(det C) I) / sqrt(tr C + 2 sqrt(det C)).
+    middle = (square + root) / np.sqrt(np.trace(square + root, axis1=1, axis2=2))[:, None, None]
+    return np.asarray(np.linalg.solve(middle, frames))
