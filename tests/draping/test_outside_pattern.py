@@ -11,7 +11,7 @@ from devices import DEVICE
 
 import warpflat
 from warpflat.core.errors import InputError
-from warpflat.draping.drape_pattern import drape_pattern
+from warpflat.draping.drape_pattern import Placement, drape_pattern
 from warpflat.draping.lift import read_lift, whole_lifts
 from warpflat.draping.mesh_pieces import mesh_pieces
 from warpflat.draping.options import DrapeOptions
@@ -172,7 +172,7 @@ def test_a_tube_is_put_around_the_body():
         pattern,
         body,
         fabric=warpflat.find_fabric("woven"),
-        spacing=0.03,
+        placement=Placement(spacing=0.03),
         options=DrapeOptions(max_steps=400),
         device=DEVICE,
     )

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray
 from warpflat.core.errors import InputError, nearest
@@ -59,9 +60,15 @@ def drape(
     surface = body.surface() if isinstance(body, Mannequin) else body
     solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
     options = options or DrapeOptions()
-    worn = relax_drape(cloth, solid, options=options, held=held_vertices(cloth, hold), callback=callback)
+    held, frames = held_vertices(cloth, hold), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
     sources = _sources(garment)
-    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources)
+    return Drape(
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames)
+    )
 
 
 def _sources(garment: Garment | Flattening | Sequence[Flattening]) -> tuple[Path, ...]:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
@@ -30,17 +31,23 @@ __all__ = ["Placement", "drape_pattern"]
 
 @dataclass(frozen=True, kw_only=True)
 class Placement:
-    """Where the pieces of a pattern go.
+    """Where the pieces of a pattern go, and how they are meshed.
 
     Attributes:
         at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
         top: a level of the body or a height [m] for the highest point of what does not hang from the shoulders.
         lifts: by piece the way to its designed surface, where there is one; it must be there for all of them or for none.
+        size: of the pattern; its sample size if not given.
+        spacing: wished edge of the mesh [m].
+        hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
     """
 
     at: Mapping[str, str] = field(default_factory=dict)
     top: str | float | None = None
     lifts: Mapping[str, Lift] = field(default_factory=dict)
+    size: str | None = None
+    spacing: float = 0.01
+    hold: Sequence[str] = ()
 
 
 def drape_pattern(
@@ -48,10 +55,7 @@ def drape_pattern(
     body: Mannequin | None,
     *,
     fabric: Fabric,
-    size: str | None = None,
     placement: Placement | None = None,
-    spacing: float = 0.01,
-    hold: Sequence[str] = (),
     options: DrapeOptions | None = None,
     callback: Callable[[int, float], None] | None = None,
     device: str | None = None,
@@ -64,10 +68,7 @@ def drape_pattern(
         pattern: pieces and their seams.
         body: a mannequin, of a size or on a scan; None for the designed surface itself.
         fabric: of all pieces.
-        size: of the pattern; its sample size if not given.
-        placement: where the pieces go.
-        spacing: wished edge of the mesh [m].
-        hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
+        placement: where the pieces go, and how finely they are meshed.
         options: friction, tolerance and limits.
         callback: called with the number of steps and the residual now and then.
         device: Warp device.
@@ -79,14 +80,14 @@ def drape_pattern(
         InputError: the pattern has no seams or no such size, a piece cannot be meshed or placed, or an edge is unknown.
     """
     placement, options = placement or Placement(), options or DrapeOptions()
-    chosen = pattern.sample if size is None else size
+    chosen = pattern.sample if placement.size is None else placement.size
     pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
     pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
     if not pattern.seams:
         raise InputError(
             f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
         )
-    meshes, welds = mesh_pieces(pieces, seams, spacing)
+    meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
     where = wp.get_device(device)
     lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
     lifted = set(meshes) <= set(lifts)
@@ -102,11 +103,15 @@ def drape_pattern(
     solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
     if not lifted:
         cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid))
-    worn = relax_drape(cloth, solid, options=options, held=held_vertices(cloth, hold), callback=callback)
+    held, frames = held_vertices(cloth, placement.hold), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
     if not lifted:
         # What it should lie on is the body below it.
         cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
-    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options), notes
+    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
 
 
 def _sew(

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import weighted_percentiles
@@ -40,6 +41,7 @@ class Drape:
         designed: the designed surface.
         options: friction, tolerance and limits.
         sources: the files that its surface was read from; none of them is ever replaced.
+        frames: #V by 3 each, where the cloth was on its way to rest [m].
     """
 
     cloth: SewnCloth
@@ -48,6 +50,7 @@ class Drape:
     designed: Body
     options: DrapeOptions
     sources: tuple[Path, ...] = ()
+    frames: tuple[NDArray[np.float32], ...] = ()
 
     @property
     def converged(self) -> bool:

@@ -257,7 +257,7 @@ def drape_outside(
     size: str | None = None,
     device: str | None = None,
 ) -> SceneResult:
-    """Drape a pattern from outside; write `metrics.json`, `NAME.draped.obj` per piece and `drape.png`, all of them or none.
+    """Drape a pattern from outside; write `metrics.json`, `NAME.draped.obj` per piece, `frames.usdc` and pictures, all of them or none.
 
     Args:
         job: what is draped.
@@ -283,16 +283,18 @@ def drape_outside(
     cloth, notes = _fabric(job, fabric)
     options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
     at = {entry.name: entry.at for entry in job.sewing.pieces if entry.at is not None}
-    with output_folder(out, ["metrics.json", "drape.png"], sources=job.sources) as folder:
+    with output_folder(out, ["metrics.json", "drape.png", "drape.webp", "frames.usdc"], sources=job.sources) as folder:
         require_own_metrics(folder)
         report_activity("draping")
         with errors_named(job.name):
+            lifts = job.lifts if size in (None, pattern.sample) else {}
+            placement = Placement(
+                at=at, top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
+            )
             draped, more = drape_pattern(
-                pattern, job.body, fabric=cloth, size=size, options=options, device=device, hold=table.hold,
-                spacing=1e-3 * job.sewing.spacing_mm,
-                placement=Placement(at=at, top=job.sewing.top, lifts=job.lifts if size in (None, pattern.sample) else {}),
-            )  # fmt: skip
-        files = [*write_drape_files(draped, folder), "metrics.json"]
+                pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
+            )
+        files = [*write_drape_files(draped, folder, frames=True), "frames.usdc", "metrics.json"]
         body = {} if job.body is None else {"mannequin": job.body.metrics()}
         measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
         metrics, stale = remove_stale(folder, measured, name=job.name, files=files)
