@@ -227,6 +227,8 @@ class Body(Entry):
     notes: list[str]
     levels: dict[str, Level]
     nearest_size: str | None = None
+    table: dict[str, Any] | None = None
+    """The scene's table of the body, by which `warpflat drape DIR` builds it again."""
 
 
 class Seam(Entry):
@@ -410,6 +412,8 @@ class Drape(Entry):
     vertices: int
     friction: float
     bending_n_m: float
+    compared_with: Literal["body", "designed surface"]
+    """What the distances are from: the body for a pattern without a designed surface."""
     distance_m: Spread
     misfit_m: Spread
     bridged_m: Spread

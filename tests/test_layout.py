@@ -33,7 +33,7 @@ ROOMS = {
     "cutting": "core surface model solver export flattening",
     "mannequin": "core surface export",
     "garment": "core surface fabric model solver pattern export flattening cutting mannequin",
-    "draping": "core surface fabric model solver export flattening mannequin garment kernels",
+    "draping": "core surface fabric model solver pattern export flattening mannequin garment kernels",
     "review": "core surface export",
     "scene": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review",
     "batch": "core surface fabric model solver pattern export flattening cutting mannequin garment draping review scene",

@@ -8,10 +8,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from PIL import Image
+from pxr import Usd, UsdGeom
 
 import warpflat
 from warpflat.cli.tables import warnings_of
 from warpflat.core.errors import InputError
+from warpflat.draping.frames import choose_frames
 from warpflat.draping.hollows import HOLLOW_REACH, hollow_depths
 from warpflat.draping.sewn_cloth import sew_cloth
 
@@ -56,12 +59,22 @@ def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):
 
 
 def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path: Path):
-    names = warpflat.save_drape(worn, tmp_path)
-    assert names == ["front.draped.obj", "back.draped.obj", "drape.png"]
+    names = warpflat.save_drape(worn, tmp_path, frames=True)
+    assert names == ["front.draped.obj", "back.draped.obj", "drape.png", "drape.webp"]
     rows = [line.split() for line in (tmp_path / names[0]).read_text().splitlines()]
     space = np.array([row[1:] for row in rows if row[0] == "v"], dtype=float)
     np.testing.assert_array_equal(space, worn.positions[worn.cloth.welded[worn.cloth.piece_vertices["front"]]])
     assert (tmp_path / "drape.png").stat().st_size > 10_000
+    with Image.open(tmp_path / "drape.webp") as film:
+        assert film.n_frames == len(choose_frames(worn.frames)) <= 30
+    stage = Usd.Stage.Open(str(tmp_path / "frames.usdc"))
+    cloth = UsdGeom.Mesh(stage.GetPrimAtPath("/World/drape/cloth")).GetPointsAttr()
+    times = cloth.GetTimeSamples()
+    assert len(times) == len(choose_frames(worn.frames))
+    assert times[-1] == stage.GetEndTimeCode()
+    np.testing.assert_array_equal(np.array(cloth.Get(times[0])), worn.cloth.designed.astype(np.float32))
+    np.testing.assert_array_equal(np.array(cloth.Get(times[-1])), worn.positions.astype(np.float32))
+    assert stage.GetPrimAtPath("/World/drape").GetAttribute("warpflat:stage").Get(times[0]) == "drape"
 
 
 def test_a_cut_is_closed_again():

@@ -21,6 +21,7 @@ from warpflat.core.errors import InputError
 from warpflat.export.dxf import block_name, write_dxf
 from warpflat.pattern.draft import draft_garment
 from warpflat.pattern.pieces import Edge, Garment, Piece
+from warpflat.pattern.seam_words import seam_words
 
 SIZES = ("36", "38", "40")
 CREATED = datetime(2024, 5, 17, 9, 30)
@@ -104,7 +105,9 @@ def test_sewing_lines_and_mirror_line_keep_their_names(dress, file):
     (piece,) = (p for p in dress.pieces["38"] if p.name == "front bodice")
     block = document.blocks.get("FRONT_BODICE_38")
     named = {t.dxf.text for t in block.query('TEXT[layer=="15"]')}
-    assert named == {f"EDGE: {e.name}" for e in piece.edges} | {f"DART: {d.dart.name}" for d in piece.darts}
+    sewn = {f"SEAM: {w}" for (p, _), rows in seam_words(dress.garment.seams).items() if p == piece.name for w in rows}
+    assert sewn
+    assert named == {f"EDGE: {e.name}" for e in piece.edges} | {f"DART: {d.dart.name}" for d in piece.darts} | sewn
     (mirror,) = block.query('LINE[layer=="6"]')
     assert abs(mirror.dxf.start.x) < 1e-6
     assert abs(mirror.dxf.end.x) < 1e-6

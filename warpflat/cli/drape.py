@@ -1,43 +1,103 @@
-"""`warpflat drape`: the garment of a scene is flattened, sewn, put on its body and measured."""
+"""`warpflat drape`: a garment is sewn, put on its body and measured: a scene's, a run's, or a pattern's from a file."""
 
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 
-from warpflat.cli.options import EXIT_CODES, RUN_FILES, ComputingCommand, output_options
-from warpflat.cli.run import run_and_report
+from warpflat.cli.options import DONE, EXIT_CODES, NOT_CONVERGED, RUN_FILES, ComputingCommand, output_options
+from warpflat.cli.run import run_and_report, start_warp_silently
+
+if TYPE_CHECKING:
+    from warpflat.scene.write import SceneResult
 
 __all__ = ["drape"]
 
 _FILES = """\b
   NAME.draped.obj  each piece as it is worn [m], with the pattern [m] as texture coordinates
-  drape.png        gap and strain from the front, the side and the back"""
+  drape.png        gap and strain from the front, the side and the back
+Of a pattern the last two and metrics.json come out alone."""
 
 
 @click.command(cls=ComputingCommand, epilog=f"{RUN_FILES}\n\n{_FILES}\n\n{EXIT_CODES}")
-@click.argument("scene", type=click.Path(path_type=Path))
+@click.argument("scene", metavar="SCENE|DIR|PATTERN", type=click.Path(path_type=Path))
+@click.option("--body", metavar="SIZE|SCAN", help='Of a pattern: a size, such as "EU 38", or a scan\'s file.')
+@click.option("--fabric", metavar="NAME", help="Of a pattern.  [default: its own, or woven]")
+@click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
+@click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
+@click.option(
+    "--edges", is_flag=True, help="Print the edges of a pattern's pieces, to name them in [[seams]]; drape nothing."
+)
 @output_options()
-def drape(scene: Path, out: Path | None, quiet: bool, verbose: bool, as_json: bool, device: str | None) -> int:
-    """Run a scene file and put the sewn garment on its body.
+def drape(
+    scene: Path,
+    out: Path | None,
+    quiet: bool,
+    verbose: bool,
+    as_json: bool,
+    device: str | None,
+    body: str | None,
+    fabric: str | None,
+    seams: Path | None,
+    size: str | None,
+    edges: bool,
+) -> int:
+    """Put a sewn garment on its body: a scene's, that of a run's folder, or a pattern's (pattern.json, DXF or SVG).
 
-    It is as if the scene had a [drape] table; the settings of one that it has hold.
+    For a scene it is as if it had a [drape] table; the settings of one that it has hold. A pattern is placed by its seams. A DXF
+    or an SVG of another program names none: they stand in a TOML file.
 
     \b
     Examples:
       warpflat drape scenes/basic_block.toml
-      warpflat drape scenes/dress.toml --out dress --json
+      warpflat drape out/dress --fabric denim
+      warpflat drape shirt.dxf --edges
+      warpflat drape shirt.dxf --seams shirt.toml --body "EU 38"
     """
     from dataclasses import replace
 
     from warpflat.core.errors import InputError
     from warpflat.scene.load import load_scene
+    from warpflat.scene.outside_pattern import OutsideJob, drape_outside, edge_table, is_pattern_file
     from warpflat.scene.schema import DrapeTable
 
+    if is_pattern_file(scene):
+        if edges:
+            click.echo(edge_table(scene, sewing=seams))
+            return DONE
+        start_warp_silently()
+        job = OutsideJob.read(scene, sewing=seams, body=body)
+        folder = out if out is not None else Path("out") / f"{job.name}-draped"
+        result = drape_outside(job, folder, fabric=fabric, size=size, device=device)
+        return _report(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
+    options = {"--body": body, "--fabric": fabric, "--seams": seams, "--size": size, "--edges": edges or None}
+    for option, value in options.items():
+        if value is not None:
+            raise InputError(
+                f"{option}: is for a pattern's file or a run's folder; {scene} is a scene, which says it itself"
+            )
     loaded = load_scene(scene)
     if loaded.settings.half:
         raise InputError(f"{scene}: half: a drape needs the whole garment; leave out half = true")
     table = loaded.settings.drape or DrapeTable()
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
     return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
+
+
+def _report(result: SceneResult, folder: Path, *, quiet: bool, verbose: bool, as_json: bool) -> int:
+    """Print what the drape of a pattern has found, and return the exit code."""
+    from warpflat.cli.tables import drape_lines, warnings_of
+
+    warnings = warnings_of(result.metrics)
+    for line in (*([] if quiet or as_json else result.notes), *warnings):
+        click.echo(f"warpflat: {line}", err=True)
+    if as_json:
+        click.echo((folder / "metrics.json").read_text(encoding="utf-8"), nl=False)
+    elif not quiet:
+        lines = drape_lines(result.metrics)
+        for line in lines if verbose else lines[:6]:
+            click.echo(line)
+        click.echo(f"files: {folder}: {', '.join(result.files)}")
+    return NOT_CONVERGED if warnings else DONE

@@ -158,7 +158,7 @@ def _within(millimetres: float) -> str:
 
 def _drape_line(drape: Mapping[str, Any]) -> str:
     mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
-    parts = [f"worn {mean:.1f} mm from the designed surface", f"misfit {1e3 * misfit['mean']:.1f} mm"]
+    parts = [f"worn {mean:.1f} mm from the {drape['compared_with']}", f"misfit {1e3 * misfit['mean']:.1f} mm"]
     parts.append(f"at most {1e3 * misfit['max']:.1f} mm")
     places = [place["words"] for place in drape["places"][:1]]
     return _clipped(f"drape: {'; '.join([', '.join(parts), *places])}")

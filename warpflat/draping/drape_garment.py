@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from pathlib import Path
 
 import numpy as np
 import warp as wp
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import BoolArray
 from warpflat.core.errors import InputError, nearest
@@ -19,7 +21,7 @@ from warpflat.garment.garment import Garment
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.surface.mesh import Surface
 
-__all__ = ["drape"]
+__all__ = ["drape", "held_vertices"]
 
 
 def drape(
@@ -58,17 +60,31 @@ def drape(
     surface = body.surface() if isinstance(body, Mannequin) else body
     solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
     options = options or DrapeOptions()
-    worn = relax_drape(cloth, solid, options=options, held=_held(cloth, hold), callback=callback)
+    held, frames = held_vertices(cloth, hold), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
+    sources = _sources(garment)
+    return Drape(
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames)
+    )
+
+
+def _sources(garment: Garment | Flattening | Sequence[Flattening]) -> tuple[Path, ...]:
+    """Return the files from which the pieces were read."""
     if isinstance(garment, Garment):
-        pieces = dict(garment.pieces)
-    else:
-        given = [garment] if isinstance(garment, Flattening) else list(garment)
-        pieces = {piece.surface.name: piece for piece in given}
-    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, pieces=pieces, options=options)
+        garment = list(garment.pieces.values())
+    pieces = [garment] if isinstance(garment, Flattening) else garment
+    return tuple(source for piece in pieces for source in piece.surface.sources)
 
 
-def _held(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:
-    """Return which vertices (#V) lie on lines that are held."""
+def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:
+    """Return which vertices (#V) lie on lines that are held, each "piece.line", or "line" of every piece that has one.
+
+    Raises:
+        InputError: an unknown line.
+    """
     held = np.zeros(len(cloth.designed), dtype=bool)
     for name in hold:
         lines = [line for line in cloth.lines if name in (line, line.partition(".")[2])]

@@ -133,6 +133,7 @@ def relax_drape(
     held: BoolArray | None = None,
     start: FloatArray | None = None,
     callback: Callable[[int, float], None] | None = None,
+    observer: Callable[[FloatArray], None] | None = None,
 ) -> DrapedCloth:
     """Let the cloth come to rest on a body.
 
@@ -143,6 +144,7 @@ def relax_drape(
         held: #V, vertices that do not move.
         start: #V by 3 [m]; the designed surface if not given.
         callback: called with the number of steps and the residual at every check.
+        observer: called with the places (#V by 3 [m]) at the start and at every check.
 
     Returns:
         the cloth; `converged` is False if it met the step limit before it was at rest.
@@ -153,11 +155,14 @@ def relax_drape(
     relaxation = _DynamicRelaxation(cloth, energy)
     hangs = body is None or float(np.mean(body.gaps(start) > _FREE)) > _HANGING_SHARE
     energy.motion.position.assign(_minimise(energy, start) if hangs else start)
+    observe = observer or (lambda _: None)
+    observe(start)
     steps, residual, before, converged = 0, np.inf, np.inf, False
     while steps < options.max_steps and not converged:
         relaxation.run(_STEPS_PER_CHECK)
         steps += _STEPS_PER_CHECK
         residual, worst = relaxation.check()
+        observe(energy.motion.position.numpy())
         converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
         if callback is not None:
             callback(steps, residual)

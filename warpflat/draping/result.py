@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.sums import weighted_percentiles
@@ -18,7 +19,6 @@ from warpflat.draping.places import Place, find_places
 from warpflat.draping.relax_drape import DrapedCloth
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.export.geometry import area_vectors, vertex_normals
-from warpflat.flattening.result import Flattening
 from warpflat.surface.triangles import triangulate
 
 __all__ = ["Drape"]
@@ -39,16 +39,18 @@ class Drape:
         worn: where it lies.
         body: what it lies on.
         designed: the designed surface.
-        pieces: the flat pieces by name.
         options: friction, tolerance and limits.
+        sources: the files that its surface was read from; none of them is ever replaced.
+        frames: #V by 3 each, where the cloth was on its way to rest [m].
     """
 
     cloth: SewnCloth
     worn: DrapedCloth
     body: Body
     designed: Body
-    pieces: Mapping[str, Flattening]
     options: DrapeOptions
+    sources: tuple[Path, ...] = ()
+    frames: tuple[NDArray[np.float32], ...] = ()
 
     @property
     def converged(self) -> bool:
@@ -148,6 +150,7 @@ class Drape:
             "vertices": len(self.positions),
             "friction": self.options.friction,
             "bending_n_m": self.cloth.fabric.bending,
+            "compared_with": "body" if self.designed is self.body else "designed surface",
             "distance_m": _spread(self.distance, areas),
             "misfit_m": _spread(self.misfit, areas),
             "bridged_m": _spread(self.bridged, areas),

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from warpflat.core.atomic_files import file_in, output_folder
+from warpflat.draping.frames import write_drape_film, write_drape_frames
 from warpflat.draping.picture import write_drape_picture
 from warpflat.draping.result import Drape
 from warpflat.export.obj import write_obj
@@ -15,34 +16,45 @@ from warpflat.surface.mesh import Surface
 __all__ = ["save_drape", "write_drape_files"]
 
 
-def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True) -> list[str]:
-    """Write `NAME.draped.obj` per piece and `drape.png`, all of them or none, and return their names.
+def save_drape(drape: Drape, folder: str | Path, *, picture: bool = True, frames: bool = False) -> list[str]:
+    """Write `NAME.draped.obj` per piece, `drape.png` and, for frames, `drape.webp`, all of them or none, and return their names.
+
+    With frames the way to rest is added to the folder's `frames.usdc`, too, or a new one is written.
 
     Raises:
         InputError: the folder cannot be written.
     """
-    sources = [source for piece in drape.pieces.values() for source in piece.surface.sources]
-    with output_folder(folder, ["drape.png"] if picture else [], sources=sources) as to:
-        return write_drape_files(drape, to, picture=picture)
+    names = [*(["drape.png"] if picture else []), *(["drape.webp"] if picture and frames else [])]
+    with output_folder(folder, [*names, *(["frames.usdc"] if frames else [])], sources=drape.sources) as to:
+        return write_drape_files(drape, to, picture=picture, frames=frames)
 
 
-def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True) -> list[str]:
-    """Write the files into a folder in a block of :func:`warpflat.core.atomic_files.output_folder`, and return their names.
+def write_drape_files(drape: Drape, folder: Path, *, picture: bool = True, frames: bool = False) -> list[str]:
+    """Write the files into a folder in a block of :func:`warpflat.core.atomic_files.output_folder`.
+
+    Returns:
+        Their names, but not that of `frames.usdc`, which may hold more.
 
     Raises:
         InputError: the folder cannot be written.
     """
     files = []
-    for name, piece in drape.pieces.items():
-        space = drape.positions[drape.cloth.welded[drape.cloth.piece_vertices[name]]]
+    cloth = drape.cloth
+    for name, rows in cloth.piece_vertices.items():
+        space, faces = drape.positions[cloth.welded[rows]], cloth.flat_faces[cloth.piece_faces[name]]
         surface = Surface(
-            vertices=space, faces=piece.faces, name=name, input_vertices=space,
-            input_index=np.arange(len(space), dtype=np.int32),
+            vertices=space, faces=np.where(faces >= 0, faces - rows.start, -1).astype(np.int32), name=name,
+            input_vertices=space, input_index=np.arange(len(space), dtype=np.int32),
         )  # fmt: skip
         path = file_in(folder, name, ".draped.obj")
-        write_obj(path, surface, piece.positions)
+        write_obj(path, surface, cloth.flat[rows])
         files.append(path.name)
     if picture:
         files.append("drape.png")
         write_drape_picture(folder / files[-1], drape)
+    if frames:
+        write_drape_frames(folder / "frames.usdc", drape)
+        if picture:
+            files.append("drape.webp")
+            write_drape_film(folder / files[-1], drape)
     return files

@@ -11,7 +11,7 @@ from __future__ import annotations
 import logging
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from datetime import datetime, timezone
 from typing import TYPE_CHECKING
 
@@ -29,6 +29,7 @@ from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
+from warpflat.pattern.seam_words import seam_words
 
 if TYPE_CHECKING:
     from ezdxf.document import Drawing
@@ -87,6 +88,7 @@ def write_dxf(
     space = document.modelspace()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
+    seams = seam_words(garment.garment.seams)
     names = {piece.name: piece.piece.title or piece.name for piece in next(iter(garment.pieces.values()))}
     written = titles(list(dict.fromkeys(names.values())), _is_written)
     for placed in lay_out(groups, width=1.5).placed:
@@ -94,7 +96,7 @@ def write_dxf(
             title = written[names[piece.name]]
             name = block_name(piece, taken, title)
             block = document.blocks.new(name, base_point=(0, 0))
-            _write_piece(block, piece, title, scale, validation=dialect == "astm")
+            _write_piece(block, piece, title, scale, seams, validation=dialect == "astm")
             for point in rules.points.get(piece.name, ()) if rules is not None and piece.size == rules.sample else ():
                 _text(block, f"# {point.rule}", point.at, scale, point.layer, 0.003)
             space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
@@ -163,14 +165,22 @@ def _is_written(name: str) -> bool:
     return any(letter.isalnum() for letter in _ascii(name))
 
 
-def _write_piece(block: BlockLayout, piece: DraftedPiece, title: str, scale: float, *, validation: bool) -> None:
+def _write_piece(
+    block: BlockLayout,
+    piece: DraftedPiece,
+    title: str,
+    scale: float,
+    seams: Mapping[tuple[str, str], Sequence[str]],
+    *,
+    validation: bool,
+) -> None:
     """Write all layers of one piece in one size."""
     boundary = _from_a_corner(piece.cut_line)
     _polyline(block, boundary, scale, "1", closed=True)
     for point, turns in zip(boundary, _is_corner(boundary), strict=True):
         _point(block, point, scale, "2" if turns else "3")
     _write_notches(block, piece, scale)
-    _write_edges(block, piece, scale)
+    _write_edges(block, piece, scale, seams)
     _line(block, piece.grain, scale, "7")
     for line in piece.internal_lines.values():
         _polyline(block, line, scale, "8")
@@ -198,16 +208,20 @@ def _write_notches(block: BlockLayout, piece: DraftedPiece, scale: float) -> Non
             block.add_point(location, dxfattribs={"layer": "4", "angle": angle})
 
 
-def _write_edges(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
-    """Write the sewing line edge by edge, each with its name."""
+def _write_edges(
+    block: BlockLayout, piece: DraftedPiece, scale: float, seams: Mapping[tuple[str, str], Sequence[str]]
+) -> None:
+    """Write the sewing line edge by edge, each with its name and, in rows below, what is sewn to it."""
     for edge in piece.edges:
         if edge.kind == "fold":
             _line(block, edge.line[[0, -1]], scale, "6")
         else:
             # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
             _polyline(block, edge.line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+        texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
         middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
-        _text(block, f"EDGE: {edge.name}", middle, scale, "15", 0.003)
+        for row, text in enumerate(texts):
+            _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
 
 
 def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:

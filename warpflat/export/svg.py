@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import re
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from xml.etree import ElementTree as ET
 
 import numpy as np
@@ -19,6 +19,7 @@ from warpflat.pattern.label import LEADING
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import CAPITALS, Words, text_width
 from warpflat.pattern.marker import Copy, Marker
+from warpflat.pattern.seam_words import seam_words
 from warpflat.pattern.words import printed_in
 
 __all__ = ["OF_SIZE", "STYLE", "SvgPage", "write_marker_svg", "write_svg"]
@@ -41,6 +42,8 @@ STYLE: dict[str, tuple[str, float, tuple[float, ...]]] = {
 }
 #: Roles whose strokes have the colour of their size in a nest.
 OF_SIZE = ("cut", "dart", "notch")
+# Roles of the edges that may be sewn.
+_SEWN = ("sew", "hem", "dart")
 
 
 def write_svg(
@@ -54,7 +57,8 @@ def write_svg(
     """Write the pieces side by side, in true size.
 
     Groups are called "PIECE-SIZE"; in them the cut line is "PIECE-SIZE.cut" and every edge "PIECE-SIZE.EDGE" (what
-    an id may not hold becomes "_"; the plain names stand in `data-piece`, `data-size` and `data-edge`).
+    an id may not hold becomes "_"; the plain names stand in `data-piece`, `data-size` and `data-edge`). What is sewn to an edge stands
+    in its `data-seam`.
 
     Args:
         garment: drafted.
@@ -70,12 +74,13 @@ def write_svg(
         groups = [(piece,) for size in chosen for nest in groups for piece in nest if piece.size == size]
     sheet = lay_out(groups, width=width)
     page = SvgPage(float(sheet.size[0]), float(sheet.size[1]), garment.name)
+    seams = seam_words(garment.garment.seams)
     for placed in sheet.placed:
         with printed_in(garment.garment.words):
             drawings = draw_nest(placed.pieces)
         for index, drawing in enumerate(drawings):
             shift = np.column_stack([np.eye(2), placed.offset])
-            page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None)
+            page.piece(drawing, shift, hue=index if len(placed.pieces) > 1 else None, seams=seams)
     page.write(path)
 
 
@@ -143,14 +148,24 @@ class SvgPage:
         ET.SubElement(self.root, "style").text = "\n".join(style)
         self._ids: set[str] = set()
 
-    def piece(self, drawing: Drawing, matrix: FloatArray, *, hue: int | None = None) -> None:
-        """Add a group for one piece and size, moved by a 2 by 3 matrix [m]."""
+    def piece(
+        self,
+        drawing: Drawing,
+        matrix: FloatArray,
+        *,
+        hue: int | None = None,
+        seams: Mapping[tuple[str, str], Sequence[str]] | None = None,
+    ) -> None:
+        """Add a group for one piece and size, moved by a 2 by 3 matrix [m]; `seams` are the words at its edges."""
         piece = drawing.piece
         key = self._id(f"{piece.name}-{piece.size}" if piece.size else piece.name)
-        group = ET.SubElement(self.root, "g", {"id": key, "data-piece": piece.name, "data-size": piece.size})
+        about = {"data-piece": piece.name, "data-size": piece.size, "data-quantity": str(piece.piece.quantity)}
+        group = ET.SubElement(self.root, "g", {"id": key, **about})
         colour = None if hue is None else self.SIZES[hue % len(self.SIZES)]
         for stroke in drawing.strokes:
             self.stroke(group, stroke, key, matrix, colour)
+            if stroke.role in _SEWN and (sewn := (seams or {}).get((piece.name, stroke.name))):
+                group[-1].set("data-seam", "\n".join(sewn))
         for words in drawing.words:
             self.words(group, words, matrix, colour if words.tag else None)
 

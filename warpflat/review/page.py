@@ -98,6 +98,7 @@ def _page(folder: Path, metrics: Mapping[str, Any], files: Sequence[str], name: 
     sections = [
         ("", summary_cards(metrics)),
         ("From the development to rest", film),
+        ("Worn: from the designed surface to rest", _worn(folder, files)),
         ("Energy, stage by stage", energy_table(metrics)),
         ("Pieces", piece_table(metrics)),
         ("Cuts and darts", ledger_table(metrics)),
@@ -142,6 +143,17 @@ def _pictures(folder: Path, files: Sequence[str]) -> str:
     found = [file for file in files if file.endswith(".png") and file != "contact_sheet.png"]
     found.sort(key=lambda file: (_FIRST.index(file) if file in _FIRST else len(_FIRST), file))
     return "".join(f'<img alt="{escape(file)}" src="{_image(latest_file(folder / file))}">' for file in found)
+
+
+def _worn(folder: Path, files: Sequence[str]) -> str:
+    """Return the moving picture of the drape."""
+    if "drape.webp" not in files:
+        return ""
+    text = base64.b64encode(latest_file(folder / "drape.webp").read_bytes()).decode("ascii")
+    return (
+        f'<img alt="drape.webp" src="data:image/webp;base64,{text}"><p>Front, left side and back, coloured by the gap to the body; '
+        "frames.usdc holds the same in space.</p>"
+    )
 
 
 def _drawings(folder: Path, files: Sequence[str]) -> str:

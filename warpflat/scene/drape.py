@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from warpflat.core.activity import report_activity
+from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named
 
 if TYPE_CHECKING:
@@ -43,4 +44,6 @@ def write_drape(
     with errors_named(scene.where):
         options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
         draped = drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
-    return {"drape": draped.measures()}, write_drape_files(draped, folder, picture=scene.settings.output.picture)
+    output = scene.settings.output
+    files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)
+    return {"drape": draped.measures()}, files

@@ -135,6 +135,7 @@ def files_of_run(scene: Scene) -> list[str]:
         "frames.usdc": FrameSchedule(output).wanted,
         "picture.png": output.picture,
         "drape.png": output.picture and settings.drape is not None,
+        "drape.webp": output.picture and settings.drape is not None and FrameSchedule(output).wanted,
         f"{name}.draped.obj": settings.drape is not None and not garment,
         "review.html": output.picture and output.review,
         "wear.png": worn and garment,

@@ -286,6 +286,8 @@ def _write_garment(
         sample_size=own,
     )
     measured = {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics}
+    if settings.mannequin is not None:
+        measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
     files += pattern.files
     if settings.output.picture and pattern.walked:
         from warpflat.export.picture_walked import write_walked_picture

@@ -1,0 +1,212 @@
+"""Patterns from outside: read, made whole, meshed with meeting seams, placed around a body, lifted to a run's surface."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import ezdxf
+import numpy as np
+import pytest
+from devices import DEVICE
+
+import warpflat
+from warpflat.core.errors import InputError
+from warpflat.draping.drape_pattern import Placement, drape_pattern
+from warpflat.draping.lift import read_lift, whole_lifts
+from warpflat.draping.mesh_pieces import mesh_pieces
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.whole_pieces import whole_pieces
+from warpflat.export.dxf import write_dxf
+from warpflat.export.read_dxf import read_dxf
+from warpflat.export.read_svg import read_svg
+from warpflat.export.svg import write_svg
+from warpflat.pattern.draft import draft_garment
+from warpflat.pattern.pieces import Dart, Edge, Garment, Piece, Seam, SeamSide
+from warpflat.scene.outside_pattern import OutsideJob
+
+
+def polygon(name: str, corners: list[tuple[float, float]], **more: object) -> Piece:
+    """A piece whose edges e1, e2 ... join its corners."""
+    ring = np.array([*corners, corners[0]], dtype=float)
+    edges = [Edge(name=f"e{k + 1}", points=ring[k : k + 2]) for k in range(len(corners))]
+    return Piece(name=name, edges=edges, **more)  # type: ignore[arg-type]
+
+
+def seam(name: str, first: str, second: str, ease: float = 0.0) -> Seam:
+    """Sides "piece.edge + piece.edge"; the second runs against its edges."""
+    sides = [
+        tuple(SeamSide(piece=p, edge=e, reversed=k == 1) for p, e in (word.split(".") for word in text.split(" + ")))
+        for k, text in enumerate((first, second))
+    ]
+    return Seam(name=name, sides=(sides[0], sides[1]), ease=ease)
+
+
+def tube(width: float, height: float, **more: object) -> Garment:
+    """Two rectangles and their side seams."""
+    corners = [(0.0, 0.0), (width, 0.0), (width, height), (0.0, height)]
+    pieces = [polygon(name, corners, **more) for name in ("front", "back")]
+    seams = [seam("side left", "front.e2", "back.e4"), seam("side right", "back.e2", "front.e4")]
+    return Garment(name="tube", pieces={"": pieces}, seams=seams)
+
+
+def darted(legs: str = "dart") -> Piece:
+    corners = [(0.0, 0.0), (0.4, 0.0), (0.4, 0.3), (0.22, 0.3), (0.2, 0.15), (0.18, 0.3), (0.0, 0.3)]
+    piece = polygon("front", corners)
+    edges = [Edge(name=e.name, points=e.points, kind=legs if e.name in ("e4", "e5") else "seam") for e in piece.edges]
+    return Piece(name="front", edges=edges, darts=[Dart(name="bust", left="e4", right="e5")])
+
+
+def test_both_sides_of_a_seam_get_the_same_points():
+    """One side is eased by 10 % and has two edges, between which a dart is closed."""
+    other = polygon("yoke", [(0.0, 0.0), (0.33, 0.0), (0.33, 0.1), (0.0, 0.1)])
+    joined = seam("yoke", "yoke.e1", "front.e6 + front.e3", ease=0.36 / 0.33 - 1.0)
+    pieces, seams, notes = whole_pieces([darted(), other, polygon("spare", [(0, 0), (1, 0), (0, 1)])], [joined])
+    assert notes == ["left out, as no seam joins them: spare"]
+    assert [s.name for s in seams] == ["yoke", "front.bust"]
+    meshes, welds = mesh_pieces(pieces, seams, 0.02)
+    front, yoke = meshes["front"], meshes["yoke"]
+    corner = front.points[front.triangles]
+    areas = 0.5 * np.linalg.det(corner[:, 1:] - corner[:, :1])
+    assert areas.min() > 0.0
+    assert areas.sum() == pytest.approx(0.4 * 0.3 - 0.5 * 0.04 * 0.15, rel=1e-12)
+    along = np.array([yoke.points[vertex][0] for (_, vertex), *_ in welds[0]])
+    assert along[0] == 0.0
+    assert along[-1] == 0.33
+    # Where the edges of the second side meet, three vertices become one.
+    middle = [joint for joint in welds[0] if len(joint) == 3]
+    assert len(middle) == 1
+    assert yoke.points[middle[0][0][1]][0] == pytest.approx(0.165)
+    tip = welds[1][-1]
+    assert {vertex for _, vertex in tip} == {front.edges["e4"][-1]}
+    # The other edge of the right side: eased evenly.
+    first = [front.points[joint[1][1]] for joint in welds[0] if joint[1][1] in front.edges["e6"]]
+    np.testing.assert_allclose(np.array(first)[:, 0], along[: len(first)] * 0.36 / 0.33, atol=1e-9)
+
+
+def test_halves_and_pairs_are_made_whole():
+    half = polygon("front", [(0.0, 0.0), (0.2, 0.0), (0.15, 0.3), (0.0, 0.3)])
+    half = Piece(
+        name="front",
+        edges=[*half.edges[:3], Edge(name="fold", points=half.edges[3].points, kind="fold")],
+    )
+    side = polygon("side", [(0.0, 0.0), (0.1, 0.0), (0.1, 0.3), (0.0, 0.31)], quantity=2)
+    back = [
+        Seam(
+            name="back",
+            sides=((SeamSide(piece="side", edge="e2"),), (SeamSide(piece="side", edge="e2", mirrored=True),)),
+        )
+    ]
+    pieces, seams, _ = whole_pieces([half, side], [seam("side", "front.e2", "side.e4"), *back])
+    assert set(pieces) == {"front", "side", "side mirrored"}
+    assert [edge.name for edge in pieces["front"].edges] == [
+        "e1",
+        "e2",
+        "e3",
+        "e3 mirrored",
+        "e2 mirrored",
+        "e1 mirrored",
+    ]
+    texts = {s.name: tuple(f"{x} {x.reversed}" for chain in s.sides for x in chain) for s in seams}
+    assert texts == {
+        "side": ("front.e2 False", "side.e4 True"),
+        "back": ("side.e2 False", "side mirrored.e2 True"),
+        "side mirrored": ("front.e2 mirrored True", "side mirrored.e4 False"),
+    }
+
+
+@pytest.mark.parametrize("ending", ["dxf", "svg"])
+def test_a_file_of_the_package_names_its_seams(ending: str, tmp_path: Path):
+    other = polygon("yoke", [(0.0, 0.0), (0.33, 0.0), (0.33, 0.1), (0.0, 0.1)])
+    given = Garment(
+        name="trial", pieces={"": [darted(), other]},
+        seams=[seam("yoke", "yoke.e1", "front.e6 + front.e3", ease=0.36 / 0.33 - 1.0)],
+    )  # fmt: skip
+    file = tmp_path / f"trial.{ending}"
+    drafted = draft_garment(given)
+    (write_dxf if ending == "dxf" else write_svg)(drafted, file)
+    found = (read_dxf if ending == "dxf" else read_svg)(file)
+    assert [s.sides for s in found.seams] == [s.sides for s in given.seams]
+    assert found.seams[0].ease == pytest.approx(given.seams[0].ease, rel=1e-5)
+    for piece in found.pieces[""]:
+        lengths = {edge.name: edge.length for edge in piece.edges}
+        asked = {
+            edge.name: edge.length
+            for edge in drafted.pieces[""][[p.name for p in given.pieces[""]].index(piece.name)].edges
+        }
+        assert lengths == pytest.approx(asked, abs=1e-5)
+    assert [(dart.left, dart.right) for dart in found.piece("front", "").darts] == [("e4", "e5")]
+
+
+def test_the_seams_of_another_programs_file_stand_in_a_table(tmp_path: Path):
+    document = ezdxf.new("R12")
+    for name, x in (("FRONT", 0.0), ("BACK", 600.0)):
+        block = document.blocks.new(name)
+        corners = [(x, 0), (x + 480, 0), (x + 480, 300), (x, 300)]
+        block.add_polyline2d([(a - 10, b - 10) for a, b in corners[:1]] + [(x + 490, -10), (x + 490, 310), (x - 10, 310)],
+                             close=True, dxfattribs={"layer": "1"})  # fmt: skip
+        block.add_text(f"PIECE NAME: {name.lower()}", dxfattribs={"layer": "1"})
+        document.modelspace().add_blockref(name, (0, 0))
+    file = tmp_path / "other.dxf"
+    document.saveas(file)
+    with pytest.raises(
+        InputError, match=r'names no seams; give --seams FILE with \[\[seams\]\] sides = \["front.edge_1", "back'
+    ):
+        OutsideJob.read(file, body="EU 38")
+    table = tmp_path / "sewn.toml"
+    table.write_text(
+        'allowance_mm = 10\ntop = "waist"\n[[seams]]\nsides = ["front.edge_2", "back.edge_4"]\n'
+        '[[seams]]\nsides = ["back.edge_2", "front.edge_4"]\n[mannequin]\nsize = "EU 38"\nresolution_mm = 40.0\n'
+    )
+    job = OutsideJob.read(file, sewing=table)
+    edges = {edge.name: edge.length for edge in job.pattern.piece("front", "").edges}
+    assert edges == pytest.approx({"edge_1": 0.48, "edge_2": 0.3, "edge_3": 0.48, "edge_4": 0.3})
+    table.write_text('[[seams]]\nsides = ["front.edge_2", "back.egde_4"]\n')
+    with pytest.raises(InputError, match=r"back.*edge_4"):
+        OutsideJob.read(file, sewing=table, body="EU 38")
+
+
+def test_a_tube_is_put_around_the_body():
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    pattern = tube(0.52, 0.25)
+    worn, _ = drape_pattern(
+        pattern,
+        body,
+        fabric=warpflat.find_fabric("woven"),
+        placement=Placement(spacing=0.03),
+        options=DrapeOptions(max_steps=400),
+        device=DEVICE,
+    )
+    measures = worn.measures()
+    assert measures["compared_with"] == "body"
+    assert measures["deepest_m"] < 1e-4
+    # It encloses the trunk once, the front before it and the back behind it, and is not drawn.
+    front, back = (worn.positions[worn.cloth.welded[rows]] for rows in worn.cloth.piece_vertices.values())
+    assert front[:, 2].mean() > 0.03
+    assert back[:, 2].mean() < -0.03
+    assert abs(measures["strain_weft"]["p95"]) < 0.03
+    with pytest.raises(InputError, match="has no seams"):
+        drape_pattern(Garment(name="rag", pieces={"": list(pattern.pieces[""])}), body, fabric=worn.cloth.fabric)
+    with pytest.raises(InputError, match=r"has no designed surface; name a body"):
+        drape_pattern(pattern, None, fabric=worn.cloth.fabric)
+
+
+def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
+    """A quarter of a cylinder, whose other quarter is its image."""
+    radius = 0.1
+    x, y = (each.ravel() for each in np.meshgrid(np.linspace(0.0, 0.157, 30), np.linspace(0.0, 0.2, 5)))
+    space = np.column_stack([radius * np.sin(x / radius), y, radius * np.cos(x / radius)])
+    i = np.arange(150).reshape(5, 30)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4) + 1
+    rows = [f"v {a} {b} {c}" for a, b, c in space] + [f"vt {a} {b}" for a, b in zip(x, y, strict=True)]
+    (tmp_path / "front.obj").write_text(
+        "\n".join([*rows, *("f " + " ".join(f"{v}/{v}" for v in face) for face in faces)])
+    )
+    half = polygon("front", [(0.0, 0.0), (0.157, 0.0), (0.157, 0.2), (0.0, 0.2)])
+    half = Piece(name="front", edges=[*half.edges[:3], Edge(name="fold", points=half.edges[3].points, kind="fold")])
+    lifts = whole_lifts([half], {"front": read_lift(tmp_path / "front.obj")})
+    points = np.array([[0.1, 0.13], [-0.1, 0.13], [-0.03, 0.02]])
+    found = lifts["front"](points)
+    asked = np.column_stack(
+        [radius * np.sin(points[:, 0] / radius), points[:, 1], radius * np.cos(points[:, 0] / radius)]
+    )
+    np.testing.assert_allclose(found, asked, atol=5e-5)

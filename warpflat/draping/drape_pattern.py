@@ -1,0 +1,165 @@
+"""A pattern from outside is meshed, put around a body by its seams, and draped there."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import warp as wp
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.draping.body import Body
+from warpflat.draping.drape_garment import held_vertices
+from warpflat.draping.lift import Lift, whole_lifts
+from warpflat.draping.mesh_pieces import FlatMesh, Weld, mesh_pieces
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.relax_drape import relax_drape
+from warpflat.draping.result import Drape
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.draping.whole_pieces import whole_pieces
+from warpflat.draping.wrap_pieces import draw_together, wrap_pieces
+from warpflat.fabric.fabric import Fabric
+from warpflat.mannequin.mannequin import Mannequin
+from warpflat.pattern.pieces import Garment, Piece
+from warpflat.surface.connectivity import join_labels
+
+__all__ = ["Placement", "drape_pattern"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Placement:
+    """Where the pieces of a pattern go, and how they are meshed.
+
+    Attributes:
+        at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
+        top: a level of the body or a height [m] for the highest point of what does not hang from the shoulders.
+        lifts: by piece the way to its designed surface, where there is one; it must be there for all of them or for none.
+        size: of the pattern; its sample size if not given.
+        spacing: wished edge of the mesh [m].
+        hold: edges that stay where they are, as "piece.edge", or "edge" for every piece that has one.
+    """
+
+    at: Mapping[str, str] = field(default_factory=dict)
+    top: str | float | None = None
+    lifts: Mapping[str, Lift] = field(default_factory=dict)
+    size: str | None = None
+    spacing: float = 0.01
+    hold: Sequence[str] = ()
+
+
+def drape_pattern(
+    pattern: Garment,
+    body: Mannequin | None,
+    *,
+    fabric: Fabric,
+    placement: Placement | None = None,
+    options: DrapeOptions | None = None,
+    callback: Callable[[int, float], None] | None = None,
+    device: str | None = None,
+) -> tuple[Drape, list[str]]:
+    """Sew a pattern of outlines, put it on a body, and let it come to rest there.
+
+    Without a designed surface the worn cloth is compared with the body.
+
+    Args:
+        pattern: pieces and their seams.
+        body: a mannequin, of a size or on a scan; None for the designed surface itself.
+        fabric: of all pieces.
+        placement: where the pieces go, and how finely they are meshed.
+        options: friction, tolerance and limits.
+        callback: called with the number of steps and the residual now and then.
+        device: Warp device.
+
+    Returns:
+        The drape, and notes.
+
+    Raises:
+        InputError: the pattern has no seams or no such size, a piece cannot be meshed or placed, or an edge is unknown.
+    """
+    placement, options = placement or Placement(), options or DrapeOptions()
+    chosen = pattern.sample if placement.size is None else placement.size
+    pattern.piece(next(iter(pattern.pieces.values()))[0].name, chosen)
+    pieces, seams, notes = whole_pieces(pattern.pieces[chosen], pattern.seams)
+    if not pattern.seams:
+        raise InputError(
+            f"pattern {pattern.name!r} has no seams; name them in a file of [[seams]] and give --seams FILE"
+        )
+    meshes, welds = mesh_pieces(pieces, seams, placement.spacing)
+    where = wp.get_device(device)
+    lifts = whole_lifts(pattern.pieces[chosen], placement.lifts)
+    lifted = set(meshes) <= set(lifts)
+    if lifted:
+        placed = {name: lifts[name](mesh.points) for name, mesh in meshes.items()}
+    elif body is None:
+        raise InputError(f'pattern {pattern.name!r} has no designed surface; name a body: --body "EU 38"')
+    else:
+        placed = wrap_pieces(meshes, welds, body, at=placement.at, top=placement.top)
+    cloth = _sew(pieces, meshes, welds, placed, fabric)
+    surface = None if body is None else body.surface()
+    designed = Body(cloth.designed, cloth.faces, device=where)
+    solid = designed if surface is None else Body(surface.vertices, surface.faces, device=where)
+    if not lifted:
+        cloth = replace(cloth, designed=draw_together(cloth, cloth.designed, solid))
+    held, frames = held_vertices(cloth, placement.hold), list[NDArray[np.float32]]()
+    worn = relax_drape(
+        cloth, solid, options=options, held=held, callback=callback,
+        observer=lambda places: frames.append(places.astype(np.float32)),
+    )  # fmt: skip
+    if not lifted:
+        # What it should lie on is the body below it.
+        cloth, designed = replace(cloth, designed=solid.nearest(worn.positions)[0]), solid
+    return Drape(cloth=cloth, worn=worn, body=solid, designed=designed, options=options, frames=tuple(frames)), notes
+
+
+def _sew(
+    pieces: Mapping[str, Piece],
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    placed: Mapping[str, FloatArray],
+    fabric: Fabric,
+) -> SewnCloth:
+    """Join the meshes along their seams; vertices that become one start in the middle of their places."""
+    counts = [len(mesh.points) for mesh in meshes.values()]
+    ends = np.concatenate([[0], np.cumsum(counts)]).tolist()
+    begins = dict(zip(meshes, ends[:-1], strict=True))
+    pairs = [(begins[a] + i, begins[b] + j) for seam in welds for (a, i), *others in seam for b, j in others]
+    first, second = (np.array(column, dtype=np.int64) for column in zip(*pairs, strict=True))
+    welded = join_labels(ends[-1], first, second)
+    space = np.concatenate([placed[name] for name in meshes])
+    total = np.stack([np.bincount(welded, column) for column in space.T], axis=1)
+    flat_faces = np.concatenate(
+        [np.column_stack([m.triangles + begins[n], np.full(len(m.triangles), -1)]) for n, m in meshes.items()]
+    ).astype(np.int32)
+    sizes = [len(mesh.triangles) for mesh in meshes.values()]
+    places = np.cumsum([0, *sizes]).tolist()
+    warps = np.repeat([_grain(pieces[name]) for name in meshes], sizes, axis=0)
+    lines = {
+        f"{name}.{edge}": welded[row + begins[name]] for name, m in meshes.items() for edge, row in m.edges.items()
+    }
+    inner = {
+        f"{name}.{line}": welded[row + begins[name]] for name, m in meshes.items() for line, row in m.lines.items()
+    }
+    return SewnCloth(
+        fabric=fabric,
+        designed=total / np.bincount(welded)[:, None],
+        faces=np.where(flat_faces >= 0, welded[flat_faces], -1).astype(np.int32),
+        flat_faces=flat_faces,
+        flat=np.concatenate([mesh.points for mesh in meshes.values()]),
+        welded=welded,
+        warp=warps,
+        weft=np.column_stack([warps[:, 1], -warps[:, 0]]),
+        piece_faces={name: slice(places[k], places[k + 1]) for k, name in enumerate(meshes)},
+        piece_vertices={name: slice(begins[name], begins[name] + counts[k]) for k, name in enumerate(meshes)},
+        lines={**inner, **lines},
+    )
+
+
+def _grain(piece: Piece) -> FloatArray:
+    """Return the unit vector of a piece's warp."""
+    if piece.grain is None:
+        return np.array([0.0, 1.0])
+    along = piece.grain[1] - piece.grain[0]
+    return np.asarray(along / np.linalg.norm(along))

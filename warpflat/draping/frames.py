@@ -1,0 +1,184 @@
+"""The way of the cloth from the designed surface to rest: frames in `frames.usdc`, and a small film for the review page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.atomic_files import atomic_path, latest_file
+from warpflat.core.sums import weighted_percentile
+from warpflat.draping.result import Drape
+from warpflat.export.colours import energy_colours, linear_rgb
+from warpflat.export.geometry import area_vectors, vertex_normals
+from warpflat.export.raster import Lighting, rasterise, shade
+from warpflat.export.usd_prims import bounding_box, define_group, export_stage, usd_errors
+from warpflat.surface.triangles import triangulate
+
+__all__ = ["choose_frames", "write_drape_film", "write_drape_frames"]
+
+_COUNT = 30
+# The body is drawn this much smaller [m], so that cloth that lies on it is seen.
+_SHRUNK = 0.003
+_SKIN = (0.80, 0.79, 0.77)
+_RATE, _HEIGHT, _PAPER, _MARGIN = 12, 420, 249, 8
+# Room between the worn garment and the surfaces beside it [m].
+_BESIDE = 0.3
+
+
+def choose_frames(frames: Sequence[NDArray[np.float32]], count: int = _COUNT) -> list[int]:
+    """Return the numbers of frames between which the cloth moves about equally far, the first and the last among them."""
+    if len(frames) <= count:
+        return list(range(len(frames)))
+    ways = [0.0, *(float(np.linalg.norm(b - a, axis=1).mean()) for a, b in pairwise(frames))]
+    # Half by the way and half by time, for what creeps is worth a look too.
+    way = np.cumsum(ways) / max(sum(ways), 1e-12) + np.linspace(0.0, 1.0, len(frames))
+    return sorted({int(np.abs(way - share).argmin()) for share in np.linspace(0.0, 2.0, count)})
+
+
+def write_drape_frames(path: Path, drape: Drape) -> None:
+    """Add `/World/drape` with `body` and `cloth` to a file of frames, after those that it has; or write a new file.
+
+    The cloth's points [m] and colours, by its gap to the body, are sampled over time; before it is draped it lies as designed.
+    `warpflat:stage` is "drape" from there on. All of it lies to the left of the surfaces.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from pxr import Gf, Kind, Sdf, Usd, UsdGeom
+
+    with usd_errors(path):
+        stage = Usd.Stage.CreateInMemory()
+        own = latest_file(path)
+        begin = 1
+        if own.is_file():
+            stage.GetRootLayer().TransferContent(Sdf.Layer.FindOrOpen(str(own)))
+            begin = int(stage.GetEndTimeCode()) + 1
+        else:
+            UsdGeom.SetStageMetersPerUnit(stage, 1.0)
+            UsdGeom.SetStageUpAxis(stage, UsdGeom.Tokens.y)
+            stage.SetStartTimeCode(1)
+            stage.SetTimeCodesPerSecond(24.0)
+            stage.SetFramesPerSecond(24.0)
+            stage.SetDefaultPrim(define_group(stage, "/World", kind=Kind.Tokens.assembly))
+        group = define_group(stage, "/World/drape", kind=Kind.Tokens.component)
+        chosen = choose_frames(drape.frames)
+        stage.SetEndTimeCode(begin + len(chosen) - 1)
+        if begin > 1:
+            width = float(np.ptp(drape.body.vertices[:, 0]))
+            UsdGeom.Xformable(group).AddTranslateOp().Set(Gf.Vec3d(-width - _BESIDE, 0.0, 0.0))
+        tag = group.CreateAttribute("warpflat:stage", Sdf.ValueTypeNames.String, custom=True)
+        tag.Set("drape", begin)
+        body = _define(
+            stage, "/World/drape/body", np.column_stack([drape.body.triangles, np.full(len(drape.body.triangles), -1)])
+        )
+        _points(body, drape.body.vertices, Usd.TimeCode.Default())
+        body.CreateDisplayColorPrimvar(UsdGeom.Tokens.constant).Set([Gf.Vec3f(*linear_rgb(_SKIN).tolist())])
+        cloth = _define(stage, "/World/drape/cloth", drape.cloth.faces)
+        colours = cloth.CreateDisplayColorPrimvar(UsdGeom.Tokens.vertex)
+        widest = _widest(drape)
+        colours.GetAttr().SetCustomData({"quantity": "gap", "unit": "m", "rangeMin": 0.0, "rangeMax": widest})
+        for time, number in enumerate(chosen, start=begin):
+            points = drape.frames[number].astype(np.float64)
+            _points(cloth, points, Usd.TimeCode(time))
+            found = linear_rgb(energy_colours(drape.body.gaps(points), widest)).astype(np.float32)
+            colours.GetAttr().Set(_vectors(found), Usd.TimeCode(time))
+        for attribute in cloth.GetPrim().GetAuthoredAttributes():
+            if attribute.GetNumTimeSamples():
+                attribute.Set(attribute.Get(stage.GetEndTimeCode()))
+    export_stage(stage, path)
+
+
+def _define(stage: Any, path: str, faces: IntArray) -> Any:
+    from pxr import UsdGeom, Vt
+
+    mesh = UsdGeom.Mesh.Define(stage, path)
+    mesh.CreateSubdivisionSchemeAttr(UsdGeom.Tokens.none)
+    mesh.CreateOrientationAttr(UsdGeom.Tokens.rightHanded)
+    mesh.CreateDoubleSidedAttr(True)
+    used = faces >= 0
+    mesh.CreateFaceVertexCountsAttr(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)))
+    mesh.CreateFaceVertexIndicesAttr(Vt.IntArray.FromNumpy(np.ascontiguousarray(faces[used], dtype=np.int32)))
+    return mesh
+
+
+def _points(mesh: Any, points: FloatArray, time: Any) -> None:
+    mesh.CreatePointsAttr().Set(_vectors(points), time)
+    mesh.CreateExtentAttr().Set(_vectors(bounding_box(points.astype(np.float32))), time)
+
+
+def _vectors(rows: Any) -> Any:
+    from pxr import Vt
+
+    return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(rows, dtype=np.float32))
+
+
+def _widest(drape: Drape) -> float:
+    """Return the upper end of the scale of gaps [m]."""
+    return max(0.005, weighted_percentile(drape.gap, drape.areas, 0.98))
+
+
+def write_drape_film(path: Path, drape: Drape) -> None:
+    """Draw the frames from the front, the left and the back as a moving picture, coloured by the gap to the body.
+
+    Raises:
+        InputError: the file cannot be written.
+    """
+    from PIL import Image
+
+    body, widest = drape.body, _widest(drape)
+    normals = vertex_normals(area_vectors(body.vertices, body.triangles), body.triangles, len(body.vertices))
+    inner = body.vertices - _SHRUNK * normals
+    cloth, _ = triangulate(drape.cloth.faces)
+    everything = np.concatenate(drape.frames)
+    low, high = everything.min(axis=0) - 0.1, everything.max(axis=0) + 0.1
+    near = ((inner > low) & (inner < high)).all(axis=1)
+    skin = body.triangles[near[body.triangles].all(axis=1)]
+    pictures = []
+    for number in choose_frames(drape.frames):
+        points = drape.frames[number].astype(np.float64)
+        gap = drape.body.gaps(points)[cloth].mean(axis=1)
+        colours = np.concatenate([energy_colours(gap, widest), np.tile(_SKIN, (len(skin), 1))])
+        joined = np.concatenate([points, inner]), np.concatenate([cloth, skin + len(points)]).astype(np.int32)
+        views = [_view(*joined, colours, (low, high), degrees) for degrees in (0.0, 90.0, 180.0)]
+        pictures.append(Image.fromarray(np.concatenate(views, axis=1)))
+    durations = [1000 // _RATE] * (len(pictures) - 1) + [2000]
+    with atomic_path(path) as temporary:
+        pictures[0].save(
+            temporary, format="WEBP", save_all=True, append_images=pictures[1:], duration=durations, loop=0, quality=80
+        )
+
+
+def _view(
+    points: FloatArray, triangles: IntArray, colours: FloatArray, box: tuple[FloatArray, FloatArray], degrees: float
+) -> Any:
+    """Return a picture of a mesh as seen by somebody who walked `degrees` around it to its left, RGB."""
+    c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
+    turn = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
+    corners = np.array(
+        [[x, y, z] for x in (box[0][0], box[1][0]) for y in (box[0][1], box[1][1]) for z in (box[0][2], box[1][2])]
+    )
+    turned, frame = points @ turn.T, corners @ turn.T
+    low, size = frame.min(axis=0), np.ptp(frame, axis=0)
+    scale = (_HEIGHT - 2 * _MARGIN) / float(size[1])
+    wide = int(2 * np.ceil((float(size[0]) * scale + 2 * _MARGIN) / 2))
+    grid = np.column_stack([
+        2.0 * ((turned[:, 0] - low[0]) * scale + _MARGIN),
+        2.0 * (_HEIGHT - (turned[:, 1] - low[1]) * scale - _MARGIN),
+        turned[:, 2],
+    ])  # fmt: skip
+    samples = rasterise(grid, triangles, (2 * _HEIGHT, 2 * wide))
+    vectors = area_vectors(turned, triangles)
+    lighting = Lighting(
+        normals=vertex_normals(vectors, triangles, len(points)), direction=(-0.3, 0.5, 1.0), back=(0.6, 0.6, 0.6)
+    )
+    pixels = shade(
+        samples, 2, grid, triangles, colours, face=np.arange(len(triangles), dtype=np.int32), lighting=lighting
+    )
+    cover = pixels[..., 3:] / 255.0
+    return np.round(_PAPER * (1.0 - cover) + pixels[..., :3] * cover).astype(np.uint8)

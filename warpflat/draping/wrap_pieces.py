@@ -1,0 +1,267 @@
+"""Flat pieces are wrapped around a body by their seams, and drawn together there: where an outside pattern starts to be draped.
+
+The pieces around the trunk are laid beside and upon each other in the plane, each by the longest seam (longest upwards) that
+joins it to one that lies. The plane is rolled up around the trunk, so that its first and last edge meet. A sleeve is rolled up
+around its arm. Then the seams are closed, and the cloth is drawn together as rigidly as it can be, outside the body, by
+projective dynamics (Bouaziz et al. 2014): each triangle is laid as near to its place as it goes without strain, and one
+sparse factor joins them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.draping.body import Body
+from warpflat.draping.mesh_pieces import FlatMesh, Weld
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.mannequin.mannequin import Mannequin
+
+__all__ = ["draw_together", "wrap_pieces"]
+
+# The trunk is rolled up as an ellipse so many times as wide as deep.
+_WIDTH_OVER_DEPTH = 1.4
+# Sides of a seam that are farther apart than this share of the pieces' width meet behind the body.
+_FAR = 0.25
+# Pieces that hang from the shoulders start this much higher [m].
+_ABOVE = 0.01
+# Rounds at most, and the mean way in one of them after which it is still enough for a start [m].
+_ROUNDS, _STILL = 300, 1e-4
+# The cloth is kept this far off the body [m], with this stiffness over the cloth's, and drawn by this share to where it was.
+_OFF, _HOLD_OFF, _INERTIA = 0.001, 30.0, 0.02
+
+
+@dataclass(frozen=True)
+class _Frame:
+    """Where pieces are rolled up: a point, the direction of their height, that of their middle, and the half axes [m]."""
+
+    origin: FloatArray
+    up: FloatArray
+    front: FloatArray
+
+    def roll(self, flat: FloatArray, width: float, ratio: float) -> FloatArray:
+        """Roll #P by 2 points up around an ellipse of the circumference `width`."""
+        angle = 2.0 * np.pi * flat[:, 0] / width
+        depth = width / (np.pi * (3 * (1 + ratio) - np.sqrt((3 + ratio) * (1 + 3 * ratio))))
+        side = np.cross(self.up, self.front)
+        out = depth * (np.outer(np.cos(angle), self.front) + ratio * np.outer(np.sin(angle), side))
+        return np.asarray(self.origin + out + np.outer(flat[:, 1], self.up))
+
+
+def wrap_pieces(
+    meshes: Mapping[str, FlatMesh],
+    welds: Sequence[Sequence[Weld]],
+    body: Mannequin,
+    *,
+    at: Mapping[str, str] | None = None,
+    top: str | float | None = None,
+) -> dict[str, FloatArray]:
+    """Place the points of each piece (#P by 3 [m]) around a body.
+
+    Args:
+        meshes: the pieces, upright: y runs up along the body, their right side towards the viewer.
+        welds: for each seam the vertices that it joins.
+        body: with its levels.
+        at: by piece "front", "back", "left arm" or "right arm"; others go by their names and seams.
+        top: the highest point of what does not hang from the shoulders: a level of the body or a height [m]; its waist if not given.
+
+    Raises:
+        InputError: a piece hangs together with no other, or a level is unknown.
+    """
+    at = dict(at or {})
+    for name in meshes:
+        if name not in at and (side := _arm_of(name)):
+            at[name] = side
+    trunk = [name for name in meshes if not at.get(name, "").endswith(" arm")]
+    if not trunk:
+        raise InputError("there are sleeves alone; a garment needs a piece around the trunk")
+    fronts = [name for name in trunk if at.get(name) == "front" or (name not in at and "front" in name.lower())]
+    joins = _joins(meshes, welds, set(trunk))
+    plane = _lay_out(meshes, joins, trunk, fronts or trunk[:1])
+    hangs_from_shoulder, width = _girth(plane, joins)
+    points = np.concatenate(list(plane.values()))
+    high = float(points[:, 1].max())
+    if hangs_from_shoulder and top is None:
+        level = float(max(body.line(f"shoulder {side}")[:, 1].max() for side in ("left", "right"))) + _ABOVE
+    else:
+        level = _height(body, "waist" if top is None else top)
+    waist = body.line("waist")
+    origin = np.array([0.0, level - high, 0.5 * (waist[:, 2].min() + waist[:, 2].max())])
+    frame = _Frame(origin, np.array([0.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0]))
+    placed = {name: frame.roll(flat, width, _WIDTH_OVER_DEPTH) for name, flat in plane.items()}
+    for name, side in at.items():
+        if side.endswith(" arm"):
+            placed[name] = _around_arm(meshes[name].points, body, side.removesuffix(" arm"))
+    return placed
+
+
+def _arm_of(name: str) -> str:
+    words = name.lower().replace("_", " ").split()
+    if not any(word.startswith("sleeve") for word in words):
+        return ""
+    return "right arm" if "right" in words or "mirrored" in words else "left arm"
+
+
+def _around_arm(flat: FloatArray, body: Mannequin, side: str) -> FloatArray:
+    """Roll a sleeve up around an arm: its middle above, its highest point at the armhole's."""
+    hole, wrist = body.line(f"armhole {side}"), body.line(f"wrist {side}").mean(axis=0)
+    shoulder = hole[hole[:, 1].argmax()]
+    up = hole.mean(axis=0) - wrist
+    up /= np.linalg.norm(up)
+    front = shoulder - hole.mean(axis=0)
+    front -= (front @ up) * up
+    front /= np.linalg.norm(front)
+    middle = 0.5 * (flat[:, 0].min() + flat[:, 0].max())
+    # The highest point of the cap lies beside the shoulder.
+    beyond = float((shoulder - hole.mean(axis=0)) @ up)
+    frame = _Frame(hole.mean(axis=0) + beyond * up, up, front)
+    return frame.roll(flat - [middle, flat[:, 1].max()], float(np.ptp(flat[:, 0])), 1.0)
+
+
+@dataclass(frozen=True)
+class _Join:
+    """Two pieces and the vertices of each that a seam joins."""
+
+    pieces: tuple[str, str]
+    vertices: tuple[IntArray, IntArray]
+
+    def points(self, points: Mapping[str, FloatArray]) -> tuple[FloatArray, FloatArray]:
+        """Return the points on both sides (#J by 2)."""
+        return points[self.pieces[0]][self.vertices[0]], points[self.pieces[1]][self.vertices[1]]
+
+
+def _joins(meshes: Mapping[str, FlatMesh], welds: Sequence[Sequence[Weld]], trunk: set[str]) -> list[_Join]:
+    """Return what each seam joins of the pieces around the trunk, a piece to itself too."""
+    found = []
+    for seam in welds:
+        pairs: dict[tuple[str, str], list[tuple[int, int]]] = {}
+        for (piece, vertex), *others in seam:
+            for other, its in others:
+                if {piece, other} <= trunk:
+                    pairs.setdefault((piece, other), []).append((vertex, its))
+        for names, rows in pairs.items():
+            first, second = np.array(rows, dtype=np.int32).T
+            found.append(_Join(names, (first, second)))
+    return [join for join in found if len(join.vertices[0]) > 1]
+
+
+def _lay_out(
+    meshes: Mapping[str, FlatMesh], joins: Sequence[_Join], trunk: Sequence[str], fronts: Sequence[str]
+) -> dict[str, FloatArray]:
+    """Shift the trunk's pieces beside each other, each by the seam that reaches highest; the middle of the fronts is at 0."""
+    flat = {name: meshes[name].points for name in trunk}
+    links = []
+    for join in joins:
+        p, q = join.points(flat)
+        if join.pieces[0] != join.pieces[1]:
+            links.append((float(min(np.ptp(p[:, 1]), np.ptp(q[:, 1]))), *join.pieces, (p - q).mean(axis=0)))
+    links.sort(key=lambda link: -link[0])
+    shift = {fronts[0]: np.zeros(2)}
+    while len(shift) < len(trunk):
+        for _, a, b, by in links:
+            if (a in shift) != (b in shift):
+                if a in shift:
+                    shift[b] = shift[a] + by
+                else:
+                    shift[a] = shift[b] - by
+                break
+        else:
+            lost = next(name for name in trunk if name not in shift)
+            raise InputError(
+                f"piece {lost!r} is sewn to no other around the trunk; join it by a seam, or say in [[pieces]] where it is"
+            )
+    plane = {name: points + shift[name] for name, points in flat.items()}
+    width = max(_girth(plane, joins)[1], 1e-6)
+    turn = sum(np.exp(2j * np.pi * plane[name][:, 0] / width).mean() for name in fronts)
+    middle = np.angle(turn) * width / (2 * np.pi)
+    return {name: points - [middle, 0.0] for name, points in plane.items()}
+
+
+def _girth(plane: Mapping[str, FloatArray], joins: Sequence[_Join]) -> tuple[bool, float]:
+    """Return whether the pieces hang from seams over the shoulders, and how far apart the edges lie that meet behind the body [m]."""
+    points = np.concatenate(list(plane.values()))
+    whole, middle = float(np.ptp(points[:, 0])), 0.5 * float(points[:, 1].min() + points[:, 1].max())
+    around, shoulders = [(0.0, whole)], False
+    for join in joins:
+        rows = join.points(plane)
+        apart = abs(float((rows[0] - rows[1])[:, 0].mean()))
+        if apart > _FAR * whole:
+            around.append((float(min(np.ptp(row[:, 1]) for row in rows)), apart))
+            level = float(min(row[:, 1].mean() for row in rows))
+            flat = all(np.ptp(row[:, 0]) > 0.5 * np.ptp(row[:, 1]) for row in rows)
+            shoulders = shoulders or (flat and level > middle)
+    return shoulders, max(around)[1]
+
+
+def _height(body: Mannequin, top: str | float) -> float:
+    if not isinstance(top, str):
+        return float(top)
+    levels = body.levels()
+    if top not in levels:
+        from warpflat.core.errors import nearest
+
+        raise InputError(f"top: level {top!r} is unknown: {nearest(top, levels)}")
+    return levels[top].height
+
+
+def draw_together(cloth: SewnCloth, start: FloatArray, body: Body) -> FloatArray:
+    """Draw sewn cloth together around a body, nearly without strain.
+
+    Args:
+        cloth: the sewn cloth.
+        start: #V by 3, where its vertices are [m].
+        body: what it stays outside of.
+
+    Returns:
+        #V by 3 [m].
+    """
+    corner, _, gradient, area = cloth.cells()
+    count = len(start)
+    # Rows give the derivative of the places along warp and weft in each cell.
+    along = gradient.reshape(-1, 2, 2)
+    weights = np.concatenate([-along.sum(axis=1, keepdims=True), along], axis=1)  # cell, corner, direction
+    rows = np.arange(2 * len(corner)).reshape(-1, 1, 2)
+    places = (np.broadcast_to(rows, weights.shape).ravel(), np.repeat(corner.ravel(), 2))
+    derivative = coo_array((weights.ravel(), places), shape=(2 * len(corner), count)).tocsr()
+    stiffness = np.repeat(area, 2)
+    weight = cloth.vertex_areas()
+    weight = weight / weight.mean()
+    laplacian = derivative.T @ diags_array(stiffness) @ derivative
+    hold = laplacian.diagonal().mean()
+    x = start.copy()
+    outside = np.zeros(count, dtype=bool)
+    factor = None
+    for number in range(_ROUNDS):
+        centre, normal = body.nearest(x)
+        depth = np.einsum("ij,ij->i", x - centre, normal)
+        near = (depth < _OFF) & (np.linalg.norm(x - centre, axis=1) < 0.2)
+        # The factor is renewed where contact has changed, not in every round.
+        if factor is None or number % 10 == 0:
+            outside = near
+            pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
+            factor = splu(csc_array(laplacian + diags_array(pull)))
+        target = np.where((near & outside)[:, None], centre + _OFF * normal, x)
+        pull = hold * (_INERTIA + _HOLD_OFF * _INERTIA * outside)
+        turned = _nearest_isometries((derivative @ x).reshape(-1, 2, 3))
+        right = derivative.T @ (stiffness[:, None] * turned.reshape(-1, 3)) + pull[:, None] * target
+        before, x = x, factor.solve(right)
+        if np.linalg.norm(x - before, axis=1).mean() < _STILL:
+            break
+    return np.asarray(x)
+
+
+def _nearest_isometries(frames: FloatArray) -> FloatArray:
+    """Return the pairs of orthonormal rows nearest to pairs of rows F (#C by 2 by 3): (F F^T)^(-1/2) F, in closed form."""
+    square = np.einsum("cik,cjk->cij", frames, frames)
+    square[:, [0, 1], [0, 1]] += 1e-12
+    root = np.sqrt(square[:, 0, 0] * square[:, 1, 1] - square[:, 0, 1] ** 2)
+    root = np.maximum(root, 1e-12)[:, None, None] * np.eye(2)
+    # The square root of a symmetric 2 by 2 matrix C is (C + sqrt(det C) I) / sqrt(tr C + 2 sqrt(det C)).
+    middle = (square + root) / np.sqrt(np.trace(square + root, axis1=1, axis2=2))[:, None, None]
+    return np.asarray(np.linalg.solve(middle, frames))

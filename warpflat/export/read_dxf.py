@@ -1,0 +1,206 @@
+"""Patterns read from DXF of apparel CAD: the package's own, with the names of edges and seams, and other programs'."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from warpflat.core.arrays import FloatArray
+from warpflat.core.errors import InputError
+from warpflat.core.input_files import note_read
+from warpflat.pattern.outline_edges import chain_edges, find_darts, inset, split_outline
+from warpflat.pattern.pieces import Garment, Piece
+from warpflat.pattern.seam_words import seams_of_words
+
+__all__ = ["outermost", "read_dxf"]
+
+# Curves are flattened to within this [m].
+_FLAT = 2e-5
+_METRES = {"METRIC": 1e-3, "ENGLISH": 0.0254}
+
+
+@dataclass
+class _Block:
+    """What a block holds: lines by layer, points by layer, texts by layer in their order."""
+
+    lines: dict[str, list[tuple[FloatArray, bool]]] = field(default_factory=dict)
+    points: dict[str, list[FloatArray]] = field(default_factory=dict)
+    texts: list[tuple[str, str, FloatArray]] = field(default_factory=list)
+
+    def closed(self, layer: str) -> list[FloatArray]:
+        return [points for points, closed in self.lines.get(layer, []) if closed]
+
+    def value(self, key: str) -> str:
+        return next((text.partition(":")[2].strip() for _, text, _ in self.texts if text.startswith(f"{key}:")), "")
+
+
+def read_dxf(path: str | os.PathLike[str], *, allowance: float | None = None) -> Garment:
+    """Read the pieces of a pattern; the seams too, where the file names them as the package does.
+
+    A block is a piece. Its sewing line is on layer 14, its boundary on layer 1, its grain on layer 7. In a file without such
+    blocks every closed line of the drawing is a piece.
+
+    Args:
+        path: of the file.
+        allowance: from the boundary to the sewing line [m] where a piece has no sewing line; none if not given.
+
+    Raises:
+        InputError: the file cannot be read, has no piece, or an outline does not close.
+    """
+    import ezdxf
+    from ezdxf import recover
+
+    path = Path(path)
+    note_read(path)
+    try:
+        document: Any = recover.readfile(str(path))[0]
+    except FileNotFoundError:
+        raise InputError(f"{path}: no such file") from None
+    except (OSError, ezdxf.DXFError, ValueError, KeyError, AttributeError, TypeError) as error:
+        raise InputError(f"{path}: cannot be read as DXF ({str(error)[:80]})") from None
+    space = document.modelspace()
+    style = _collect(space)
+    metres = _METRES.get(style.value("UNITS").upper(), 1e-3)
+    blocks = [(block.name, _collect(block)) for block in document.blocks if not block.name.startswith("*")]
+    pieces, words = list[Piece](), dict[tuple[str, str], list[tuple[str, str, str]]]()
+    for name, block in blocks:
+        if block.closed("1") or block.closed("14"):
+            pieces.append(_piece(name, block, metres, allowance, words, f"{path}: {name}"))
+    if not pieces:
+        loops = [points for layer in style.lines for points in style.closed(layer)]
+        pieces = [
+            Piece(name=f"piece_{n}", edges=split_outline(inset(ring * metres, allowance or 0.0, f"{path}: piece_{n}")))
+            for n, ring in enumerate(outermost(loops), start=1)
+        ]
+    if not pieces:
+        raise InputError(f"{path}: has no closed line; a piece is a closed line on layer 1 of a block")
+    sizes: dict[str, list[Piece]] = {}
+    for piece in pieces:
+        sizes.setdefault(piece.size, []).append(piece)
+    first = next(iter(sizes))
+    seams = seams_of_words(entry for (size, _), rows in words.items() if size == first for entry in rows)
+    sample = style.value("SAMPLE SIZE")
+    return Garment(
+        name=style.value("STYLE NAME") or path.stem, pieces=sizes, seams=seams,
+        sample_size=sample if sample in sizes else None,
+    )  # fmt: skip
+
+
+def outermost(loops: Iterable[FloatArray]) -> list[FloatArray]:
+    """Return the closed lines (#P by 2) that lie in no other, the largest first."""
+    import shapely
+
+    rings = [(ring, shapely.Polygon(ring)) for ring in loops if len(ring) > 2]
+    rings = sorted((pair for pair in rings if pair[1].area > 0.0), key=lambda pair: -pair[1].area)
+    found: list[tuple[FloatArray, Any]] = []
+    for ring, polygon in rings:
+        if not any(other.contains(polygon.representative_point()) for _, other in found):
+            found.append((ring, polygon))
+    return [ring for ring, _ in found]
+
+
+def _collect(space: Any) -> _Block:
+    from ezdxf.path import make_path
+
+    found = _Block()
+    for entity in space:
+        kind, layer = entity.dxftype(), str(entity.dxf.layer)
+        if kind in ("TEXT", "MTEXT"):
+            text = entity.dxf.text if kind == "TEXT" else entity.plain_text()
+            found.texts.append((layer, str(text).strip(), np.array(tuple(entity.dxf.insert)[:2])))
+        elif kind == "POINT":
+            found.points.setdefault(layer, []).append(np.array(tuple(entity.dxf.location)[:2]))
+        elif kind in ("POLYLINE", "LWPOLYLINE", "LINE", "ARC", "CIRCLE", "SPLINE", "ELLIPSE"):
+            path = make_path(entity)
+            points = np.array([tuple(p)[:2] for p in path.flattening(_FLAT * 1e3)]).reshape(-1, 2)
+            kept = np.concatenate([[True], np.linalg.norm(np.diff(points, axis=0), axis=1) > 1e-9])
+            points = points[kept]
+            if len(points) < 2:
+                continue
+            closed = bool(np.linalg.norm(points[0] - points[-1]) < 1e-6 * max(1.0, float(np.ptp(points))))
+            found.lines.setdefault(layer, []).append((points[:-1] if closed else points, closed))
+    return found
+
+
+def _piece(
+    block_name: str,
+    block: _Block,
+    metres: float,
+    allowance: float | None,
+    words: dict[tuple[str, str], list[tuple[str, str, str]]],
+    where: str,
+) -> Piece:
+    """Return the piece of a block; add what is sewn to its edges to `words`, by size and piece."""
+    name, size = block.value("PIECE NAME") or block_name, block.value("SIZE")
+    quantity = block.value("QUANTITY").split(",")[0].strip()
+    parts, sewn = _named_parts(block, metres)
+    darts = []
+    if parts:
+        edges = chain_edges(parts, where)
+        tips = {t.removeprefix("DART: "): at * metres for _, t, at in block.texts if t.startswith("DART: ")}
+        darts = find_darts(edges, tips, where)
+        words[size, name] = [(name, edge, text) for edge, text in sewn]
+    else:
+        edges = _edges_without_names(block, metres, allowance, where)
+    grain = [points * metres for points, _ in block.lines.get("7", []) if len(points) > 1]
+    return Piece(
+        name=name, size=size, edges=edges, darts=darts, quantity=int(quantity) if quantity.isdigit() else 1,
+        grain=_upwards(grain[0][[0, -1]]) if grain else None, fabric=block.value("FABRIC"),
+    )  # fmt: skip
+
+
+def _upwards(grain: FloatArray) -> FloatArray:
+    return grain if grain[1, 1] >= grain[0, 1] else grain[::-1]
+
+
+def _named_parts(block: _Block, metres: float) -> tuple[list[tuple[str, str, FloatArray]], list[tuple[str, str]]]:
+    """Return name, kind and points of the lines beside which a name stands, and what is sewn to them."""
+    lines = [
+        (layer, points) for layer in ("14", "8", "6") for points, closed in block.lines.get(layer, []) if not closed
+    ]
+    parts, sewn, last = list[tuple[str, str, FloatArray]](), list[tuple[str, str]](), ""
+    # The name stands on a point of its line, and on no other line's.
+    for _, text, at in block.texts:
+        if text.startswith("EDGE: ") and lines:
+            last = text.removeprefix("EDGE: ")
+            off = [_distance(points, at) for _, points in lines]
+            layer, points = lines.pop(int(np.argmin(off)))
+            parts.append((last, {"6": "fold", "8": "dart"}.get(layer, "seam"), points * metres))
+        elif text.startswith("SEAM: ") and last:
+            sewn.append((last, text.removeprefix("SEAM: ")))
+    tips = [at * metres for _, text, at in block.texts if text.startswith("DART: ")]
+    # The legs of a dart that is cut away are on the layer of seams.
+    parts = [
+        (name, "dart" if kind == "seam" and _is_leg(points, tips) else kind, points) for name, kind, points in parts
+    ]
+    return parts, sewn
+
+
+def _is_leg(points: FloatArray, tips: Sequence[FloatArray]) -> bool:
+    return any(np.linalg.norm(points[end] - tip) < 1e-6 for tip in tips for end in (0, -1))
+
+
+def _distance(points: FloatArray, at: FloatArray) -> float:
+    """Return the distance of a point from a line's middle point, or from its points."""
+    middle = points[len(points) // 2] if len(points) > 2 else points.mean(axis=0)
+    return float(np.linalg.norm(middle - at))
+
+
+def _edges_without_names(block: _Block, metres: float, allowance: float | None, where: str) -> list[Any]:
+    """Return the edges of a piece whose file names none: of its sewing line, or of its boundary less the allowance."""
+    sewing = block.lines.get("14", [])
+    if block.closed("14"):
+        return split_outline(max(block.closed("14"), key=len) * metres)
+    if sewing:
+        parts = [(f"edge_{n}", "seam", points * metres) for n, (points, _) in enumerate(sewing, start=1)]
+        return chain_edges(parts, where)
+    ring = max(block.closed("1"), key=len) * metres
+    corners = np.array(block.points.get("2", [])).reshape(-1, 2) * metres
+    if allowance:
+        return split_outline(inset(ring, allowance, where))
+    return split_outline(ring, corners if len(corners) > 1 else None)

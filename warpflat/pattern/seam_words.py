@@ -1,0 +1,57 @@
+"""Seams as words at the edges that they join, for files that know edges alone: DXF and SVG."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+from warpflat.core.errors import InputError
+from warpflat.pattern.pieces import Seam, SeamSide
+
+__all__ = ["seam_words", "seams_of_words"]
+
+
+def seam_words(seams: Iterable[Seam]) -> dict[tuple[str, str], list[str]]:
+    """Return what is written at each edge, by piece and edge: "NAME | side 1 part 1 | against mirrored | ease 0.03 0 1".
+
+    The third part says how the seam runs along the edge, and whether the edge is one of the copy that is cut turned over.
+    """
+    found: dict[tuple[str, str], list[str]] = {}
+    for seam in seams:
+        for number, chain in enumerate(seam.sides, start=1):
+            for part, side in enumerate(chain, start=1):
+                how = ("against" if side.reversed else "with") + (" mirrored" if side.mirrored else "")
+                words = f"{seam.name} | side {number} part {part} | {how}"
+                if seam.ease:
+                    words += f" | ease {seam.ease:.6g} {seam.eased[0]:.6g} {seam.eased[1]:.6g}"
+                found.setdefault((side.piece, side.edge), []).append(words)
+    return found
+
+
+def seams_of_words(found: Iterable[tuple[str, str, str]]) -> list[Seam]:
+    """Return the seams that are written at edges: piece, edge, words of each.
+
+    Raises:
+        InputError: words of another form, or a seam of which one side is missing.
+    """
+    sides: dict[str, tuple[dict[int, SeamSide], dict[int, SeamSide]]] = {}
+    eases: dict[str, Sequence[float]] = {}
+    for piece, edge, words in found:
+        try:
+            name, place, how, *rest = words.split(" | ")
+            _, number, _, part = place.split(" ")
+            chain = sides.setdefault(name, ({}, {}))[int(number) - 1]
+            side = SeamSide(piece=piece, edge=edge, reversed="against" in how, mirrored="mirrored" in how)
+            chain[int(part)] = side
+            if rest:
+                eases[name] = [float(value) for value in rest[0].split(" ")[1:4]]
+        except (ValueError, IndexError):
+            raise InputError(f"seam {words!r} at {piece}.{edge}: must read 'NAME | side 1 part 1 | with'") from None
+    seams = []
+    for name, (first, second) in sides.items():
+        if not (first and second):
+            only = next(iter((first or second).values()))
+            raise InputError(f"seam {name!r} has one side, {only}; its other edge is missing in the file")
+        ease, low, high = eases.get(name, (0.0, 0.0, 1.0))
+        chains = tuple(first[k] for k in sorted(first)), tuple(second[k] for k in sorted(second))
+        seams.append(Seam(name=name, sides=chains, ease=ease, eased=(low, high)))
+    return seams

@@ -1,0 +1,318 @@
+"""A pattern that comes from a file, and a small file that says how it is sewn, are draped on a body."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, Literal
+
+from pydantic import Field
+
+from warpflat.core.errors import InputError
+from warpflat.core.file_names import make_file_name
+from warpflat.core.toml_file import Table, check_table, read_toml
+from warpflat.mannequin.table import MannequinTable, mannequin_from_table
+from warpflat.scene.load import errors_named, expand_variables
+from warpflat.scene.schema import DrapeTable
+from warpflat.scene.write import SceneResult
+
+if TYPE_CHECKING:
+    from warpflat.draping.lift import Lift
+    from warpflat.mannequin.mannequin import Mannequin
+    from warpflat.pattern.pieces import Garment, Piece, Seam
+
+__all__ = ["OutsideJob", "SewingTable", "drape_outside", "edge_table", "is_pattern_file"]
+
+_ENDINGS = (".json", ".dxf", ".svg")
+
+
+class SewnSeamTable(Table):
+    """A seam: two sides that are sewn together, each an edge "piece.edge", or several, "piece.edge + piece.edge".
+
+    Edges run counter-clockwise around their piece. The first side is walked that way, the second the other way, as two edges that
+    lie beside each other are.
+    """
+
+    name: str | None = None
+    sides: Annotated[list[str], Field(min_length=2, max_length=2)]
+
+
+class SewnPieceTable(Table):
+    """What a file does not say of a piece."""
+
+    name: str
+    at: Literal["front", "back", "left arm", "right arm"] | None = None
+    fold: str | None = None
+    """The edge that lies on the fold of the cloth."""
+    quantity: Annotated[int, Field(ge=1, le=2)] | None = None
+    """2 for a piece that is cut twice, the second one turned over: "NAME mirrored"."""
+
+
+class SewingTable(Table):
+    """How the pieces of a file are sewn and worn; every key may be left out."""
+
+    seams: list[SewnSeamTable] = Field(default_factory=list)
+    pieces: list[SewnPieceTable] = Field(default_factory=list)
+    top: str | float | None = None
+    """A level of the body, or a height [m], for the highest point of what does not hang from the shoulders."""
+    allowance_mm: Annotated[float, Field(ge=0, le=100)] | None = None
+    """From the boundary to the sewing line, where the file has none."""
+    fabric: str | None = None
+    mannequin: MannequinTable | None = None
+    spacing_mm: Annotated[float, Field(ge=2, le=50)] = 10.0
+    drape: DrapeTable = Field(default_factory=DrapeTable)
+
+
+@dataclass(frozen=True, kw_only=True)
+class OutsideJob:
+    """A pattern from outside, read and ready to be draped.
+
+    Attributes:
+        name: of its files.
+        pattern: pieces and seams.
+        sewing: how they are sewn and worn.
+        body: what they are put on; None for the designed surface itself.
+        lifts: by piece the way to its designed surface, for the folder of a run.
+        sources: files that were read.
+    """
+
+    name: str
+    pattern: Garment
+    sewing: SewingTable
+    body: Mannequin | None
+    lifts: dict[str, Lift]
+    sources: tuple[Path, ...]
+
+    @classmethod
+    def read(cls, path: Path, *, sewing: Path | None = None, body: str | None = None) -> OutsideJob:
+        """Read a pattern, and how it is sewn.
+
+        Args:
+            path: a run's folder, its pattern.json, a DXF or an SVG.
+            sewing: a TOML file (see :class:`SewingTable`).
+            body: a size or the file of a scan, before that of the sewing file and of the run.
+
+        Raises:
+            InputError: a file cannot be read, a name is unknown, or there is no seam or no body.
+        """
+        from warpflat.core.input_files import listening_to_reads
+
+        sources: list[Path] = []
+        with listening_to_reads(sources.append):
+            table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
+            pattern, lifts, run_body = _read(path, table)
+            with errors_named(str(sewing)):
+                pattern = _sewn(pattern, table)
+            if not pattern.seams:
+                raise InputError(
+                    f"{path}: names no seams; give --seams FILE with [[seams]] sides = "
+                    f"[{', '.join(_examples(pattern))}] (warpflat drape {path.name} --edges prints all edges)"
+                )
+            mannequin = _body(body, table, run_body, path, designed=bool(lifts))
+        name = make_file_name((path if path.is_dir() else path.with_suffix("")).resolve().name)
+        return cls(name=name, pattern=pattern, sewing=table, body=mannequin, lifts=lifts, sources=tuple(sources))
+
+
+def is_pattern_file(path: Path) -> bool:
+    """Return whether a path is that of a pattern rather than of a scene: a folder, or a JSON, DXF or SVG file."""
+    return path.is_dir() or path.suffix.lower() in _ENDINGS
+
+
+def edge_table(path: Path, *, sewing: Path | None = None) -> str:
+    """Return every edge of a pattern's pieces with its length and ends, a line each.
+
+    Raises:
+        InputError: a file cannot be read.
+    """
+    table = SewingTable() if sewing is None else check_table(SewingTable, read_toml(sewing), str(sewing))
+    lines = []
+    pattern = _read(path, table)[0]
+    for piece in pattern.pieces[pattern.sample]:
+        for edge in piece.edges:
+            (x, y), (u, v) = 1e3 * edge.points[[0, -1]]
+            lines.append(
+                f"{piece.name}.{edge.name}: {1e3 * edge.length:.1f} mm, {edge.kind}, from ({x:.0f}, {y:.0f}) to ({u:.0f}, {v:.0f}) mm"
+            )
+    return "\n".join(lines)
+
+
+def _read(path: Path, table: SewingTable) -> tuple[Garment, dict[str, Lift], dict[str, Any] | None]:
+    """Return the pattern, the ways to its designed surface, and the run's table of its body."""
+    from warpflat.draping.lift import read_lift
+    from warpflat.export.read_dxf import read_dxf
+    from warpflat.export.read_pattern_json import read_pattern_json
+    from warpflat.export.read_svg import read_svg
+
+    allowance = None if table.allowance_mm is None else 1e-3 * table.allowance_mm
+    if path.suffix.lower() == ".dxf" and not path.is_dir():
+        return read_dxf(path, allowance=allowance), {}, None
+    if path.suffix.lower() == ".svg" and not path.is_dir():
+        return read_svg(path, allowance=allowance), {}, None
+    folder = path if path.is_dir() else None
+    pattern = read_pattern_json(path / "pattern.json" if folder else path).garment
+    if folder is None:
+        return pattern, {}, None
+    from warpflat.core.input_files import note_read
+
+    lifts = {
+        piece.name: read_lift(folder / f"{piece.name}.obj")
+        for piece in pattern.pieces[pattern.sample]
+        if (folder / f"{piece.name}.obj").is_file()
+    }
+    try:
+        note_read(folder / "metrics.json")
+        metrics = json.loads((folder / "metrics.json").read_text(encoding="utf-8"))
+        found = (metrics.get("mannequin") or {}).get("table")
+    except (OSError, ValueError, AttributeError):
+        found = None
+    return pattern, lifts, found if isinstance(found, dict) else None
+
+
+def _sewn(pattern: Garment, table: SewingTable) -> Garment:
+    """Return the pattern with the folds, quantities and seams of the sewing file, whose seams replace the pattern's.
+
+    Raises:
+        InputError: an unknown piece or edge.
+    """
+    from warpflat.pattern.pieces import Seam
+
+    wanted = {entry.name: entry for entry in table.pieces}
+    for name in wanted:
+        pattern.piece(name, pattern.sample)
+    pieces = {size: [_changed(piece, wanted.get(piece.name)) for piece in row] for size, row in pattern.pieces.items()}
+    seams: list[Seam] = list(pattern.seams)
+    if table.seams:
+        seams = []
+        for number, entry in enumerate(table.seams, start=1):
+            name = entry.name or f"seam {number}"
+            first, second = (
+                tuple(_side(text.strip(), reversed=k == 1) for text in side.split(" + "))
+                for k, side in enumerate(entry.sides)
+            )
+            seams.append(Seam(name=name, sides=(first, second)))
+    return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _changed(piece: Piece, entry: SewnPieceTable | None) -> Piece:
+    if entry is None:
+        return piece
+    edges = list(piece.edges)
+    if entry.fold is not None:
+        place = edges.index(piece.edge(entry.fold))
+        edges[place] = replace(edges[place], kind="fold", allowance=None)
+    return replace(piece, edges=edges, quantity=entry.quantity or piece.quantity)
+
+
+def _side(text: str, *, reversed: bool) -> Any:
+    from warpflat.draping.whole_pieces import MIRRORED
+    from warpflat.pattern.pieces import SeamSide
+
+    piece, _, edge = text.partition(".")
+    if not edge:
+        raise InputError(f'seams: {text!r} must be "piece.edge"')
+    mirrored = piece.endswith(MIRRORED) or edge.endswith(MIRRORED)
+    piece, edge = piece.removesuffix(MIRRORED), edge.removesuffix(MIRRORED)
+    # A mirrored edge runs the other way than the one that it is an image of.
+    return SeamSide(piece=piece, edge=edge, reversed=reversed != mirrored, mirrored=mirrored)
+
+
+def _examples(pattern: Garment) -> list[str]:
+    pieces = list(pattern.pieces[pattern.sample])
+    second = pieces[1] if len(pieces) > 1 else pieces[0]
+    return [f'"{pieces[0].name}.{pieces[0].edges[0].name}"', f'"{second.name}.{second.edges[-1].name}"']
+
+
+def _body(
+    given: str | None, table: SewingTable, run: dict[str, Any] | None, path: Path, *, designed: bool
+) -> Mannequin | None:
+    """Return the body that was asked for, or that of the run; None for the designed surface itself.
+
+    Raises:
+        InputError: there is none, or it cannot be built.
+    """
+    if given is not None:
+        key = "scan" if Path(given).suffix else "size"
+        found = check_table(MannequinTable, {key: given}, "--body")
+    elif table.mannequin is not None:
+        found = table.mannequin
+    elif run is not None:
+        if "scan" in run:
+            raise InputError(f"{path}: was made on the scan {run['scan']!r}; give it with --body FILE")
+        found = check_table(MannequinTable, run, f"{path / 'metrics.json'}: mannequin.table")
+    elif designed:
+        return None
+    else:
+        raise InputError(f'{path}: says nothing of a body; give --body "EU 38" or --body SCAN.obj')
+    with errors_named("--body" if given is not None else "mannequin"):
+        return mannequin_from_table(found, path_of=lambda file: Path(expand_variables(file)))
+
+
+def drape_outside(
+    job: OutsideJob,
+    out: str | Path,
+    *,
+    fabric: str | None = None,
+    size: str | None = None,
+    device: str | None = None,
+) -> SceneResult:
+    """Drape a pattern from outside; write `metrics.json`, `NAME.draped.obj` per piece, `frames.usdc` and pictures, all of them or none.
+
+    Args:
+        job: what is draped.
+        out: folder for the files, made if need be.
+        fabric: a name, before that of the sewing file and of the pattern; "woven" if none of them says one.
+        size: of the pattern; its sample size if not given.
+        device: Warp device.
+
+    Raises:
+        InputError: an unknown fabric or size, a pattern that cannot be meshed, placed or written.
+    """
+    import warp as wp
+
+    from warpflat.core.activity import report_activity
+    from warpflat.core.atomic_files import output_folder
+    from warpflat.core.manifest import remove_stale, require_own_metrics
+    from warpflat.draping.drape_pattern import Placement, drape_pattern
+    from warpflat.draping.options import DrapeOptions
+    from warpflat.draping.write import write_drape_files
+    from warpflat.flattening.result import run_metrics
+
+    table, pattern = job.sewing.drape, job.pattern
+    cloth, notes = _fabric(job, fabric)
+    options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+    at = {entry.name: entry.at for entry in job.sewing.pieces if entry.at is not None}
+    with output_folder(out, ["metrics.json", "drape.png", "drape.webp", "frames.usdc"], sources=job.sources) as folder:
+        require_own_metrics(folder)
+        report_activity("draping")
+        with errors_named(job.name):
+            lifts = job.lifts if size in (None, pattern.sample) else {}
+            placement = Placement(
+                at=at, top=job.sewing.top, lifts=lifts, size=size, spacing=1e-3 * job.sewing.spacing_mm, hold=table.hold
+            )
+            draped, more = drape_pattern(
+                pattern, job.body, fabric=cloth, placement=placement, options=options, device=device
+            )
+        files = [*write_drape_files(draped, folder, frames=True), "frames.usdc", "metrics.json"]
+        body = {} if job.body is None else {"mannequin": job.body.metrics()}
+        measured = run_metrics({}, wp.get_device(device), {**body, "drape": draped.measures()})
+        metrics, stale = remove_stale(folder, measured, name=job.name, files=files)
+    return SceneResult(metrics=metrics, files=tuple(files), notes=(*notes, *more, *stale))
+
+
+def _fabric(job: OutsideJob, name: str | None) -> tuple[Any, Sequence[str]]:
+    """Return the cloth, and a note where it is a guess."""
+    from warpflat.fabric.library import find_fabric, load_library
+
+    library = load_library()
+    asked = name or job.sewing.fabric
+    if asked is not None:
+        return find_fabric(asked, library), ()
+    own = {piece.fabric for piece in job.pattern.pieces[job.pattern.sample]}
+    known = sorted(own & set(library))
+    if known:
+        return find_fabric(known[0], library), ()
+    return find_fabric("woven", library), (
+        "the pattern names no cloth of the library: woven is taken; --fabric names another",
+    )
