@@ -342,6 +342,38 @@ class Corner(Entry):
     """The largest move of the edges that meet there."""
 
 
+class DrawnCurve(Entry):
+    """A stretch of a form's border, drawn as by hand."""
+
+    place: str
+    """The piece and its edge."""
+    seam: str
+    """The seam that it is a side of, or a part of one; "" for a free edge."""
+    book: str
+    """Where a book draws it straight: "all", "below hip" or ""."""
+    straight: bool
+    """Whether it is straight there."""
+    away_mm: float
+    """How far from straight it was there; beyond the bound it stays curved."""
+    inflections_before: int
+    inflections_after: int
+    """How often it changes from bending one way to bending the other, by a degree or more each, before its corners are trued."""
+    shift_mm: float
+    """The largest distance between the two shapes, laid upon each other."""
+    price_j: float
+    """Half the work of the forces that hold it."""
+
+
+class Curves(Entry):
+    """The borders of a form's pieces, drawn as by hand."""
+
+    bound_mm: float
+    """`curves_mm` of the scene."""
+    price_j: float
+    """The model energy that all cost together."""
+    lines: list[DrawnCurve]
+
+
 class WalkedSeam(Entry):
     """The two sides of a seam laid upon each other as near as they come, darts closed."""
 
@@ -446,6 +478,7 @@ class Metrics(Entry):
     sizes: dict[str, dict[str, Any]] | None = None
     """Summaries of graded sizes."""
     pattern: Drawing | None = None
+    curves: Curves | None = None
     corners: list[Corner] | None = None
     walked: list[WalkedSeam] | None = None
     cloths: list[ClothCut] | None = None

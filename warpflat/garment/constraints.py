@@ -1,14 +1,14 @@
-"""Constraints on a border, a line or a dart: straight, of a fixed length, symmetric, a mouth of a given width."""
+"""Constraints on a border, a line or a dart: straight, of a fixed length, symmetric, a mouth of a given width, drawn."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar, Literal
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import segment_lengths
 from warpflat.fabric.fabric import grain_axes
@@ -19,6 +19,7 @@ from warpflat.model.constraint_equations import (
     mirror_equations,
     one_group,
     seam_equations,
+    shape_equations,
     smooth_equations,
     straight_equations,
 )
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
 __all__ = [
     "Constraint",
     "DartMouth",
+    "DrawnLine",
     "FixedLength",
     "KeptGirth",
     "Straight",
@@ -124,31 +126,57 @@ class DartMouth:
         return f"{self.piece}.{self.dart} mouth {wanted}"
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class KeptGirth:
-    """A level that keeps its length on the form in one piece, in all the parts into which darts divide it.
+    """A level with a given girth around all pieces together, which share it as is easiest for them.
 
     Attributes:
-        piece, level: names.
-        lines: names of the parts.
+        level: its name.
+        edges: by piece, #E by 2, vertices.
+        shares: by piece, #E, how much of an edge's length counts in the girth.
+        lengths: by piece, #E [m]: lengths with which the girth is as it should be.
     """
 
-    piece: str
     level: str
-    lines: tuple[str, ...]
+    edges: Mapping[str, IntArray] = field(repr=False)
+    shares: Mapping[str, FloatArray] = field(repr=False)
+    lengths: Mapping[str, FloatArray] = field(repr=False)
     kind: ClassVar[str] = "girth"
 
     @property
     def name(self) -> str:
         """Name for reports."""
-        return f"{self.piece}.{self.level} girth"
+        return f"{self.level} girth"
 
 
-Constraint = Straight | FixedLength | Symmetric | DartMouth | KeptGirth
+@dataclass(frozen=True, kw_only=True, eq=False)
+class DrawnLine:
+    """An edge that has the shape of a drawn line, wherever that lies on the cloth.
+
+    Attributes:
+        piece, line: names.
+        vertices: of the piece, along the edge.
+        shape: #V by 2, where they lie on the drawn line [m].
+    """
+
+    piece: str
+    line: str
+    vertices: IntArray = field(repr=False)
+    shape: FloatArray = field(repr=False)
+    kind: ClassVar[str] = "curve"
+
+    @property
+    def name(self) -> str:
+        """Name for reports."""
+        return f"{self.piece}.{self.line} drawn"
+
+
+PieceConstraint = Straight | FixedLength | Symmetric | DartMouth | DrawnLine
+Constraint = PieceConstraint | KeptGirth
 
 
 def equations_of_constraint(
-    constraint: Constraint, piece: Flattening, fold: IntArray | None = None
+    constraint: PieceConstraint, piece: Flattening, fold: IntArray | None = None
 ) -> tuple[ConstraintEquations, bool]:
     """Return a constraint's equations in the piece's own numbering, and whether they orient the piece on the cloth.
 
@@ -161,9 +189,8 @@ def equations_of_constraint(
     """
     if isinstance(constraint, DartMouth):
         return _mouth_equations(constraint, piece), False
-    if isinstance(constraint, KeptGirth):
-        parts = [FixedLength(piece=constraint.piece, line=line) for line in constraint.lines]
-        return one_group(*(equations_of_constraint(part, piece, fold)[0] for part in parts)), False
+    if isinstance(constraint, DrawnLine):
+        return shape_equations(constraint.vertices, constraint.shape), False
     surface = piece.network.surface
     line = _line(constraint, piece)
     if isinstance(constraint, FixedLength):
@@ -226,7 +253,7 @@ def _line(constraint: FixedLength | Straight | Symmetric, piece: Flattening) -> 
     return line
 
 
-def find_piece(constraint: Constraint, pieces: Mapping[str, Flattening]) -> Flattening:
+def find_piece(constraint: PieceConstraint, pieces: Mapping[str, Flattening]) -> Flattening:
     """Return the piece that a constraint is about.
 
     Raises:

@@ -119,13 +119,18 @@ def seam_ratios(form: FormResult, wishes: Sequence[SeamWish]) -> SeamRatios:
 
 def cap_wishes(form: FormResult, fabric: Fabric, wishes: Sequence[SeamWish] = ()) -> list[SeamWish]:
     """Return wishes for the sleeves' caps that none of `wishes` is about, as the cloth needs them: none for a knit."""
-    if fabric.strain_limit > _WOVEN_STRAIN:
+    if is_knit(fabric):
         return []
     plan = plan_form(form)
     also = {seam.name: plan.of_form[i][0].name for i, seam in enumerate(form.seams)}
     asked = {also.get(wish.name, wish.name) for wish in wishes}
     caps = [seam.name for seam in plan.seams if _is_cap(form, seam) and seam.name not in asked]
     return [SeamWish(name=name, factor=1.0 + _WOVEN_CAP, upper=True) for name in caps]
+
+
+def is_knit(fabric: Fabric) -> bool:
+    """Return whether a fabric stretches as knits do, by its strain limit."""
+    return fabric.strain_limit > _WOVEN_STRAIN
 
 
 def _is_cap(form: FormResult, seam: Seam) -> bool:

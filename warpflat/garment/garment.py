@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from warpflat.core.arrays import IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import expect, expect_callback, expect_each
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.fabric.fabric import DEFAULT_FABRIC, Fabric
@@ -19,7 +19,8 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening, run_metrics, write_files
 from warpflat.garment.constraints import Constraint, DartMouth, FixedLength, Straight, Symmetric
 from warpflat.garment.darts import dart_constraints, dart_pairs, measure_darts
-from warpflat.garment.ease import SeamRatios, SeamWish, seam_ratios
+from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, plan_curves
+from warpflat.garment.ease import SeamRatios, SeamWish, is_knit, seam_ratios
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.girths import girth_constraints, pattern_girths, wearer_fit
@@ -53,6 +54,7 @@ class Garment:
         openings: along its seams.
         finishing: of its free edges, in the pattern.
         pockets: in the pattern.
+        curves: its borders as they are drawn; None if they are as the cloth rests.
     """
 
     name: str
@@ -64,6 +66,7 @@ class Garment:
     openings: Sequence[Opening] = ()
     finishing: Sequence[Finishing] = ()
     pockets: Sequence[Pocket] = ()
+    curves: Curves | None = None
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -160,6 +163,7 @@ class Garment:
             "girths": girths,
             "rings": [ring.as_dict() for ring in self.rings],
             **({} if self.sewn is None else self._sewing()),
+            **({} if self.curves is None else {"curves": self.curves.as_dict()}),
         }
         return run_metrics(pieces, first.network.device, more)
 
@@ -225,6 +229,7 @@ def flatten_form(
     sewn: bool = True,
     wishes: Sequence[SeamWish] = (),
     constraints: Sequence[Constraint] = (),
+    curves_mm: float = CURVES_MM,
     **options: Any,
 ) -> Garment:
     """Flatten every piece of a form from its own datum line, then relax all together so that their seams match.
@@ -238,6 +243,7 @@ def flatten_form(
             keeps its own minimum.
         wishes: fullness and gathers of seams; those of sleeves' caps by cloth are :func:`warpflat.garment.ease.cap_wishes`.
         constraints: on edges and lines of pieces.
+        curves_mm: how far borders may move to be drawn as by hand; 0 leaves them as the cloth rests.
 
     Raises:
         InputError: a piece cannot be flattened, or a wish or constraint names what does not exist; one line says which
@@ -281,9 +287,65 @@ def flatten_form(
     ]  # fmt: skip
     pairs += dart_pairs(form)
     folds = {name: piece.edges[piece.fold] for name, piece in form.pieces.items() if piece.fold}
-    held = (*constraints, *dart_constraints(form), *girth_constraints(form))
+    held = (*constraints, *dart_constraints(form))
     result = sew(pieces, pairs, constraints=held, folds=folds, options=relax)
-    return Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
+    garment = Garment(name=form.name, mannequin=mannequin, form=form, pieces=result.pieces, sewn=result, wished=wished)
+    again = _SewAgain(pairs=pairs, held=held, folds=folds, options=relax)
+    if form.ease and not is_knit(next(iter(pieces.values())).fabric):
+        garment, again = again.with_girths(garment)
+    return again.with_curves(garment, 1e-3 * curves_mm) if curves_mm else garment
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class _SewAgain:
+    """What holds a sewn garment, to relax it again under more.
+
+    Attributes:
+        pairs, held, folds, options: as :func:`warpflat.garment.sewing.sew` takes them.
+    """
+
+    pairs: Sequence[SeamPair]
+    held: Sequence[Constraint]
+    folds: Mapping[str, IntArray]
+    options: RelaxOptions | None
+
+    def __call__(self, garment: Garment, more: Sequence[Constraint]) -> tuple[Garment, Sewn]:
+        """Return the garment under more constraints, and the outcome of that; as it was, where they cannot be kept."""
+        assert garment.sewn is not None
+        outcome = sew(
+            garment.pieces, self.pairs, constraints=[*self.held, *more], folds=self.folds, options=self.options,
+            offsets=garment.sewn.offsets,
+        )  # fmt: skip
+        if not outcome.converged:
+            return garment, outcome
+        return replace(garment, pieces=outcome.pieces, sewn=garment.sewn.followed_by(outcome)), outcome
+
+    def with_girths(self, garment: Garment) -> tuple[Garment, _SewAgain]:
+        """Return the garment with the girths that its form asks for, and what holds it then."""
+        girths = girth_constraints(garment.mannequin, garment.form, _positions(garment))
+        if not girths:
+            return garment, self
+        kept, outcome = self(garment, girths)
+        return kept, replace(self, held=[*self.held, *girths]) if outcome.converged else self
+
+    def with_curves(self, garment: Garment, bound: float) -> Garment:
+        """Return the garment with its borders drawn as by hand, within a bound [m]."""
+        assert garment.sewn is not None
+        plans = plan_curves(garment.mannequin.layout, garment.form, _positions(garment), bound, self.held)
+        if not plans or not garment.sewn.converged:
+            return garment
+        drawn, outcome = self(garment, [plan.line for plan in plans])
+        if not outcome.converged:
+            return garment
+        lines = measure_curves(
+            garment.form, plans, _positions(drawn), [each for each in outcome.results if each.kind == "curve"]
+        )
+        price = outcome.energy_after - garment.sewn.energy_after
+        return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=price, lines=lines))
+
+
+def _positions(garment: Garment) -> dict[str, FloatArray]:
+    return {name: piece.positions for name, piece in garment.pieces.items()}
 
 
 def _callback_by_name(

@@ -2,39 +2,50 @@
 
 from __future__ import annotations
 
-import itertools
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.garment.constraints import KeptGirth
 from warpflat.mannequin.layout import RING_LEVELS
-from warpflat.mannequin.pieces import is_part_of
 from warpflat.mannequin.profiles import convex_girth
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
+    from warpflat.mannequin.layout import Layout
     from warpflat.mannequin.mannequin import Mannequin
+    from warpflat.mannequin.pieces import FormPiece
 
 __all__ = ["girth_constraints", "pattern_girths", "wearer_fit"]
 
 
-def girth_constraints(form: FormResult) -> list[KeptGirth]:
-    """Return constraints that keep the girth of every level with ease, in a form with darts.
+def girth_constraints(mannequin: Mannequin, form: FormResult, positions: Mapping[str, FloatArray]) -> list[KeptGirth]:
+    """Return constraints that give every level of the trunk the ease that a form asks for.
 
-    Cloth would rather lose some of it to strain. Darts give it its shape at a price of few millijoules; without them the
-    strain would only go elsewhere.
+    Cloth at rest loses some of it to strain, or has more elsewhere.
+
+    Args:
+        mannequin: the body.
+        form: on it.
+        positions: by piece, #V by 2, sewn without these constraints [m].
     """
-    if not form.darts:
-        return []
     found = []
-    for level in (level for level, ease in form.ease.items() if ease != 0.0):
-        for name, piece in form.pieces.items():
-            lines = tuple(line for line in piece.surface.lines if is_part_of(line, level))
-            if lines:
-                found.append(KeptGirth(piece=name, level=level, lines=lines))
+    for level, girth in pattern_girths(mannequin, form, positions).items():
+        if "ease_wanted_m" not in girth:
+            continue
+        factor = (girth["body_m"] + girth["ease_wanted_m"]) / girth["pattern_m"]
+        edges = _level_edges(mannequin, form, level)
+        found.append(
+            KeptGirth(
+                level=level,
+                edges={name: own for name, (own, _) in edges.items()},
+                shares={name: shares for name, (_, shares) in edges.items()},
+                lengths={name: factor * _lengths(positions[name], own) for name, (own, _) in edges.items()},
+            )
+        )
     return found
 
 
@@ -53,18 +64,14 @@ def pattern_girths(
         positions: by piece, #V by 2 [m].
     """
     layout = mannequin.layout
-    rows = {level: layout.rings[layout.level_row[level]] for level in RING_LEVELS}
-    lengths = _edge_lengths(form, positions, {int(v) for row in rows.values() for v in row})
     found: dict[str, dict[str, float]] = {}
     for level in reversed(RING_LEVELS):
-        row = rows[level]
-        ring = [*row.tolist(), int(row[0])]
-        own = [_length(lengths, a, b) or _length(lengths, *layout.mirror[[a, b]]) for a, b in itertools.pairwise(ring)]
-        if not all(own):
+        edges = _level_edges(mannequin, form, level)
+        if not edges:
             continue
-        sides = np.diff(form.vertices[ring], axis=0)
-        level_share = np.linalg.norm(sides[:, [0, 2]], axis=1) / np.linalg.norm(sides, axis=1)
-        body, pattern = convex_girth(mannequin.vertices[row]), float(np.dot(own, level_share))
+        row = layout.rings[layout.level_row[level]]
+        pattern = sum(float(_lengths(positions[name], own) @ shares) for name, (own, shares) in edges.items())
+        body = convex_girth(mannequin.vertices[row])
         found[level] = {
             "body_m": body,
             "form_m": convex_girth(form.vertices[row]),
@@ -93,25 +100,47 @@ def wearer_fit(girths: Mapping[str, Mapping[str, float]], limit: float) -> dict[
     return {"fits": all(level["strain"] <= limit for level in levels.values()), "levels": levels}
 
 
-def _edge_lengths(
-    form: FormResult, positions: Mapping[str, FloatArray], wanted: set[int]
-) -> dict[tuple[int, int], list[float]]:
-    """Return the lengths in the pieces of the mannequin's edges between wanted vertices, one per piece and side."""
-    found: dict[tuple[int, int], list[float]] = {}
-    ids = np.array(sorted(wanted))
-    for name, piece in form.pieces.items():
-        corners = piece.surface.faces
-        ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-        ends = np.unique(ends, axis=0)
-        grid = np.sort(piece.grid_vertices[ends], axis=1)
-        own = np.isin(grid, ids).all(axis=1)
-        length = np.linalg.norm(positions[name][ends[own, 0]] - positions[name][ends[own, 1]], axis=1)
-        for (a, b), each in zip(grid[own].tolist(), length.tolist(), strict=True):
-            found.setdefault((a, b), []).append(each)
-    return found
+def _level_edges(mannequin: Mannequin, form: FormResult, level: str) -> dict[str, tuple[IntArray, FloatArray]]:
+    """Return by piece the edges along a level (#E by 2, vertices) and the share by which each counts in its girth.
+
+    Empty where the pieces do not go all around.
+    """
+    layout = mannequin.layout
+    row = layout.rings[layout.level_row[level]]
+    ring = np.column_stack([row, np.roll(row, -1)])
+    side = form.vertices[ring[:, 1]] - form.vertices[ring[:, 0]]
+    level_share = np.linalg.norm(side[:, [0, 2]], axis=1) / np.linalg.norm(side, axis=1)
+    ends = {name: _mesh_edges(piece) for name, piece in form.pieces.items()}
+    keys = {name: _edge_keys(layout, form.pieces[name].grid_vertices[own]) for name, own in ends.items()}
+    shares = {name: np.zeros(len(own)) for name, own in ends.items()}
+    for own_key, image_key, share in zip(
+        _edge_keys(layout, ring).tolist(), _edge_keys(layout, layout.mirror[ring]).tolist(), level_share, strict=True
+    ):
+        places = {name: np.flatnonzero(row == own_key) for name, row in keys.items()}
+        # The right half of a half piece is its left one.
+        if not any(len(at) for at in places.values()):
+            places = {name: np.flatnonzero(row == image_key) for name, row in keys.items()}
+        copies = sum(len(at) for at in places.values())
+        if copies == 0:
+            return {}
+        for name, at in places.items():
+            shares[name][at] += share / copies
+    return {name: (ends[name][own > 0.0], own[own > 0.0]) for name, own in shares.items() if own.any()}
 
 
-def _length(lengths: Mapping[tuple[int, int], list[float]], a: int, b: int) -> float:
-    """Return the mean length of an edge; 0 where no piece has it."""
-    own = lengths.get((min(a, b), max(a, b)), [])
-    return sum(own) / len(own) if own else 0.0
+def _edge_keys(layout: Layout, edges: IntArray) -> NDArray[np.int64]:
+    """Return one number for each edge of the grid (#E by 2), whichever way it runs."""
+    low, high = np.sort(edges.astype(np.int64), axis=1).T
+    return np.asarray(low * layout.vertex_count + high)
+
+
+def _mesh_edges(piece: FormPiece) -> IntArray:
+    """Return the edges of a piece's faces, #E by 2, each once."""
+    corners = piece.surface.faces
+    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
+    return np.unique(ends, axis=0)
+
+
+def _lengths(positions: FloatArray, edges: IntArray) -> FloatArray:
+    """Return the lengths of edges (#E by 2) [m]."""
+    return np.asarray(np.linalg.norm(positions[edges[:, 0]] - positions[edges[:, 1]], axis=1))

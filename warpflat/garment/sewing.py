@@ -13,22 +13,24 @@ up to the energy that all constraints together have cost; `Sewn.cost` is that en
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 import warp as wp
 
 from warpflat.core.activity import report_activity
-from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.flattening.progress import CONTACT
 from warpflat.flattening.result import Flattening
-from warpflat.garment.constraints import Constraint, equations_of_constraint, find_piece
+from warpflat.garment.constraints import Constraint, DrawnLine, KeptGirth, equations_of_constraint, find_piece
 from warpflat.garment.sewing_network import SewingNetwork
 from warpflat.model.constraint_equations import (
     ConstraintEquations,
+    Correction,
+    girth_equations,
     join_equations,
     one_group,
     seam_equations,
@@ -82,7 +84,7 @@ class ConstraintResult:
 
     Attributes:
         name: the seam's or the constraint's; "PIECE fold" of a fold.
-        kind: "seam", "fold", "straight", "length" or "symmetric".
+        kind: "seam", "fold", "straight", "length", "symmetric", "mouth", "girth" or "curve".
         cost: half the work of its forces [J].
         violation: largest error of a seam's two lengths, of a line's whole length, or of a place [m].
     """
@@ -110,6 +112,7 @@ class Sewn:
         energy_before, energy_after: of all pieces, springs and guard [J].
         results: every seam, fold and constraint with its cost, in the order in which they were given.
         seconds: wall clock.
+        offsets: by kind and name of what is held, the offsets of its equations at the end [m].
     """
 
     pieces: Mapping[str, Flattening]
@@ -120,6 +123,7 @@ class Sewn:
     energy_after: float
     results: tuple[ConstraintResult, ...]
     seconds: float
+    offsets: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict, repr=False)
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `metrics.json`."""
@@ -133,6 +137,22 @@ class Sewn:
             "price_j": self.cost,
             "largest_difference_mm": 1e3 * self.largest_difference,
         }
+
+    def followed_by(self, later: Sewn) -> Sewn:
+        """Return the pieces as they lie after they were relaxed again, under more constraints.
+
+        What was held the first time keeps its cost from there; drawn lines are reported with the curves.
+        """
+        amiss = {(each.kind, each.name): each.violation for each in later.results}
+        before = {(each.kind, each.name) for each in self.results}
+        added = [each for each in later.results if (each.kind, each.name) not in before and each.kind != "curve"]
+        return replace(
+            later,
+            steps=self.steps + later.steps,
+            energy_before=self.energy_before,
+            results=(*(replace(each, violation=amiss[each.kind, each.name]) for each in self.results), *added),
+            seconds=self.seconds + later.seconds,
+        )
 
     @property
     def cost(self) -> float:
@@ -157,6 +177,7 @@ def sew(
     constraints: Sequence[Constraint] = (),
     folds: Mapping[str, IntArray] | None = None,
     options: RelaxOptions | None = None,
+    offsets: Mapping[tuple[str, str], FloatArray] | None = None,
 ) -> Sewn:
     """Relax pieces together under their seams and constraints.
 
@@ -166,6 +187,7 @@ def sew(
         constraints: on borders and lines.
         folds: by piece, vertices that must lie on one upright line, exactly.
         options: of the relaxation.
+        offsets: those of an earlier sewing, at whose end the pieces lie.
 
     Raises:
         InputError: a constraint names what does not exist, or a piece cannot be laid with its fold straight.
@@ -193,6 +215,7 @@ def sew(
             target=equations.target,
             lever=equations.lever,
         )
+        _set_offsets(network, equations, kinds, offsets or {})
     # A piece with a guided line needs nothing else to hold it: the line cannot turn.
     alignments = [
         part
@@ -231,7 +254,42 @@ def sew(
             *_fold_results(state, joined, folds, unsewn),
         ),
         seconds=seconds,
+        offsets=_offsets(state.network, equations, kinds),
     )
+
+
+def _held(
+    equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
+) -> Iterator[tuple[tuple[str, str], IntArray]]:
+    """Yield kind and name of every group, and the numbers of those of its equations that have offsets."""
+    lasting = (equations.soft == 0) | (equations.share > 0)
+    for number, (name, kind) in enumerate(kinds):
+        yield (kind, name), np.flatnonzero(lasting & (equations.group == number)).astype(np.int32)
+
+
+def _set_offsets(
+    network: SpringNetwork,
+    equations: ConstraintEquations,
+    kinds: Sequence[tuple[str, str]],
+    known: Mapping[tuple[str, str], FloatArray],
+) -> None:
+    """Begin with the offsets that are known of the same equations."""
+    assert network.seams is not None
+    offset = network.seams.offset.numpy().copy()
+    for key, own in _held(equations, kinds):
+        if len(known.get(key, ())) == len(own):
+            offset[own] = known[key]
+    network.seams.offset.assign(offset)
+
+
+def _offsets(
+    network: SpringNetwork, equations: ConstraintEquations, kinds: Sequence[tuple[str, str]]
+) -> dict[tuple[str, str], FloatArray]:
+    """Return the offsets of every group."""
+    if network.seams is None:
+        return {}
+    offset = network.seams.offset.numpy()
+    return {key: offset[own] for key, own in _held(equations, kinds)}
 
 
 def _constraint_equations(
@@ -249,10 +307,15 @@ def _constraint_equations(
     groups: dict[tuple[str, str], list[ConstraintEquations]] = {}
     oriented: set[str] = set()
     on_fold = {name: joined.numbers(name, ids) for name, ids in folds.items()}
+    # A drawn line keeps its shape: nothing else need keep it smooth.
+    lines = [each for each in constraints if isinstance(each, DrawnLine)]
+    drawn = {vertex for each in lines for vertex in joined.numbers(each.piece, each.vertices).tolist()}
     for seam in seams:
         first, second = (joined.numbers(n, ids) for n, ids in zip(seam.pieces, seam.vertices, strict=True))
         sides = zip((first, second), seam.pieces, strict=True)
-        smooth = [smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides]
+        smooth = [
+            smooth_equations(side, unsewn, on_fold.get(name)) for side, name in sides if not drawn.issuperset(side)
+        ]
         if seam.joints is None:
             sewn = seam_equations(first, second, seam.ratio)
         else:
@@ -260,6 +323,14 @@ def _constraint_equations(
         groups.setdefault((seam.name, "seam"), []).append(one_group(sewn, *smooth))
     equations, kinds = [one_group(*runs) for runs in groups.values()], list(groups)
     for constraint in constraints:
+        if isinstance(constraint, KeptGirth):
+            parts = [
+                girth_equations(joined.numbers(name, edges), constraint.lengths[name], constraint.shares[name])
+                for name, edges in constraint.edges.items()
+            ]
+            equations.append(one_group(*parts))
+            kinds.append((constraint.name, constraint.kind))
+            continue
         own, orients = equations_of_constraint(
             constraint, find_piece(constraint, joined.pieces), folds.get(constraint.piece)
         )
@@ -309,22 +380,22 @@ def _with_overlap_note(piece: Flattening, overlap: float) -> Flattening:
 def _relax(state: Relaxation, equations: ConstraintEquations, gap: float = 0.0) -> ConstrainedOutcome:
     """Relax until all is at rest and the equations hold; with contact, if a gap is given [m]."""
     report_activity("sewing")
-    corrected = equations.soft == 0
+    corrected, correction = equations.soft == 0, Correction(equations)
 
     def on_round(residuals: FloatArray) -> None:
         farthest = np.abs(residuals[corrected]).max(initial=0.0)
         report_activity(f"sewing, step {state.steps}, {1e3 * farthest:.2g} mm amiss")
 
     if factor_pays(state.network, state.options):
-        return relax_under_equations(state, corrected, equations.violation, on_round=on_round, gap=gap)
+        return relax_under_equations(state, correction, equations.violation, on_round=on_round, gap=gap)
     if not len(equations):
         return ConstrainedOutcome(outcome=relax(state), residuals=np.zeros(0), satisfied=True, contradictory=False)
-    return _relax_by_steps(state, corrected, equations.violation, on_round)
+    return _relax_by_steps(state, correction, equations.violation, on_round)
 
 
 def _relax_by_steps(
     state: Relaxation,
-    corrected: BoolArray,
+    correction: Callable[[FloatArray], FloatArray],
     violation: Callable[[FloatArray], float],
     on_round: Callable[[FloatArray], None],
 ) -> ConstrainedOutcome:
@@ -347,7 +418,7 @@ def _relax_by_steps(
             return ConstrainedOutcome(
                 outcome=outcome, residuals=residuals, satisfied=satisfied, contradictory=contradictory
             )
-        seams.offset.assign(seams.offset.numpy() + np.where(corrected, residuals, 0.0))
+        seams.offset.assign(seams.offset.numpy() + correction(residuals))
 
 
 def _constraint_results(

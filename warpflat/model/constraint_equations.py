@@ -14,12 +14,15 @@ from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 
 __all__ = [
     "ConstraintEquations",
+    "Correction",
+    "girth_equations",
     "join_equations",
     "length_equations",
     "level_equations",
     "mirror_equations",
     "one_group",
     "seam_equations",
+    "shape_equations",
     "smooth_equations",
     "straight_equations",
     "stretch_equations",
@@ -34,6 +37,10 @@ _PLACE_TOLERANCE = 5e-5
 # Waves up to this length [m] are kept out of a line of prescribed lengths, by springs of this stiffness over the
 # stiffer thread's where two edges are as long as a wave.
 WAVE, SMOOTH = 0.04, 0.3
+# Stiffness of equations that hold together, over the stiffer thread's.
+_SHARED = 1.0
+# The part of an offset by which the residual of such a group is expected to fall, at first, and at least.
+_RESPONSE, _LEAST_RESPONSE = 0.3, 0.02
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -45,6 +52,8 @@ class ConstraintEquations:
         tolerance: #P, tolerance of |c| [m].
         soft: #P, for equations that are only springs, their stiffness over that of the stiffer thread: their residuals
             are neither corrected nor counted; 0 for all others.
+        share: #P, above 0 for equations that only hold together: the sum of their residuals times their shares is zero. They
+            are soft, and one force acts in all of a group.
         group: #P, the seam or constraint that an equation belongs to.
         sum_tolerance: #groups, tolerance of the absolute sum of its c [m]; infinite where sums mean nothing.
     """
@@ -56,6 +65,7 @@ class ConstraintEquations:
     lever: FloatArray
     tolerance: FloatArray
     soft: FloatArray
+    share: FloatArray
     group: IntArray
     sum_tolerance: FloatArray = field(default_factory=lambda: np.array([np.inf]))
 
@@ -65,13 +75,43 @@ class ConstraintEquations:
 
     def group_sums(self, residuals: FloatArray) -> FloatArray:
         """Return the sum of the residuals (#P [m]) of each group, #groups [m]."""
-        counted = np.where(self.soft > 0, 0.0, residuals)
+        counted = np.where(self.soft > 0, self.share * residuals, residuals)
         return np.bincount(self.group, counted, minlength=len(self.sum_tolerance)).astype(np.float64)
 
     def violation(self, residuals: FloatArray) -> float:
         """Return the largest residual or sum over its tolerance; up to 1 the equations hold."""
         own, sums = np.abs(residuals) / self.tolerance, np.abs(self.group_sums(residuals)) / self.sum_tolerance
         return float(max(own.max(initial=0.0), sums.max(initial=0.0)))
+
+
+class Correction:
+    """The growth of the offsets from round to round (augmented Lagrangian).
+
+    An equation's offset grows by its residual. That of equations that hold together grows by their mean residual over its
+    response to the last growth (secant method).
+    """
+
+    def __init__(self, equations: ConstraintEquations) -> None:
+        self._equations = equations
+        self._weight = np.bincount(equations.group, equations.share, minlength=len(equations.sum_tolerance))
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def __call__(self, residuals: FloatArray) -> FloatArray:
+        """Return by how much the offsets grow (#P [m])."""
+        equations = self._equations
+        change = np.where(equations.soft > 0, 0.0, residuals)
+        together = equations.share > 0
+        if together.any():
+            mean = equations.group_sums(residuals) / np.maximum(self._weight, 1e-300)
+            response = np.full(len(mean), _RESPONSE)
+            if self._last is not None:
+                before, grown = self._last
+                moved = np.abs(grown) > 1e-9
+                np.divide(before - mean, grown, out=response, where=moved)
+            grown = np.where(self._weight > 0, mean / np.clip(response, _LEAST_RESPONSE, 1.0), 0.0)
+            self._last = mean, grown
+            change = np.where(together, grown[equations.group], change)
+        return change
 
 
 def one_group(*equations: ConstraintEquations) -> ConstraintEquations:
@@ -92,6 +132,7 @@ def join_equations(equations: Sequence[ConstraintEquations]) -> ConstraintEquati
         lever=np.concatenate([each.lever for each in equations]),
         tolerance=np.concatenate([each.tolerance for each in equations]),
         soft=np.concatenate([each.soft for each in equations]),
+        share=np.concatenate([each.share for each in equations]),
         group=np.concatenate([np.full(len(each), number, dtype=np.int32) for number, each in enumerate(equations)]),
         sum_tolerance=np.concatenate([each.sum_tolerance for each in equations]),
     )
@@ -150,11 +191,49 @@ def length_equations(line: IntArray, lengths: FloatArray) -> ConstraintEquations
     return _equations(ends, LENGTHS, ratio=0.0, target=lengths, tolerance=_EDGE_TOLERANCE, sum_tolerance=_SUM_TOLERANCE)
 
 
+def girth_equations(edges: IntArray, lengths: FloatArray, shares: FloatArray) -> ConstraintEquations:
+    """Return equations by which edges have a given length together, each counted by its share.
+
+    Args:
+        edges: #E by 2, vertices.
+        lengths: #E [m], lengths with which they have it.
+        shares: #E.
+    """
+    equations = _equations(
+        np.column_stack([edges, edges]), LENGTHS, target=lengths, tolerance=np.inf, sum_tolerance=_SUM_TOLERANCE
+    )
+    return replace(equations, soft=_SHARED * shares, share=shares)
+
+
 def straight_equations(line: IntArray) -> ConstraintEquations:
     """Return equations that put every inner vertex of a row on the straight line between its ends."""
     inner = line[1:-1]
     ends = np.column_stack([inner, np.full(len(inner), line[0]), np.full(len(inner), line[-1]), inner])
     return _equations(ends, STRAIGHT, tolerance=_PLACE_TOLERANCE)
+
+
+def shape_equations(line: IntArray, shape: FloatArray) -> ConstraintEquations:
+    """Return equations that give a row of vertices the shape of a drawn line, wherever that lies on the cloth.
+
+    The middle vertex keeps its distance from the chord between the ends, the middle of each half its distance from the half's
+    chord, and so on. Vertices may slide along the line: the lengths between them are free.
+
+    Args:
+        line: vertices.
+        shape: #line by 2, where they lie on the drawn line [m].
+    """
+    # An odd number of edges is halved so that a row and its mirror image, which may run the other way, have the same equations.
+    triples, spans = [], [(0, len(line) - 1, int(shape[0, 1] < shape[-1, 1]))]
+    for first, last, longer in spans:
+        if last - first > 1:
+            middle = (first + last + longer) // 2
+            triples.append((middle, first, last, middle))
+            spans += [(first, middle, 0), (middle, last, 1)]
+    places = np.array(triples, dtype=np.int32).reshape(-1, 4)
+    here, before, after = (shape[places[:, k]] for k in range(3))
+    chord, away = after - before, here - before
+    distance = (chord[:, 0] * away[:, 1] - chord[:, 1] * away[:, 0]) / np.linalg.norm(chord, axis=1)
+    return _equations(line[places], STRAIGHT, target=distance, tolerance=_PLACE_TOLERANCE)
 
 
 def smooth_equations(line: IntArray, positions: FloatArray, fold: IntArray | None = None) -> ConstraintEquations:
@@ -259,6 +338,7 @@ def _equations(
         lever=np.zeros((count, 4, 2)) if lever is None else lever,
         tolerance=np.full(count, tolerance),
         soft=np.zeros(count),
+        share=np.zeros(count),
         group=np.zeros(count, dtype=np.int32),
         sum_tolerance=np.zeros(0) if sum_tolerance is None else np.array([sum_tolerance]),
     )

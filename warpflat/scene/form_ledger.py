@@ -170,8 +170,8 @@ def trial_of_scene(scene: Scene, *, device: str | None = None) -> FormTrial:
 def _flatten(plan: GarmentPlan, names: Sequence[str] | Mapping[str, Any], scene: Scene | None = None) -> Garment:
     """Flatten some pieces of a plan's form, or of another scene's form on its body, without seams between them."""
     form = plan.form if scene is None else scene_form(scene, plan.mannequin)[1]
-    alone = replace(form, pieces={name: form.pieces[name] for name in names}, seams=())
-    settings = {**plan.settings, "relax": coarse_options(plan.settings["relax"])}
+    alone = replace(form, pieces={name: form.pieces[name] for name in names}, seams=(), ease={})
+    settings = {**plan.settings, "relax": coarse_options(plan.settings["relax"]), "curves_mm": 0.0}
     return flatten_form(plan.mannequin, alone, **settings)
 
 

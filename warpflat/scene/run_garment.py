@@ -14,6 +14,7 @@ from warpflat.fabric.library import as_fabric
 from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
+from warpflat.garment.drawn_curves import CURVES_MM
 from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
@@ -172,6 +173,7 @@ def plan_garment(
         settings={
             "fabric": fabric,
             "grain_angle": settings.grain_angle,
+            "curves_mm": CURVES_MM if settings.curves_mm is None else settings.curves_mm,
             "model": settings.model,
             "wear": scene_wear(scene),
             "relax": relax,

@@ -388,6 +388,9 @@ class SceneTable(Table):
     many of a book's darts as bring the strain within the cloth's limit."""
     ease: str | dict[str, Any] | None = None
     """Wearing ease of a form: a preset (moulage, close, semi-fitted, loose), or a table of levels [cm], with a `preset` for the others."""
+    curves_mm: Annotated[float, Field(ge=0, le=20)] | None = None
+    """How far the borders of a form's pieces may move to be drawn as by hand: without wobble, and straight where a book has them
+    straight; 3 mm if not given, 0 leaves them as the cloth rests."""
     lines: dict[str, LineTable] = Field(default_factory=dict)
     cuts: list[CutTable] = Field(default_factory=list)
     auto_cut: AutoCutTable | None = None
@@ -436,6 +439,8 @@ class SceneTable(Table):
         for key in ("openings", "finishing", "pockets"):
             if getattr(self, key):
                 raise ValueError(f"{key} belongs to a form's pieces; on a [surface] leave it out")
+        if self.curves_mm is not None:
+            raise ValueError("curves_mm belongs to a form's pieces; on a [surface] leave it out")
         if self.ease is not None:
             raise ValueError("ease belongs to a form; a [surface] is as large as its mesh")
         for number, cut in enumerate(self.cuts):

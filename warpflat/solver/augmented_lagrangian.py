@@ -17,7 +17,7 @@ import numpy as np
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import splu
 
-from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.arrays import FloatArray
 from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.contact import NO_CONTACTS, Barrier, ContactPoint
@@ -153,7 +153,7 @@ def _metric(state: Relaxation) -> Solve:
 
 def relax_under_equations(
     state: Relaxation,
-    corrected: BoolArray | None = None,
+    correction: Callable[[FloatArray], FloatArray] = lambda residuals: residuals,
     violation: Callable[[FloatArray], float] = lambda residuals: 0.0,
     *,
     on_round: Callable[[FloatArray], None] | None = None,
@@ -163,7 +163,7 @@ def relax_under_equations(
 
     Args:
         state: where to start, no cell mirrored; holds the relaxed layout afterwards.
-        corrected: #P, whether an equation must hold; the others are springs. All must, if not given.
+        correction: of residuals (#P [m]), by how much the offsets grow.
         violation: of residuals (#P [m]), the largest over its tolerance: up to 1 all equations hold.
         on_round: called after each round with the residuals.
         gap: with contact between stretches of a piece's border, the distance below which it acts [m]; then no piece may lie over
@@ -199,8 +199,7 @@ def relax_under_equations(
                 outcome=outcome, residuals=residuals, satisfied=violations[-1] <= 1.0, contradictory=contradictory
             )
         if network.seams is not None:
-            change = residuals if corrected is None else np.where(corrected, residuals, 0.0)
-            network.seams.offset.assign(network.seams.offset.numpy() + change)
+            network.seams.offset.assign(network.seams.offset.numpy() + correction(residuals))
         is_stale = descent.iterations - factored_at > _STEPS_PER_FACTOR
         if is_stale:
             problem.factor_again()

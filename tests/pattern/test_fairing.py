@@ -1,0 +1,50 @@
+"""Faired lines: without wobble, within their bound, straight where they are to be."""
+
+import numpy as np
+
+from warpflat.core.polyline import turning_angles
+from warpflat.pattern.fairing import count_inflections, fair_line, shortest_wave
+
+ALONG = np.linspace(0.0, 0.3, 61)
+
+
+def wobbly_hip() -> np.ndarray:
+    """Return a side seam that is straight below and bent above, with a wobble of 0.6 mm."""
+    bend = 1.2 * np.maximum(ALONG - 0.18, 0.0) ** 2
+    return np.column_stack([bend + 6e-4 * np.sin(2 * np.pi * ALONG / 0.05), ALONG])
+
+
+def test_inflections_are_bends_both_ways():
+    wave = np.column_stack([ALONG, 0.004 * np.sin(2 * np.pi * ALONG / 0.1)])
+    assert count_inflections(wave) == 5
+    assert count_inflections(wave * [1.0, 0.001]) == 0
+    circle = np.column_stack([np.cos(ALONG * 5), np.sin(ALONG * 5)])
+    assert count_inflections(circle) == 0
+
+
+def test_a_wobble_is_faired_away_within_the_bound():
+    line = wobbly_hip()
+    assert count_inflections(line) > 4
+    wave = shortest_wave(line, 0.003)
+    assert wave is not None
+    faired = fair_line(line, wave)
+    assert faired.inflections == 0
+    assert faired.shift < 0.0015
+    assert shortest_wave(line, 1e-5) is None
+
+
+def test_a_stretch_is_straight_and_a_circle_stays():
+    line = wobbly_hip()
+    straight = line[:, 1] < 0.15
+    faired = fair_line(line, 0.05, straight=straight)
+    assert np.abs(turning_angles(faired.points[straight])).max() < 1e-6
+    angle = np.linspace(0.0, np.pi / 2, 40)
+    circle = 0.1 * np.column_stack([np.cos(angle), np.sin(angle)])
+    assert fair_line(circle, 0.08).shift < 2e-4
+
+
+def test_a_line_meets_the_fold_squarely():
+    across = np.linspace(0.0, 0.2, 40)
+    neck = np.column_stack([across, 0.3 * across + 2.0 * across**2])
+    first = np.diff(fair_line(neck, 0.2, mirrored=(True, False)).points[:2], axis=0)[0]
+    assert abs(np.degrees(np.arctan2(first[1], first[0]))) < 0.35 * np.degrees(np.arctan2(0.3, 1.0))

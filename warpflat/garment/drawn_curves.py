@@ -1,0 +1,233 @@
+"""Borders drawn as by hand: side seams, necklines and hems without wobble, straight where a book has them straight.
+
+Cloth at rest has a border that follows the body's every hollow. Each edge gets the shape of a faired line within a bound of it
+(`warpflat.pattern.fairing`), and the pieces are relaxed again with these shapes as constraints: where the edges lie, and how long they
+are, the cloth decides, so that seams, darts and girths stay as they are. The energy that this costs is the curves' price.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray, IntArray
+from warpflat.core.polyline import turning_angles
+from warpflat.garment.constraints import Constraint, DrawnLine, FixedLength, Straight
+from warpflat.garment.edge_rules import HEMMED_LEVELS
+from warpflat.pattern.fairing import count_inflections, fair_line, shortest_wave
+
+if TYPE_CHECKING:
+    from warpflat.garment.sewing import ConstraintResult
+    from warpflat.mannequin.forms import FormResult
+    from warpflat.mannequin.layout import Layout
+
+__all__ = ["CURVES_MM", "Curves", "DrawnCurve", "PlannedCurve", "measure_curves", "plan_curves"]
+
+#: By default a border is drawn within this of where the cloth would have it [mm].
+CURVES_MM = 3.0
+#: Edges that books draw straight as a whole, if they are so within the bound; hems are, too.
+STRAIGHT_EDGES = ("shoulder", "side", "centre front", "centre back")
+#: An edge is drawn in two where it turns by more than this [rad] at one vertex.
+CORNER = np.radians(30.0)
+#: A wave by which it is measured how far an edge lies from straight [m].
+RULER = 0.05
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class PlannedCurve:
+    """A stretch of an edge and the line that it is to be.
+
+    Attributes:
+        line: the constraint.
+        before: #P by 2, where it lay [m].
+        book: where a book draws it straight: "all", "below hip" or "".
+        straight: whether it is.
+        away: how far from straight it is where a book draws it straight [m].
+    """
+
+    line: DrawnLine
+    before: FloatArray
+    book: str
+    straight: bool
+    away: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class DrawnCurve:
+    """A stretch of a border, drawn.
+
+    Attributes:
+        place: "piece.edge".
+        seam: the seam that it is a side of, or a part of one; "" for a free edge.
+        book: where a book draws it straight: "all", "below hip" or "".
+        straight: whether it is straight there.
+        away_mm: how far from straight that was; beyond the bound it stays curved.
+        inflections_before, inflections_after: how often it changes from bending one way to bending the other.
+        shift_mm: the largest distance between the two shapes, laid upon each other.
+        price_j: half the work of the forces that hold it.
+    """
+
+    place: str
+    seam: str
+    book: str
+    straight: bool
+    away_mm: float
+    inflections_before: int
+    inflections_after: int
+    shift_mm: float
+    price_j: float
+
+
+@dataclass(frozen=True, kw_only=True)
+class Curves:
+    """The drawn borders of a garment.
+
+    Attributes:
+        bound_mm: how far a line may lie from where the cloth would have it.
+        price_j: energy that all cost together.
+        lines: the drawn stretches.
+    """
+
+    bound_mm: float
+    price_j: float
+    lines: tuple[DrawnCurve, ...]
+
+    def as_dict(self) -> dict[str, Any]:
+        """Return the entry `curves` of `metrics.json`."""
+        return {"bound_mm": self.bound_mm, "price_j": self.price_j, "lines": [vars(line) for line in self.lines]}
+
+
+def plan_curves(
+    layout: Layout,
+    form: FormResult,
+    positions: Mapping[str, FloatArray],
+    bound: float,
+    constraints: Sequence[Constraint] = (),
+) -> list[PlannedCurve]:
+    """Return the lines that the edges of a form's pieces are to be.
+
+    Folds, legs of darts and edges that a constraint is about stay. Two edges that are each other's mirror images stay
+    so.
+
+    Args:
+        layout: the body's grid.
+        form: the pieces on it.
+        positions: by piece, #V by 2, sewn [m].
+        bound: how far a line may lie from where the cloth would have it [m].
+        constraints: of the sewing.
+    """
+    ruled = {(each.piece, each.line) for each in constraints if isinstance(each, Straight | FixedLength)}
+    sewn = {
+        (name, edge)
+        for seam in form.seams
+        for run in seam.runs
+        for name, edge in zip(seam.pieces, run.edges, strict=True)
+    }
+    drawn: dict[Any, tuple[IntArray, FloatArray, bool]] = {}
+    plans = []
+    for name, piece in form.pieces.items():
+        on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
+        for edge, vertices in _open_edges(form, name, positions[name]):
+            if (name, edge) in ruled or len(vertices) < 4:
+                continue
+            own, grid = positions[name][vertices], piece.grid_vertices[vertices]
+            mirrored = vertices[0] in on_fold, vertices[-1] in on_fold
+            book, wanted = _book_line(layout, form, grid, piece.parts.get(edge, edge), free=(name, edge) not in sewn)
+            away = fair_line(own, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
+            image = layout.mirror[grid]
+            twin = (name.replace("right", "left"), *min(sorted(grid.tolist()), sorted(image.tolist())))
+            if twin not in drawn:
+                straight = bool(wanted.any()) and away <= bound
+                kept = wanted if straight else None
+                wave = shortest_wave(own, bound, straight=kept, mirrored=mirrored)
+                if wave is None:
+                    continue
+                shape = fair_line(own, wave, straight=kept, mirrored=mirrored).points
+                if (image[::-1] == grid).all():
+                    shape -= shape.mean(axis=0)
+                    shape = 0.5 * (shape + shape[::-1] * [-1.0, 1.0])
+                drawn[twin] = grid, shape, straight
+            first, shape, straight = drawn[twin]
+            if not (first == grid).all():
+                place = {vertex: number for number, vertex in enumerate(first.tolist())}
+                shape = shape[[place[vertex] for vertex in image.tolist()]] * [-1.0, 1.0]
+            line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=shape)
+            plans.append(PlannedCurve(line=line, before=own, book=book, straight=straight, away=away))
+    return plans
+
+
+def measure_curves(
+    form: FormResult,
+    plans: Sequence[PlannedCurve],
+    positions: Mapping[str, FloatArray],
+    results: Sequence[ConstraintResult],
+) -> tuple[DrawnCurve, ...]:
+    """Return what has become of the planned lines.
+
+    Args:
+        form: whose they are.
+        plans: the lines.
+        positions: by piece, #V by 2, with the lines drawn [m].
+        results: of the lines, in their order.
+    """
+    of_edge = {
+        (name, edge): seam.name
+        for seam in form.seams
+        for run in seam.runs
+        for name, edge in zip(seam.pieces, run.edges, strict=True)
+    }
+    measured = []
+    for plan, result in zip(plans, results, strict=True):
+        place, after = (plan.line.piece, plan.line.line), positions[plan.line.piece][plan.line.vertices]
+        measured.append(
+            DrawnCurve(
+                place=".".join(place),
+                seam=of_edge.get(place, ""),
+                book=plan.book,
+                straight=plan.straight,
+                away_mm=1e3 * plan.away,
+                inflections_before=count_inflections(plan.before),
+                inflections_after=count_inflections(after),
+                shift_mm=1e3 * _shift(plan.before, after),
+                price_j=result.cost,
+            )
+        )
+    return tuple(measured)
+
+
+def _open_edges(form: FormResult, name: str, flat: FloatArray) -> Iterator[tuple[str, IntArray]]:
+    """Yield the edges of a piece that are neither a fold nor legs of darts, in parts where they have corners."""
+    piece = form.pieces[name]
+    legs = {leg for dart in piece.darts.values() for leg in dart}
+    for edge, vertices in piece.edges.items():
+        if edge == piece.fold or edge in legs:
+            continue
+        corners = np.flatnonzero(np.abs(turning_angles(flat[vertices])) > CORNER) + 1
+        for first, last in zip([0, *corners], [*corners, len(vertices) - 1], strict=True):
+            yield edge, vertices[first : last + 1]
+
+
+def _book_line(layout: Layout, form: FormResult, grid: IntArray, edge: str, *, free: bool) -> tuple[str, BoolArray]:
+    """Return where a book draws an edge straight, and which of its vertices that are."""
+    heights = form.vertices[grid, 1]
+    hip = float(form.vertices[layout.rings[layout.level_row["hip"]], 1].mean())
+    if free and edge.split(" ")[0] in HEMMED_LEVELS:
+        return "all", np.ones(len(grid), dtype=bool)
+    if edge.startswith("side") and heights.min() < hip - 0.05:
+        return "below hip", heights < hip + 1e-3
+    if edge.startswith(STRAIGHT_EDGES):
+        return "all", np.ones(len(grid), dtype=bool)
+    return "", np.zeros(len(grid), dtype=bool)
+
+
+def _shift(before: FloatArray, after: FloatArray) -> float:
+    """Return the largest distance [m] between two shapes of a line, laid upon each other as near as they come."""
+    import shapely
+
+    first, second = before - before.mean(axis=0), after - after.mean(axis=0)
+    left, _, right = np.linalg.svd(second.T @ first)
+    laid = second @ (left @ np.diag([1.0, np.sign(np.linalg.det(left @ right))]) @ right)
+    return float(shapely.distance(shapely.LineString(laid), shapely.points(first[1:-1])).max())

@@ -1,0 +1,139 @@
+"""Fairing: the smoothest curve near a line of points, with few inflections, as drawn by hand with a ruler and a curve."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from warpflat.core.arrays import BoolArray, FloatArray
+from warpflat.core.polyline import arc_lengths, points_at_lengths
+
+__all__ = ["FairLine", "count_inflections", "fair_line", "shortest_wave"]
+
+#: A line is faired at places this far apart [m], but at no fewer and no more of them than this.
+STEP, FEWEST, MOST = 0.003, 24, 200
+#: A bend counts if the line turns by more than this [rad] before it bends back.
+LEAST_BEND = np.radians(1.0)
+#: Waves that are tried: the first [m], the factor from each to the next, and how many.
+FIRST_WAVE, GROWTH, WAVES = 0.03, 1.3, 20
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FairLine:
+    """A faired line.
+
+    Attributes:
+        points: #P by 2 [m], where the given points come to lie.
+        shift: the largest distance of a given point from the line [m].
+        inflections: of the line.
+    """
+
+    points: FloatArray
+    shift: float
+    inflections: int
+
+
+def count_inflections(points: FloatArray) -> int:
+    """Return how often a line (#P by 2 [m]) changes between bending left and bending right, by a degree or more each."""
+    steps = np.diff(_evenly(points)[1], axis=0)
+    count, sign, low, high = 0, 0, np.inf, -np.inf
+    for angle in np.unwrap(np.arctan2(steps[:, 1], steps[:, 0])).tolist():
+        low, high = min(low, angle), max(high, angle)
+        turned = 1 if angle - low > LEAST_BEND else -1 if high - angle > LEAST_BEND else 0
+        if turned:
+            # The next bend begins where this one ends.
+            count, sign, low, high = count + (sign == -turned), turned, angle, angle
+    return count
+
+
+def fair_line(
+    points: FloatArray,
+    wave: float,
+    *,
+    straight: BoolArray | None = None,
+    mirrored: tuple[bool, bool] = (False, False),
+) -> FairLine:
+    """Return the line p that minimises the integral of |p - p0|^2 + (wave / 2 pi)^6 |p'''|^2 along its length.
+
+    A wave of the given length loses half of its height, a shorter one more. Circles stay nearly as they are: what is
+    kept small is the change of curvature (Moreton and Sequin 1992).
+
+    Args:
+        points: #P by 2 [m], p0.
+        wave: [m].
+        straight: #P, points in a row that come to lie on one straight line, if some do.
+        mirrored: whether the line goes on beyond its first and its last point as its mirror image in an upright line.
+    """
+    places, even = _evenly(points)
+    arc = arc_lengths(points)
+    is_straight = np.zeros(len(even), dtype=bool)
+    if straight is not None and straight.any():
+        ends = arc[straight][[0, -1]] + places[1] * np.array([-1.0, 1.0])
+        is_straight = (places >= ends[0]) & (places <= ends[1])
+    first = 0
+    for at_end in (False, True):
+        if mirrored[at_end]:
+            image = even * [-1.0, 1.0] + [2.0 * even[-1 if at_end else first, 0], 0.0]
+            added = slice(-2, None, -1) if at_end else slice(None, 0, -1)
+            rows = [(even, image[added]), (is_straight, is_straight[added])]
+            even, is_straight = (np.concatenate(row if at_end else row[::-1]) for row in rows)
+            first += 0 if at_end else len(image) - 1
+    basis = _straight_basis(is_straight)
+    bend = (wave / (2 * np.pi * places[1])) ** 3 * np.diff(basis, n=3, axis=0)
+    solved = np.linalg.solve(basis.T @ basis + bend.T @ bend, basis.T @ even)
+    smooth = (basis @ solved)[first : first + len(places)]
+    # Points keep their shares of the length.
+    reached = arc_lengths(smooth)
+    placed = points_at_lengths(smooth, np.interp(arc, places, reached))
+    return FairLine(points=placed, shift=_distance(points, smooth), inflections=count_inflections(smooth))
+
+
+def shortest_wave(
+    points: FloatArray,
+    bound: float,
+    *,
+    straight: BoolArray | None = None,
+    mirrored: tuple[bool, bool] = (False, False),
+) -> float | None:
+    """Return the shortest wave that makes the fewest inflections within a bound [m]; None if every wave breaks the bound."""
+    best: tuple[int, float] | None = None
+    for wave in FIRST_WAVE * GROWTH ** np.arange(WAVES):
+        tried = fair_line(points, float(wave), straight=straight, mirrored=mirrored)
+        if tried.shift > bound:
+            break
+        if best is None or tried.inflections < best[0]:
+            best = tried.inflections, float(wave)
+    return None if best is None else best[1]
+
+
+def _evenly(points: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return lengths along a line [m] that are evenly apart, and the points there (#P by 2 [m])."""
+    arc = arc_lengths(points)
+    places = np.linspace(0.0, arc[-1], int(np.clip(np.ceil(arc[-1] / STEP), FEWEST, MOST)))
+    return places, points_at_lengths(points, places)
+
+
+def _straight_basis(is_straight: BoolArray) -> FloatArray:
+    """Return the points as sums of free ones (#P by #F): points in a straight row lie between the ends of the row."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], is_straight, [False]]).astype(np.int8)))
+    basis = np.eye(len(is_straight))
+    inner = np.zeros(len(is_straight), dtype=bool)
+    for first, end in edges.reshape(-1, 2):
+        last = end - 1
+        share = (np.arange(first + 1, last) - first) / max(last - first, 1)
+        basis[first + 1 : last] = 0.0
+        basis[first + 1 : last, first], basis[first + 1 : last, last] = 1.0 - share, share
+        inner[first + 1 : last] = True
+    return basis[:, ~inner]
+
+
+def _distance(points: FloatArray, line: FloatArray) -> float:
+    """Return the largest distance of a point from a line that goes on straight beyond its ends [m]."""
+    import shapely
+
+    reach = 0.02
+    ends = [line[0] - line[1], line[-1] - line[-2]]
+    away = [reach * end / max(float(np.linalg.norm(end)), 1e-12) for end in ends]
+    longer = np.vstack([line[0] + away[0], line, line[-1] + away[1]])
+    return float(shapely.distance(shapely.LineString(longer), shapely.points(points)).max())
