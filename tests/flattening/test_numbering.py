@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
+from warpflat.solver.options import RelaxOptions
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.mesh import Surface
 from warpflat.surface.repair.validate import make_surface
-from warpflat.surface.shapes import bodice
+from warpflat.surface.shapes import bodice, make_shape
 
 IntArray = NDArray[np.int32]
 WIDTH = 21
@@ -28,9 +29,11 @@ def split(faces: IntArray, first: int) -> IntArray:
     return np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
 
 
-def flattened(vertices: NDArray[np.float64], faces: IntArray, datum: IntArray, fabric: str) -> Flattening:
+def flattened(
+    vertices: NDArray[np.float64], faces: IntArray, datum: IntArray, fabric: str, relax: RelaxOptions | None = None
+) -> Flattening:
     surface = make_surface(vertices, faces, lines={"datum": datum})
-    return flatten(surface, datum="datum", fabric=fabric)
+    return flatten(surface, datum="datum", fabric=fabric, relax=relax)
 
 
 def cost(result: Flattening) -> tuple[float, float]:
@@ -45,12 +48,14 @@ def assert_same_cost(ours: Flattening, theirs: Flattening) -> None:
     assert max(work, most) <= 1.3 * min(work, most)
 
 
-@pytest.fixture(scope="module", params=["isotropic", "woven"])
+@pytest.fixture(scope="module", params=["isotropic quads", "woven quads", "woven triangles", "linen triangles"])
 def whole(request: pytest.FixtureRequest) -> Flattening:
-    return flattened(WHOLE.vertices, WHOLE.faces, WHOLE.lines["centre"], request.param)
+    fabric, kind = request.param.split()
+    faces = WHOLE.faces if kind == "quads" else split(WHOLE.faces, 0)
+    return flattened(WHOLE.vertices, faces, WHOLE.lines["centre"], fabric)
 
 
-@hypothesis.settings(max_examples=8, deadline=None)
+@hypothesis.settings(max_examples=6, deadline=None)
 @hypothesis.given(
     order=st.sampled_from(["kept", "rows and columns exchanged", "permuted"]),
     faces_sorted=st.booleans(),
@@ -78,10 +83,11 @@ def test_a_grid_costs_the_same_however_it_is_numbered_and_wound(
         number = rng.permutation(count)
     vertices = np.empty_like(WHOLE.vertices)
     vertices[number] = WHOLE.vertices
-    faces = number[WHOLE.faces]
+    faces = number[WHOLE.faces if whole.surface.is_quad.all() else split(WHOLE.faces, seed % 2)]
+    sides = faces.shape[1]
     faces = faces[np.argsort(faces.min(axis=1))] if faces_sorted else faces[rng.permutation(len(faces))]
     turns = rng.integers(4, size=len(faces)) if first_corner is None else np.full(len(faces), first_corner)
-    faces = np.take_along_axis(faces, (turns[:, None] + np.arange(4)) % 4, axis=1)
+    faces = np.take_along_axis(faces, (turns[:, None] + np.arange(sides)) % sides, axis=1)
     if reversed_winding:
         faces = faces[:, ::-1]
     c, s = np.cos(turn), np.sin(turn)
@@ -89,15 +95,31 @@ def test_a_grid_costs_the_same_however_it_is_numbered_and_wound(
     assert_same_cost(flattened(vertices, faces, number[WHOLE.lines["centre"]], whole.fabric.name), whole)
 
 
+@pytest.mark.parametrize("fabric", ["isotropic", "denim"])
 @pytest.mark.parametrize("reversed_winding", [False, True])
-def test_both_diagonals_of_a_split_grid_cost_the_same(reversed_winding: bool) -> None:
+def test_both_diagonals_of_a_split_grid_cost_the_same(reversed_winding: bool, fabric: str) -> None:
     """The bodice is its own mirror image, so that the two differ in their numbers only."""
     centre = WHOLE.lines["centre"]
     first, second = (
-        flattened(WHOLE.vertices, faces[:, ::-1] if reversed_winding and k else faces, centre, "isotropic")
+        flattened(WHOLE.vertices, faces[:, ::-1] if reversed_winding and k else faces, centre, fabric)
         for k, faces in enumerate((split(WHOLE.faces, 0), split(WHOLE.faces, 1)))
     )
     assert_same_cost(first, second)
+
+
+@pytest.mark.parametrize("fabric", ["woven", "linen"])
+def test_directions_are_followed_until_little_is_left(fabric: str) -> None:
+    """Springs follow the directions of their layout. Where these were measured too seldom, linen ended 0.7 % and 1.5 mm away."""
+    shape = make_shape("dome", resolution=15)
+    border = border_of(shape)
+    strict = RelaxOptions(energy_left=0.0, energy_tolerance=1e-9, residual_tolerance=1e-4)
+    ends = [
+        flattened(shape.vertices * [0.6, 1.0, 1.0], split(shape.faces, 0), shape.lines["centre"], fabric, relax)
+        for relax in (None, strict)
+    ]
+    way = np.diff([end.positions[border] - end.positions[border].mean(axis=0) for end in ends], axis=0)[0]
+    assert np.linalg.norm(way, axis=1).max() <= 2e-4
+    assert cost(ends[0])[0] == pytest.approx(cost(ends[1])[0], rel=TOLERANCE)
 
 
 @pytest.mark.parametrize("model", ["springs", "membrane"])

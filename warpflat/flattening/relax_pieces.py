@@ -1,7 +1,8 @@
 """Pieces are relaxed here, several side by side: from a layout to the network that is measured in it, to the minimum of its energy.
 
-On triangles and under a stretch the network depends on the layout in which its directions are measured. Such a piece is relaxed in
-rounds, and its directions are updated between them.
+On triangles and under a stretch the network depends on the layout in which its directions are measured. L-BFGS measures them anew every
+few iterations, so that its estimate of what is left knows what follows from them. Any other scheme relaxes such a piece in rounds, and
+its directions are updated between them.
 """
 
 from __future__ import annotations
@@ -34,7 +35,7 @@ from warpflat.solver.grain_alignment import grain_alignments
 from warpflat.solver.multigrid.coarsen import can_coarsen, coarsenings_of, is_coarsest
 from warpflat.solver.multigrid.solve import multigrid_pays, relax_multilevel
 from warpflat.solver.options import RelaxOptions
-from warpflat.solver.quasi_newton import quasi_newton_pays, relax_quasi_newton
+from warpflat.solver.quasi_newton import Measure, quasi_newton_pays, relax_quasi_newton
 from warpflat.solver.relax import relax
 from warpflat.solver.relaxation import Relaxation
 from warpflat.surface.connectivity import components_of
@@ -137,6 +138,16 @@ class RelaxationTask:
         """
         return development.method == "harmonic" and not development.as_rigid and not self.fabric.is_isotropic
 
+    def follows_layout(self, network: SpringNetwork) -> bool:
+        """Return whether the energy of the piece's network depends on the layout in which it is measured."""
+        springs = self.model == "springs"
+        return self._is_tight or (springs and (not self.fabric.is_isotropic or network.spring_arrays.long_quads > 0))
+
+    @property
+    def _is_tight(self) -> bool:
+        """Whether the lengths for an intended stretch depend on the layout."""
+        return self.wear is not None and self.wear.is_tight and (self.model == "springs" or bool(self.wear.pressure))
+
     def max_direction_updates(self, *, mended: bool = False) -> int:
         """Return how many times directions are updated at most.
 
@@ -146,10 +157,8 @@ class RelaxationTask:
         Args:
             mended: whether folds of the development were repaired.
         """
-        springs = self.model == "springs"
         alike = self.fabric.is_isotropic or bool(self.surface.is_quad.all())
-        tight = self.wear is not None and self.wear.is_tight and (springs or bool(self.wear.pressure))
-        return _MAX_UPDATES if tight or (springs and not alike) else int(mended or not alike)
+        return _MAX_UPDATES if self._is_tight or (self.model == "springs" and not alike) else int(mended or not alike)
 
     def report_progress(self, stage: str, state: Relaxation, piece: int) -> None:
         """Call the callback with the state of this piece at the last convergence check; it may stop the relaxation."""
@@ -384,6 +393,9 @@ class _Batch:
                 [task.build_isotropic_network(start[at]) for task, at in zip(self._tasks, own, strict=True)], start
             )
             self._update_directions(scheme)
+        if scheme == "quasi-newton":
+            follows = self._tasks[0].follows_layout(self._state.network)
+            return self._round(scheme, measure=self._measure if follows else None)
         for _ in range(direction_updates):
             if self._update_directions(scheme) <= _SETTLED_SHIFT:
                 break
@@ -419,19 +431,29 @@ class _Batch:
         before = state.positions()
         self._round(scheme, least_gain=_ROUND_GAIN)
         layout = state.positions()
-        self._put(
-            [task.build_network(layout[own]) for task, own in zip(self._tasks, state.vertex_ranges, strict=True)],
-            layout,
-        )
-        after = self._state
+        after = self._measure(layout, layout)
         after.steps, after.restarts, after.work_units = state.steps, state.restarts, state.work_units
         return max(_moved(before[own], layout[own]) for own in state.vertex_ranges)
 
-    def _round(self, scheme: Scheme, *, least_gain: float | None = None) -> Outcome:
+    def _measure(self, layout: FloatArray, directions: FloatArray) -> Relaxation:
+        """Return the state that goes on from a layout (#V by 2 [m]), with directions measured in another one."""
+        own = self._state.vertex_ranges
+        self._put([task.build_network(directions[at]) for task, at in zip(self._tasks, own, strict=True)], layout)
+        return self._state
+
+    def _round(
+        self,
+        scheme: Scheme,
+        *,
+        least_gain: float | None = None,
+        measure: Measure | None = None,
+    ) -> Outcome:
         listens = any(task.callback is not None for task in self._tasks)
         each_step = self._each_step if listens else None
         if scheme == "quasi-newton":
-            return relax_quasi_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
+            return relax_quasi_newton(
+                self._state, measure=measure, least_gain=least_gain, watch=self._watch, each_step=each_step
+            )
         if scheme == "gauss-newton":
             return relax_gauss_newton(self._state, least_gain=least_gain, watch=self._watch, each_step=each_step)
         if scheme == "steps":

@@ -22,6 +22,8 @@ from warpflat.solver.convergence import Outcome
 from warpflat.solver.grain_alignment import align_grain, remove_rotation
 from warpflat.solver.quasi_newton import Descent, Metric, Point, Solve
 from warpflat.solver.relaxation import Relaxation
+from warpflat.solver.remainder import Remainder, RemainderEstimate
+from warpflat.surface.connectivity import border_of
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
@@ -237,9 +239,11 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
     if not np.isfinite(point.energy):
         return None
     descent, at_rest = Descent(problem, point), False
+    estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
     most = min(_MOST_ITERATIONS, state.options.max_steps)
     while not at_rest and descent.iterations < most and descent.step():
-        at_rest = descent.is_at_rest(state.options)
+        left = estimate.add(descent.point.energy, descent.point.positions)
+        at_rest = left.is_small(state.options) or descent.is_at_rest(state.options)
     residual = problem.residual(descent.point)
     end = descent.point.positions.copy()
     align_grain(state.alignments, end)
@@ -255,4 +259,5 @@ def relax_with_contact(state: Relaxation, gap: float) -> Outcome | None:
         residual=residual,
         energies=state.energies(),
         seconds=time.perf_counter() - began,
+        left=left if np.isfinite(left.outline_mm) else None,
     )

@@ -25,11 +25,11 @@ from warpflat.solver.grain_alignment import GrainAlignment, align_grain
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relax import Watch
 from warpflat.solver.relaxation import Relaxation
-from warpflat.solver.remainder import Remainder, RemainderEstimate
+from warpflat.solver.remainder import REMEMBERED, Remainder, RemainderEstimate
 from warpflat.surface.connectivity import border_of
 from warpflat.surface.laplacian import factor_pays, laplacian_of
 
-__all__ = ["Descent", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
+__all__ = ["Descent", "Measure", "Metric", "Point", "Problem", "quasi_newton_pays", "relax_quasi_newton"]
 
 # Corrections that L-BFGS remembers.
 _MEMORY = 8
@@ -44,6 +44,12 @@ _LONGER = 4.0
 _LEAST_FRACTION, _ARMIJO = 1e-16, 1e-4
 # Work units of an iteration: two evaluations of the forces and the solution; and of each layout that is tried.
 _WORK, _TRIAL_WORK = 3.0, 0.5
+
+# A rise of the energy from one measurement of directions to the next, as a share, that makes them follow the layout by less.
+_RISE = 1e-4
+
+Measure = Callable[[FloatArray, FloatArray], Relaxation]
+"""Returns the state to go on with from a layout, with directions measured in another one, each #V by 2 [m]."""
 
 Solve = Callable[[FloatArray], FloatArray]
 
@@ -135,32 +141,54 @@ class Metric:
 
 
 class _Memory:
-    """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4)."""
+    """The last corrections of L-BFGS (Nocedal and Wright, algorithm 7.4), all of them in one product (Byrd et al. 1994)."""
 
-    def __init__(self) -> None:
-        self._pairs: list[tuple[FloatArray, FloatArray, float]] = []
+    def __init__(self, numbers: int) -> None:
+        # Rows are used in turn; the oldest is overwritten.
+        self._steps, self._changes = np.empty((2, _MEMORY, numbers))
+        self._order: list[int] = []
+        # Scalar product of the step in each row with the change in each.
+        self._table = np.zeros((_MEMORY, _MEMORY))
 
     @property
     def is_empty(self) -> bool:
         """True if nothing is remembered."""
-        return not self._pairs
+        return not self._order
+
+    def clear(self) -> None:
+        """Forget everything."""
+        self._order = []
 
     def add(self, step: FloatArray, change: FloatArray) -> None:
         """Remember a step and the change of the gradient along it, if the energy is convex there."""
         curvature = dot(step, change)
-        if curvature > 1e-12 * math.sqrt(dot(step, step) * dot(change, change)):
-            self._pairs = [*self._pairs, (step, change, 1.0 / curvature)][-_MEMORY:]
+        if curvature <= 1e-12 * math.sqrt(dot(step, step) * dot(change, change)):
+            return
+        row = self._order[0] if len(self._order) == _MEMORY else len(self._order)
+        self._order = [*self._order[-_MEMORY + 1 :], row]
+        self._steps[row], self._changes[row] = step.ravel(), change.ravel()
+        used = len(self._order)
+        self._table[:used, row] = _products(self._steps[:used], change)
 
     def direction(self, gradient: FloatArray, solve: Solve) -> FloatArray:
         """Return the direction of descent."""
-        q, shares = gradient.copy(), []
-        for step, change, scale in reversed(self._pairs):
-            shares.append(scale * dot(step, q))
-            q -= shares[-1] * change
-        z = solve(q)
-        for (step, change, scale), share in zip(self._pairs, reversed(shares), strict=True):
-            z += step * (share - scale * dot(change, z))
-        return -z
+        if self.is_empty:
+            return -solve(gradient)
+        used, order = len(self._order), self._order
+        steps, changes = self._steps[:used], self._changes[:used]
+        # Each step times the changes that came with and after it.
+        table = np.triu(self._table[np.ix_(order, order)])
+        share = np.empty(used)
+        share[order] = np.linalg.solve(table, _products(steps, gradient)[order])
+        z = solve(gradient - np.einsum("i,ij->j", share, changes).reshape(gradient.shape))
+        own = np.empty(used)
+        own[order] = np.linalg.solve(table.T, np.diag(table) * share[order] - _products(changes, z)[order])
+        return -z - np.einsum("i,ij->j", own, steps).reshape(z.shape)
+
+
+def _products(rows: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Return the scalar products of rows (#N by #M) with vectors of #M numbers."""
+    return np.asarray(np.einsum("ij,j->i", rows, vectors.ravel()))
 
 
 class Descent(Generic[P]):
@@ -177,13 +205,14 @@ class Descent(Generic[P]):
     def __init__(self, problem: Problem[P], start: P) -> None:
         self._problem = problem
         self.point, self.history = start, [start.energy]
-        self._gradient, self._memory, self._fraction = problem.gradient(start), _Memory(), 1.0
+        self._gradient, self._memory, self._fraction = problem.gradient(start), _Memory(start.positions.size), 1.0
         self.tried, self.release, self.is_stuck = 1, np.inf, False
 
     @property
     def gain(self) -> float:
-        """The energy that the last few iterations have released together [J]; infinite if there were fewer."""
-        return self.history[-1 - _REST_INTERVAL] - self.history[-1] if len(self.history) > _REST_INTERVAL else np.inf
+        """The range of the last few energies, which the iterations between have released [J]; infinite if there were fewer."""
+        last = self.history[-1 - _REST_INTERVAL :]
+        return max(last) - min(last) if len(last) > _REST_INTERVAL else np.inf
 
     @property
     def iterations(self) -> int:
@@ -218,7 +247,8 @@ class Descent(Generic[P]):
             if self._memory.is_empty:
                 self.is_stuck = True
                 return False
-            self._memory, self._fraction = _Memory(), 1.0
+            self._memory.clear()
+            self._fraction = 1.0
         gradient = self._problem.gradient(new)
         self._memory.add(new.positions - self.point.positions, gradient - self._gradient)
         self.point, self._gradient = new, gradient
@@ -228,7 +258,7 @@ class Descent(Generic[P]):
     def renew(self, *, forget: bool = False) -> None:
         """Evaluate the present point again, as the energy has changed, and forget past corrections if the metric has."""
         if forget:
-            self._memory = _Memory()
+            self._memory.clear()
         self.point = self._problem.at(self.point.positions)
         self._gradient = self._problem.gradient(self.point)
         self.history[-1] = self.point.energy
@@ -251,27 +281,52 @@ class _Cloth:
     """The energy of a network alone."""
 
     def __init__(self, state: Relaxation) -> None:
-        self._state = state
+        self.state = state
         self._solve = Metric(state.network, state.alignments).solver()
 
     def at(self, positions: FloatArray) -> Point:
         """Evaluate a layout."""
-        self._state.position.assign(positions)
-        return Point(positions=positions, energy=float(self._state.potentials().sum()))
+        self.state.position.assign(positions)
+        return Point(positions=positions, energy=float(self.state.potentials().sum()))
 
     def gradient(self, point: Point) -> FloatArray:
         """Return the gradient of the energy, #V by 2 [N]."""
-        self._state.position.assign(point.positions)
-        return -self._state.forces()
+        self.state.position.assign(point.positions)
+        return -self.state.forces()
 
     def solver(self, point: Point) -> Solve:
         """Return the solution by the metric, which is the same everywhere."""
         return self._solve
 
 
+class _Directions:
+    """The layout in which the directions of springs are measured.
+
+    It is the present one. On slivers of soft cloth that makes short edges swing to and fro for ever. So once the energy rises, the layout
+    follows the present one by half the way only, then by a quarter, and so on.
+    """
+
+    def __init__(self, measure: Measure, positions: FloatArray) -> None:
+        self._measure, self._layout = measure, positions
+        self._share, self._energy = 1.0, np.inf
+
+    def renew(self, state: Relaxation, point: Point) -> Relaxation:
+        """Return the state to go on with from a point."""
+        self._layout = self._layout + self._share * (point.positions - self._layout)
+        new = self._measure(point.positions, self._layout)
+        new.steps, new.restarts, new.work_units = state.steps, state.restarts, state.work_units
+        new.has_status, new.status = True, state.status
+        energy = float(new.potentials().sum())
+        if energy > (1.0 + _RISE) * self._energy:
+            self._share *= 0.5
+        self._energy = energy
+        return new
+
+
 def relax_quasi_newton(
     state: Relaxation,
     *,
+    measure: Measure | None = None,
     least_gain: float | None = None,
     watch: Watch | None = None,
     each_step: Watch | None = None,
@@ -280,6 +335,7 @@ def relax_quasi_newton(
 
     Args:
         state: where to start, no cell mirrored; holds the relaxed layout afterwards.
+        measure: measures the springs' directions anew, if the energy depends on them.
         least_gain: stop, at rest or not, once some iterations release no more than this share of the energy; if given.
         watch: called every few iterations with the state, its energies and the residual.
         each_step: called after every iteration, with the energies and the residual of the last check.
@@ -295,6 +351,7 @@ def relax_quasi_newton(
         return state.make_outcome(steps_before, work_before, began_at=began_at)
     descent, options = Descent(problem, point), state.options
     estimate, left = RemainderEstimate(border_of(state.network.surface)), Remainder()
+    directions = None if measure is None else _Directions(measure, start)
 
     done = False
     while not done:
@@ -303,6 +360,9 @@ def relax_quasi_newton(
         state.work_units = work_before + descent.work_units
         if moved and each_step is not None:
             each_step(state, state.status.total, state.status.worst_residual)
+        if directions is not None and descent.iterations % REMEMBERED == 0:
+            problem.state = state = directions.renew(state, descent.point)
+            descent.renew()
         left = estimate.add(descent.point.energy, descent.point.positions)
         near = left.is_small(options) or descent.is_at_rest(options)
         done = not moved or state.work_units - work_before >= options.max_steps

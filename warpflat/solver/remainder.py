@@ -10,11 +10,11 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.solver.options import RelaxOptions
 
-__all__ = ["Remainder", "RemainderEstimate"]
+__all__ = ["REMEMBERED", "Remainder", "RemainderEstimate"]
 
 # So many iterations are looked back upon. What follows them releases at most so many times their energy, and moves the outline at most so
 # many times as far: measured on draped meshes, split grids and forms (`benchmarks/stopping.py` measures it on others).
-_INTERVAL = 6
+REMEMBERED = 6
 _ENERGY_FACTOR, _OUTLINE_FACTOR = 10.0, 4.0
 # No estimate is smaller: a share of the energy, and a distance [m].
 _LEAST_SHARE, _LEAST_DISTANCE = 1e-4, 5e-5
@@ -53,7 +53,7 @@ class RemainderEstimate:
             border: the vertices of the outline.
         """
         self._border = border
-        self._last: deque[tuple[float, FloatArray]] = deque(maxlen=_INTERVAL + 1)
+        self._last: deque[tuple[float, FloatArray]] = deque(maxlen=REMEMBERED + 1)
 
     def add(self, energy: float, positions: FloatArray) -> Remainder:
         """Add the layout of the next iteration and return what is left after it; infinite after few iterations.
@@ -64,13 +64,14 @@ class RemainderEstimate:
         """
         outline = positions[self._border]
         self._last.append((energy, outline))
-        if len(self._last) <= _INTERVAL:
+        if len(self._last) <= REMEMBERED:
             return Remainder()
-        before, there = self._last[0]
-        moved = outline - there
+        moved = outline - self._last[0][1]
         moved -= moved.mean(axis=0)
         distance = float(np.linalg.norm(moved, axis=1).max(initial=0.0))
-        share = (before - energy) / max(energy, 1e-300)
+        energies = [each for each, _ in self._last]
+        # The range: where directions have been measured anew the energy may also have risen.
+        share = (max(energies) - min(energies)) / max(energy, 1e-300)
         return Remainder(
             energy_share=max(_ENERGY_FACTOR * share, _LEAST_SHARE),
             outline_mm=1e3 * max(_OUTLINE_FACTOR * distance, _LEAST_DISTANCE),
