@@ -9,15 +9,31 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull
 
 
-def section_parts(mesh: trimesh.Trimesh, height: float) -> list[np.ndarray]:
-    """Return the connected parts of a level section, each #P by 2 (x, z), largest box first."""
-    ends = np.asarray(trimesh.intersections.mesh_plane(mesh, [0, 1, 0], [0, height, 0])).reshape(-1, 3)
-    _, key = np.unique(np.round(ends * 1e7).astype(np.int64), axis=0, return_inverse=True)
-    key = key.ravel()
+def plane_parts(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
+    """Return the connected parts of a plane section, each #P by 3."""
+    away = (mesh.vertices.view(np.ndarray) - at) @ normal
+    # trimesh sorts the signs of all faces; only those that reach the plane are given to it.
+    signs = (away > 1e-7).astype(np.int8) - (away < -1e-7)
+    a, b, c = mesh.faces.view(np.ndarray).T
+    near = np.flatnonzero(np.abs(signs[a] + signs[b] + signs[c]) < 3)
+    if not len(near):
+        return []
+    ends = np.asarray(trimesh.intersections.mesh_plane(mesh, normal, at, local_faces=near, cached_dots=away)).reshape(
+        -1, 3
+    )
+    if not len(ends):
+        return []
+    places = np.round(ends * 1e7).astype(np.int64) @ np.array([1, 2**27, 2**54])
+    key = np.unique(places, return_inverse=True)[1].ravel()
     graph = coo_matrix((np.ones(len(key) // 2), (key[::2], key[1::2])), (key.max() + 1,) * 2)
     label = connected_components(graph, directed=False)[1][key]
-    parts = [ends[label == i][:, [0, 2]] for i in range(label.max() + 1)]
-    return sorted(parts, key=lambda p: -np.prod(np.ptp(p, axis=0)))
+    return [ends[label == i] for i in range(label.max() + 1)]
+
+
+def section_parts(mesh: trimesh.Trimesh, height: float) -> list[np.ndarray]:
+    """Return the connected parts of a level section, each #P by 2 (x, z), largest box first."""
+    parts = plane_parts(mesh, np.array([0.0, height, 0.0]), np.array([0.0, 1.0, 0.0]))
+    return sorted((p[:, [0, 2]] for p in parts), key=lambda p: -np.prod(np.ptp(p, axis=0)))
 
 
 def _trunk(mesh: trimesh.Trimesh, height: float) -> np.ndarray:

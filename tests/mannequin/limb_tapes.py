@@ -4,23 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
-from body_tapes import section_parts
+from body_tapes import plane_parts, section_parts
 from scipy.ndimage import gaussian_filter1d
 from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components, dijkstra
+from scipy.sparse.csgraph import dijkstra
 from scipy.spatial import ConvexHull
 
 
 def _parts(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> list[np.ndarray]:
-    """Return the connected parts of a plane section, each #P by 3."""
-    ends = np.asarray(trimesh.intersections.mesh_plane(mesh, normal, at)).reshape(-1, 3)
-    if not len(ends):
-        return []
-    key = np.unique(np.round(ends * 1e7).astype(np.int64), axis=0, return_inverse=True)[1].ravel()
-    graph = coo_matrix((np.ones(len(key) // 2), (key[::2], key[1::2])), (key.max() + 1,) * 2)
-    label = connected_components(graph, directed=False)[1][key]
-    parts = [ends[label == i] for i in range(label.max() + 1)]
-    return [p for p in parts if len(p) > 5]
+    """Return the connected parts of a plane section that are more than slivers, each #P by 3."""
+    return [p for p in plane_parts(mesh, at, normal) if len(p) > 5]
 
 
 def _girth(points: np.ndarray, normal: np.ndarray) -> float:
@@ -28,9 +21,16 @@ def _girth(points: np.ndarray, normal: np.ndarray) -> float:
     return float(ConvexHull(points @ axes.T).area)
 
 
+def _near(parts: list[np.ndarray], at: np.ndarray) -> np.ndarray:
+    """Return the largest part with its middle within 30 mm of a point, or else the nearest: noise leaves slivers."""
+    away = [float(np.linalg.norm(0.5 * (p.min(axis=0) + p.max(axis=0)) - at)) for p in parts]
+    near = [p for p, d in zip(parts, away, strict=True) if d < max(0.03, min(away) + 1e-9)]
+    return max(near, key=lambda p: np.linalg.norm(np.ptp(p, axis=0)))
+
+
 def _tape(mesh: trimesh.Trimesh, at: np.ndarray, normal: np.ndarray) -> tuple[float, float]:
-    """Return height and girth [m] of a tape across `normal` around the part of the section whose middle is nearest."""
-    part = min(_parts(mesh, at, normal), key=lambda p: np.linalg.norm(0.5 * (p.min(axis=0) + p.max(axis=0)) - at))
+    """Return height and girth [m] of a tape across `normal` around the largest part of the section with its middle near."""
+    part = _near(_parts(mesh, at, normal), at)
     return float(0.5 * (part[:, 1].min() + part[:, 1].max())), _girth(part, normal)
 
 
@@ -105,9 +105,10 @@ def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple
         # Across the line instead of along equal ways over the surface, which lie askew where an arm is bent.
         towards = np.gradient(gaussian_filter1d(line, 3.0, axis=0, mode="nearest"), axis=0)
         for i, (at, normal) in enumerate(zip(line.copy(), towards, strict=True)):
-            parts = _parts(mesh, at, normal)
-            boxes = [0.5 * (p.min(axis=0) + p.max(axis=0)) for p in parts if np.ptp(p, axis=0).max() < 0.13 * stature]
-            line[i] = min(boxes, key=lambda m: np.linalg.norm(m - at), default=at)
+            parts = [p for p in _parts(mesh, at, normal) if np.ptp(p, axis=0).max() < 0.13 * stature]
+            if parts:
+                part = _near(parts, at)
+                line[i] = 0.5 * (part.min(axis=0) + part.max(axis=0))
     misses = []
     for joint in bands[8:-8]:
         bones = np.column_stack([np.ones_like(bands), bands - joint, np.maximum(bands - joint, 0.0)])
@@ -131,14 +132,17 @@ def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple
     palm = v[tip] - wrist
     length = np.linalg.norm(palm)
     axis = palm / length
-    split = []
-    for s in np.arange(0.3, 0.62, 0.01) * length:
+    palms: list[tuple[int, float, float]] = []
+    for s in np.arange(0.3, 0.64, 0.01) * length:
         parts = [
             p for p in _parts(mesh, wrist + s * axis, axis) if np.linalg.norm(p.mean(axis=0) - wrist - s * axis) < 0.1
         ]
-        if len(parts) == 2:
+        if parts:
             palm = max(parts, key=lambda p: _girth(p, axis))
-            split.append((float(0.5 * (palm[:, 1].min() + palm[:, 1].max())), _girth(palm, axis)))
-    if split:
-        found["hand"] = split[len(split) // 2]
+            palms.append((len(parts), float(0.5 * (palm[:, 1].min() + palm[:, 1].max())), _girth(palm, axis)))
+    thumb = next((i for i, of in enumerate(palms) if of[0] > 1), None)
+    if thumb is not None:
+        # Where the fingers part, the girth of the largest part falls.
+        ends = (i for i in range(thumb + 1, len(palms)) if palms[i][2] < 0.92 * palms[i - 1][2])
+        found["hand"] = palms[(thumb + next(ends, len(palms)) - 1) // 2][1:]
     return found

@@ -8,8 +8,9 @@ import trimesh
 
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import polyline_length
-from warpflat.mannequin.forms import form_from_mapping
+from warpflat.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
+from warpflat.mannequin.shapes import shaped_form
 
 SIDES = ("left", "right")
 
@@ -70,6 +71,27 @@ def test_trousers_are_sewn_from_four_pieces_around_the_crotch(body: Mannequin) -
             )
             assert np.array_equal(first, second)
     assert set(body.form("trousers", half=True).pieces) == {"front_left", "back_left"}
+
+
+def test_trousers_take_waist_darts(body: Mannequin) -> None:
+    form = body.form(shaped_form(body.layout, shipped_form("trousers"), "darts"))
+    lengths = {}
+    for dart in form.darts:
+        row = form.vertices[dart.row]
+        assert row[0, 1] == pytest.approx(body.levels()["waist"].height, abs=0.002), dart.name
+        lengths[dart.piece, dart.name] = round(polyline_length(row), 3)
+    # One in the front, two in the back, the second of them shorter; the tips lie on the grid's rows of 20 mm.
+    assert {piece: sum(key[0] == piece for key in lengths) for piece in form.pieces} == {
+        "front_left": 1, "front_right": 1, "back_left": 2, "back_right": 2,
+    }  # fmt: skip
+    for side in SIDES:
+        first, second = (
+            lengths[f"back_{side}", f"waist dart {side}"],
+            lengths[f"back_{side}", f"second waist dart {side}"],
+        )
+        assert lengths[f"front_{side}", f"waist dart {side}"] == pytest.approx(0.100, abs=0.012)
+        assert first == pytest.approx(0.130, abs=0.012)
+        assert second <= first
 
 
 def test_trousers_lie_outside_the_body(body: Mannequin) -> None:

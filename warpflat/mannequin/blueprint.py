@@ -6,7 +6,7 @@ Size tables and scans both answer with a :class:`Blueprint`; one builder lays th
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from warpflat.core.arrays import FloatArray
 
@@ -62,11 +62,18 @@ class ArmCurves:
 
     Attributes:
         biceps, elbow, wrist: the curves; the first point is on the underarm line, the opposite one on the overarm line.
+        between: further curves by their place: 0 is the biceps, 1 the elbow, 2 the wrist.
     """
 
     biceps: FloatArray
     elbow: FloatArray
     wrist: FloatArray
+    between: Mapping[float, FloatArray] = field(default_factory=dict)
+
+    @property
+    def by_place(self) -> dict[float, FloatArray]:
+        """All curves by their place, from the biceps to the wrist."""
+        return dict(sorted({0.0: self.biceps, 1.0: self.elbow, 2.0: self.wrist, **self.between}.items()))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -97,12 +104,14 @@ class LegCurves:
         profile: the profile of a side, ``left`` or ``right``, at a height [m] from the ankle to the thigh.
         crotch: #P by 3 [m], the crotch curve in the midplane, from the hip's centre front to its centre back.
         point: share of the crotch curve's length at which the crotch point lies.
+        attract: maps #P by 3 points of seat and thighs [m] to the body's surface, those outside it to themselves; None for none.
     """
 
     heights: Mapping[str, float]
     profile: Callable[[str, float], LegProfile]
     crotch: FloatArray
     point: float
+    attract: Callable[[FloatArray], FloatArray] | None = None
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -210,17 +210,18 @@ def _set_arms(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> Non
             np.arange(len(hole)) <= half, 0.5 * s[:-1] / s[half], 0.5 + 0.5 * (s[:-1] - s[half]) / (s[-1] - s[half])
         )
         even = np.arange(len(hole)) / len(hole)
+        places = np.array(list(c.by_place))
+        evened = np.interp(places, [0.0, 1.0, 2.0], [0.5, 0.8, 1.0])
         rings = [
             _to_length(resample(loop, w * even + (1 - w) * shares, closed=True), polyline_length(loop, closed=True))
-            for loop, w in ((c.biceps, 0.5), (c.elbow, 0.8), (c.wrist, 1.0))
+            for loop, w in zip(c.by_place.values(), evened, strict=True)
         ]
-        middles = [r.mean(axis=0) for r in rings]
         rows = layout.arm_row
-        at = np.array([rows["biceps"], rows["elbow"], rows["wrist"]], float)
+        at = np.interp(places, [0.0, 1.0, 2.0], [rows["biceps"], rows["elbow"], rows["wrist"]])
         between = np.arange(rows["biceps"], rows["wrist"] + 1)
         vertices[grid[between]] = PchipInterpolator(at, np.stack(rings), axis=0)(between)
         # From the armhole the sleeve leaves along the shoulder at the top and along the arm at the bottom.
-        axis = middles[1] - middles[0]
+        axis = rings[int(np.searchsorted(places, 1.0))].mean(axis=0) - rings[0].mean(axis=0)
         axis = axis / np.linalg.norm(axis)
         reach = np.linalg.norm(rings[0] - hole, axis=1)[:, None]
         high = ((hole[:, 1] - hole[:, 1].min()) / max(np.ptp(hole[:, 1]), 1e-9))[:, None]

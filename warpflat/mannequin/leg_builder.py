@@ -38,7 +38,7 @@ def set_legs(vertices: FloatArray, layout: Layout, legs: LegCurves) -> None:
                 share = (row - rows[high]) / (rows[low] - rows[high])
                 height = (1.0 - share) * legs.heights[high] + share * legs.heights[low]
                 vertices[grid[row]] = leg_ring(layout, legs.profile(side, height), height)
-    fill_fork(vertices, layout)
+    fill_fork(vertices, layout, legs.attract)
 
 
 def leg_ring(layout: Layout, profile: LegProfile, height: float) -> FloatArray:

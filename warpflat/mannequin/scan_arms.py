@@ -20,6 +20,8 @@ __all__ = ["ScanArm", "slice_arm", "tape_around"]
 _ELBOW = 0.575
 # An arm shows its elbow where the centre line bends by this much [radians].
 _BENT = np.radians(8.0)
+# The bones' lines are fitted so far up and down the arm, as a share of the stature.
+_NEAR_ELBOW = 0.09
 #: How far the plane that parts the arm from the trunk leans outward from the armpit up.
 _LEAN = np.radians(9.0)
 
@@ -116,26 +118,31 @@ def slice_arm(slicer: Slicer, hole: FloatArray, sign: float, side: str) -> ScanA
     whole = np.flatnonzero(girths > 0.6 * np.median(girths[:17]))
     wrist = float(low[whole[int(np.argmin(np.array(girths)[whole]))]])
     under, tip = (float((p - middle) @ axis) / reach for p in (hole[0], hole[int(np.argmax(hole[:, 1]))]))
-    elbow, bent = _elbow(shares, line, tip, wrist)
+    elbow, bent = _elbow(shares, line, tip, wrist, _NEAR_ELBOW * float(np.ptp(points[:, 1])) / reach)
     return ScanArm(
         cut=cut, shares=shares, line=line, way=way, reach=reach, under=under, tip=tip, elbow=elbow, wrist=wrist,
         bent=bent, limb=limb,
     )  # fmt: skip
 
 
-def _elbow(shares: FloatArray, line: FloatArray, tip: float, wrist: float) -> tuple[float, bool]:
-    """Return the share at which two straight bones that fit the centre line best meet, and whether they meet at an angle."""
-    rows = (shares > 0.22) & (shares < wrist)
-    s, p = shares[rows], line[rows]
+def _elbow(shares: FloatArray, line: FloatArray, tip: float, wrist: float, near: float) -> tuple[float, bool]:
+    """Return the share at which two straight bones that fit the centre line best meet, and whether they meet at an angle.
+
+    Only `near` the elbow, as a share: farther off, muscles bend the line, not bones.
+    """
     guess = tip + _ELBOW * (wrist - tip)
     best = (np.inf, guess, 0.0)
-    for joint in np.linspace(guess - 0.12, guess + 0.12, 49):
-        bones = np.column_stack([np.ones_like(s), s - joint, np.maximum(s - joint, 0.0)])
-        fit, *_ = np.linalg.lstsq(bones, p, rcond=None)
-        miss = float(np.linalg.norm(bones @ fit - p))
-        cosine = float(_unit(fit[1]) @ _unit(fit[1] + fit[2]))
-        if miss < best[0]:
-            best = (miss, float(joint), float(np.arccos(np.clip(cosine, -1.0, 1.0))))
+    for _ in range(2):
+        rows = (np.abs(shares - best[1]) < near) & (shares < wrist)
+        s, p = shares[rows], line[rows]
+        best = (np.inf, best[1], 0.0)
+        for joint in np.linspace(guess - 0.12, guess + 0.12, 49):
+            bones = np.column_stack([np.ones_like(s), s - joint, np.maximum(s - joint, 0.0)])
+            fit, *_ = np.linalg.lstsq(bones, p, rcond=None)
+            miss = float(np.linalg.norm(bones @ fit - p))
+            cosine = float(_unit(fit[1]) @ _unit(fit[1] + fit[2]))
+            if miss < best[0]:
+                best = (miss, float(joint), float(np.arccos(np.clip(cosine, -1.0, 1.0))))
     return (best[1], True) if best[2] > _BENT and abs(best[1] - guess) < 0.115 else (guess, False)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -11,10 +11,10 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, resample
 from warpflat.mannequin.blueprint import LegCurves, LegProfile, Profile
+from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.layout import LEG_LEVELS
-from warpflat.mannequin.profiles import convex_girth
 from warpflat.mannequin.rays import ray_radii
-from warpflat.mannequin.scan_levels import TrunkSections, leg_sections
+from warpflat.mannequin.scan_levels import TrunkSections
 from warpflat.mannequin.scan_pose import Slicer
 from warpflat.mannequin.table_legs import crotch_curve, profile_of_curve
 
@@ -36,6 +36,7 @@ class LegSections:
     Attributes:
         y: #S, heights [m].
         hulls: by side, for each section its hull as scanned, #P by 2 (x, z) [m].
+        girths: by side #S, the hulls' girths [m].
         inwards: by side #S, how far each section is moved towards the midplane [m].
         crotch: height of the lowest point of the body in the midplane [m].
         slope: how far the legs' middles run apart per metre down the leg.
@@ -43,6 +44,7 @@ class LegSections:
 
     y: FloatArray
     hulls: Mapping[str, tuple[FloatArray, ...]]
+    girths: Mapping[str, FloatArray]
     inwards: Mapping[str, FloatArray]
     crotch: float
     slope: float
@@ -76,7 +78,7 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
     from scipy.ndimage import gaussian_filter1d
 
     heights = trunk.y[trunk.y <= trunk.crotch]
-    found = _leg_hulls(slicer, trunk.stature, heights)
+    found, girths = _leg_hulls(trunk, heights)
     middles = {s: np.array([0.5 * (h[:, 0].min() + h[:, 0].max()) for h in hulls]) for s, hulls in found.items()}
     straight = heights >= 0.09 * trunk.stature
     apart = 0.5 * (middles["left"] - middles["right"])
@@ -91,12 +93,13 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
     near = ahead[np.abs(ahead - trunk.crotch) < 0.02 * trunk.stature]
     return LegSections(
         y=heights, hulls={s: tuple(h) for s, h in found.items()}, inwards=inwards,
+        girths={s: np.array(g) for s, g in girths.items()},
         crotch=float(near.min()) if len(near) else trunk.crotch, slope=slope,
     )  # fmt: skip
 
 
-def _leg_hulls(slicer: Slicer, stature: float, heights: FloatArray) -> dict[str, list[FloatArray]]:
-    """Return the convex hull of each leg's section at each height, by side.
+def _leg_hulls(trunk: TrunkSections, heights: FloatArray) -> tuple[dict[str, list[FloatArray]], dict[str, list[float]]]:
+    """Return the convex hull of each leg's section at each height, and its girth [m], by side.
 
     Raises:
         InputError: there are no two legs at a height.
@@ -104,8 +107,9 @@ def _leg_hulls(slicer: Slicer, stature: float, heights: FloatArray) -> dict[str,
     from scipy.spatial import ConvexHull
 
     found: dict[str, list[FloatArray]] = {"left": [], "right": []}
-    for y in heights:
-        flats = [p.points[:, [0, 2]] for p in leg_sections(slicer, float(y), stature)]
+    girths: dict[str, list[float]] = {"left": [], "right": []}
+    for y, parts in zip(heights, trunk.parts, strict=False):
+        flats = list(parts)
         if len(flats) == 1:
             # The thighs touch: the midplane parts them.
             flats = [flats[0][flats[0][:, 0] > 0.0], flats[0][flats[0][:, 0] < 0.0]]
@@ -113,8 +117,10 @@ def _leg_hulls(slicer: Slicer, stature: float, heights: FloatArray) -> dict[str,
         if len(flats) != 2 or min(len(p) for p in flats) < 8:
             raise InputError(f"scan: no two legs at {y:.2f} m above the floor; its mesh is broken there")
         for side, flat in zip(("left", "right"), flats, strict=True):
-            found[side].append(flat[ConvexHull(flat).vertices])
-    return found
+            hull = ConvexHull(flat)
+            found[side].append(flat[hull.vertices])
+            girths[side].append(float(hull.area))
+    return found, girths
 
 
 def plumb_legs(trunk: TrunkSections, legs: LegSections) -> tuple[TrunkSections, list[str]]:
@@ -155,7 +161,6 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
     point = float(resample(crotch, _POINT)[2])
     thigh, knee = levels["leg_thigh"], levels["leg_knee"]
     curves: dict[str, FloatArray] = {}
-    girths: dict[str, FloatArray] = {}
     for side, sign in (("left", 1.0), ("right", -1.0)):
         hulls = [legs.moved(side, i) * np.array([sign, 1.0]) for i in range(len(legs.y))]
         middle = gaussian_filter1d(np.array([0.5 * (h.min(axis=0) + h.max(axis=0)) for h in hulls]), 2.0, axis=0)
@@ -171,7 +176,6 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
         rays = np.arange(_COUNT) * 2.0 * np.pi / _COUNT
         outward = np.column_stack([-np.cos(rays), np.sin(rays)])
         curves[side] = (radii[..., None] * outward + middle[:, None]) * np.array([sign, 1.0])
-        girths[side] = np.array([convex_girth(h) for h in hulls])
 
     def profile(side: str, height: float) -> LegProfile:
         at = float(np.clip(np.interp(height, legs.y, np.arange(len(legs.y))), 0.0, len(legs.y) - 1.001))
@@ -186,11 +190,46 @@ def leg_curves(slicer: Slicer, legs: LegSections, levels: Mapping[str, float], h
         )
         share = near * float(np.clip(ahead / s[-1], -0.1, 0.1))
         curve = resample(curve, share + np.arange(_COUNT) / _COUNT, closed=True)
-        girth = (1.0 - f) * girths[side][i] + f * girths[side][i + 1]
+        girth = (1.0 - f) * legs.girths[side][i] + f * legs.girths[side][i + 1]
         return profile_of_curve(curve, float(girth), near)
 
     heights = {level: levels[level] for level in LEG_LEVELS[1:]}
-    return LegCurves(heights=heights, profile=profile, crotch=crotch, point=_POINT)
+    return LegCurves(
+        heights=heights, profile=profile, crotch=crotch, point=_POINT,
+        attract=_seat_attractor(slicer, legs, thigh, levels["hip"], 0.5 * float(np.ptp(hip.curve[:, 0]))),
+    )  # fmt: skip
+
+
+def _seat_attractor(
+    slicer: Slicer, legs: LegSections, low: float, high: float, half: float
+) -> Callable[[FloatArray], FloatArray]:
+    """Return the nearest place on seat and thighs for every point inside the body; points outside stay where they are.
+
+    Cloth bridges cleft and crotch, so nothing is drawn inwards.
+
+    Args:
+        slicer: the upright scan.
+        legs: sections of the legs, which are moved together.
+        low, high: heights between which it is asked [m].
+        half: of the width at the hip [m]: what lies farther out is a hand.
+    """
+    points, triangles = legs.move(slicer.vertices), slicer.triangles
+    middle = slicer.vertices[triangles].mean(axis=1)
+    room = 0.06
+    near = (middle[:, 1] > low - room) & (middle[:, 1] < high + room) & (np.abs(middle[:, 0]) < half + 0.01)
+    corners = points[triangles]
+    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    # A mesh whose faces turn inwards has a negative volume.
+    turn = np.sign(np.einsum("td,td->", normals, corners.mean(axis=1) - points.mean(axis=0)))
+    normals = turn * normals[near]
+    closest = Closest(points, triangles[near])
+
+    def attract(where: FloatArray) -> FloatArray:
+        triangle, weights, _ = closest(where)
+        way = np.einsum("nk,nkd->nd", weights, closest.corners[triangle]) - where
+        return where + np.where(np.einsum("nd,nd->n", way, normals[triangle])[:, None] > 0.0, way, 0.0)
+
+    return attract
 
 
 def _crotch(slicer: Slicer, legs: LegSections, hip: float, profile: Profile) -> FloatArray:

@@ -38,6 +38,7 @@ class TrunkSections:
         front_centre, back_centre: #S, z of the surface near the midplane [m].
         apex: #S, distance of the foremost points from the midplane [m].
         hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
+        parts: for each section the points of the trunk, or those of both legs apart, each #P by 2 (x, z) [m].
         crotch: height below which the legs are apart [m].
         armpits: height at which the left and the right arm join the trunk [m], and the trunk's (x, z) there.
     """
@@ -55,6 +56,7 @@ class TrunkSections:
     back_centre: FloatArray
     apex: FloatArray
     hulls: tuple[FloatArray, ...]
+    parts: tuple[tuple[FloatArray, ...], ...]
     crotch: float
     armpits: Mapping[str, tuple[float, float, float]]
 
@@ -71,6 +73,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     heights = np.arange(0.04, 0.93, 0.0025) * stature
     rows: list[list[float]] = []
     hulls: list[FloatArray] = []
+    parts: list[tuple[FloatArray, ...]] = []
     crotch = 0.0
     for y in heights:
         chosen = leg_sections(slicer, float(y), stature)
@@ -78,7 +81,8 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
             raise InputError(f"scan: nothing of the body at {y:.2f} m above the floor; its mesh is broken there")
         if len(chosen) == 2:
             crotch = float(y)
-        flat = np.concatenate([p.points for p in chosen])[:, [0, 2]]
+        parts.append(tuple(p.points[:, [0, 2]] for p in chosen))
+        flat = np.concatenate(parts[-1])
         hull = ConvexHull(flat)
         centre = np.abs(flat[:, 0]) < 0.02 * stature
         z_front, z_back = float(flat[:, 1].max()), float(flat[:, 1].min())
@@ -97,7 +101,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     return TrunkSections(
         stature=stature, y=heights, girth=table[0], length=table[1], area=table[2], left=table[3], right=table[4],
         front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], hulls=tuple(hulls),
-        crotch=crotch, armpits=armpits,
+        parts=tuple(parts), crotch=crotch, armpits=armpits,
     )  # fmt: skip
 
 
@@ -268,9 +272,23 @@ def _underbust(t: TrunkSections, waist: float, bust: float, notes: list[str]) ->
     least, most = waist + 0.3 * (bust - waist), bust - 0.01 * t.stature
     if least < y[row] < most and even[row] - girth[row] > 0.03 * girth[-1]:
         return float(y[row])
-    guess = bust - 0.40 * (bust - waist)
-    notes.append(f"underbust = {guess:.3f} m is a guess: no fold shows under the bust")
+    # Of a chest that grows fuller up to the armpits the bust lies lower than its fullest girth.
+    chest = np.flatnonzero((t.y > waist) & (t.y <= min(a[0] for a in t.armpits.values())))
+    y = np.arange(waist, max(bust, float(t.y[chest[np.argmax(t.girth[chest])]])), 0.002)
+    guess = float(np.clip(_bend(y, np.interp(y, t.y, t.girth)), waist + 0.25 * (bust - waist), most))
+    notes.append(
+        f"underbust = {guess:.3f} m is a guess: no fold shows under the bust; it is where the girth bends most"
+    )
     return guess
+
+
+def _bend(y: FloatArray, values: FloatArray) -> float:
+    """Return where the two joined straight lines bend that fit `values` best."""
+    misses = []
+    for at in y[2:-2]:
+        lines = np.column_stack([np.ones_like(y), y - at, np.maximum(y - at, 0.0)])
+        misses.append(float(np.linalg.norm(lines @ np.linalg.lstsq(lines, values, rcond=None)[0] - values)))
+    return float(y[2 + int(np.argmin(misses))])
 
 
 def _hip(t: TrunkSections, waist: float, notes: list[str]) -> float:

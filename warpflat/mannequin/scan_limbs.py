@@ -27,6 +27,8 @@ _SCOOP = 0.012
 # The biceps' row lies so far [m] beyond the underarm that the shortest sleeve has a seam to sew.
 _SHORTEST_SLEEVE = 0.070
 _HARMONICS = 5
+# Where an arm is sliced between biceps (0), elbow (1) and wrist (2): forearms swell below the elbow.
+_ARM_PLACES = (0.5, 1.25, 1.5, 1.75)
 _NOTCH = 0.22
 
 
@@ -310,4 +312,8 @@ def _arm_curves(arm: ScanArm) -> ArmCurves:
         return _loop(cut, cut.mean(axis=0), -up, np.sign(ahead[2]) * ahead, 4, 240)
 
     biceps = float(np.clip(max(arm.under, arm.tip) + _SHORTEST_SLEEVE / arm.reach, 0.10, arm.elbow - 0.10))
-    return ArmCurves(biceps=ring(biceps), elbow=ring(arm.elbow), wrist=ring(arm.wrist))
+    shares = np.interp(_ARM_PLACES, [0.0, 1.0, 2.0], [biceps, arm.elbow, arm.wrist])
+    return ArmCurves(
+        biceps=ring(biceps), elbow=ring(arm.elbow), wrist=ring(arm.wrist),
+        between={place: ring(float(share)) for place, share in zip(_ARM_PLACES, shares, strict=True)},
+    )  # fmt: skip

@@ -24,6 +24,10 @@ _HIP_JOINT = 0.530
 # The fullest upper arm is sought from so far beyond the armpit, the thigh's tape lies so far below the crotch, both as
 # shares of the stature: nearer sections hold a part of the shoulder or of the seat.
 _BEYOND_ARMPIT, _BELOW_CROTCH = 0.02, 0.03
+# A belly of the upper arm is one if it is so full, as a share of the fullest tape.
+_BELLY = 0.98
+# The palm's tape falls to this share where the fingers part.
+_FINGERS_PART = 0.92
 # Shares of the crotch's height between which an ankle and a calf lie.
 _ANKLE, _CALF = (0.10, 0.30), (0.32, 0.60)
 # Girths [m] per metre of stature that bodies have, from infants to the heaviest.
@@ -64,8 +68,8 @@ def leg_levels(legs: LegSections) -> tuple[dict[str, float], dict[str, str]]:
 
 def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict[str, str]]:
     y, guesses = legs.y, {}
-    girth = smooth(np.array([convex_girth(h) for h in legs.hulls[side]]), 1.5)
-    back = smooth(np.array([h[:, 1].min() for h in legs.hulls[side]]), 2.0)
+    girth = smooth(legs.girths[side], 3.0)
+    back = smooth(np.array([h[:, 1].min() for h in legs.hulls[side]]), 3.0)
 
     def extreme(name: str, values: FloatArray, between: tuple[float, float], share: float) -> float:
         low, high = between
@@ -213,7 +217,10 @@ def _arm(arm: ScanArm, trunk: TrunkSections, side: str) -> dict[str, ScanMeasure
 
 
 def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
-    """Return the fullest tape across the upper arm's bone, from `beyond` [m] off the armpit to the elbow."""
+    """Return the fullest tape across the upper arm's bone, from `beyond` [m] off the armpit to the elbow.
+
+    The muscle's belly counts before the shoulder's flesh at the upper end, which a lowered arm presses out.
+    """
     rows = (arm.shares > 0.2) & (arm.shares < arm.elbow - 0.04)
     way = arm.way[rows].mean(axis=0)
     way /= np.linalg.norm(way)
@@ -222,7 +229,10 @@ def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
     tapes = []
     for at in np.arange(float((armpit - middle) @ way) + beyond, end, 0.004):
         tapes.append(tape_around(arm.cut(middle + at * way, way), way))
-    row = int(np.argmax(smooth(np.array([girth for _, girth in tapes]), 1.0)))
+    girths = smooth(np.array([girth for _, girth in tapes]), 1.0)
+    bellies = 1 + np.flatnonzero((girths[1:-1] >= girths[:-2]) & (girths[1:-1] > girths[2:]))
+    bellies = bellies[girths[bellies] > _BELLY * girths.max()]
+    row = int(bellies[np.argmax(girths[bellies])]) if len(bellies) else int(np.argmax(girths))
     return ScanMeasure(height=tapes[row][0], girth=tapes[row][1])
 
 
@@ -237,20 +247,24 @@ def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
     if length < 0.18 * arm.reach:
         return None
     axis = (beyond[int(np.argmax(reach))] - wrist) / length
-    parted: list[tuple[float, float]] = []
-    whole: list[tuple[float, float]] = []
-    for share in np.arange(0.30, 0.62, 0.01):
+    counts: list[int] = []
+    tapes: list[tuple[float, float]] = []
+    for share in np.arange(0.30, 0.64, 0.01):
         at = wrist + share * length * axis
         parts = [p.points for p in slicer.cut(axis, float(at @ axis))
                  if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * length and len(p.points) > 5]  # fmt: skip
         if parts:
-            tape = max((tape_around(p, axis) for p in parts), key=lambda t: t[1])
-            (parted if len(parts) == 2 else whole).append(tape)
-    found = parted or whole
-    if not found:
+            counts.append(len(parts))
+            tapes.append(max((tape_around(p, axis) for p in parts), key=lambda t: t[1]))
+    if not tapes:
         return None
-    height, girth = found[len(found) // 2]
-    return ScanMeasure(height=height, girth=girth, guess=None if parted else "no thumb stands off the palm")
+    girths = np.array([girth for _, girth in tapes])
+    thumb = next((i for i, count in enumerate(counts) if count > 1), None)
+    first = thumb or 0
+    # Where the fingers part, the girth of the largest part falls.
+    falls = first + np.flatnonzero(girths[first + 1 :] < _FINGERS_PART * girths[first:-1])
+    height, girth = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
+    return ScanMeasure(height=height, girth=girth, guess="no thumb stands off the palm" if thumb is None else None)
 
 
 def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
@@ -265,10 +279,9 @@ def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
 
 def _leg(legs: LegSections, side: str, thigh: float) -> dict[str, ScanMeasure]:
     places, guesses = _places_of_leg(legs, side)
-    girth = np.array([convex_girth(h) for h in legs.hulls[side]])
     places = {"thigh": thigh, **places}
     return {
-        name: ScanMeasure(height=y, girth=float(np.interp(y, legs.y, girth)), guess=guesses.get(name))
+        name: ScanMeasure(height=y, girth=float(np.interp(y, legs.y, legs.girths[side])), guess=guesses.get(name))
         for name, y in places.items()
     }
 
@@ -300,8 +313,8 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
                 best = breadth, points
     if best is None:
         return None
-    height, girth = tape_around(best[1], axis)
-    return ScanMeasure(height=height, girth=girth)
+    # The foot stands on the floor, also where a scan has no sole.
+    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1])
 
 
 def _long_way(corners: FloatArray) -> FloatArray:

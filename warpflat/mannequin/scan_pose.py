@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
-from warpflat.surface.connectivity import join_labels
+from warpflat.mannequin.scan_holes import close_holes
+from warpflat.mannequin.scan_noise import smooth_noise
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "turn_scan_upright"]
@@ -103,33 +104,52 @@ class Slicer:
         self.face_edges = np.ravel(inverse).reshape(-1, 3)
         self.vertices = vertices
         self.triangles = triangles
+        self._corners = np.ascontiguousarray(triangles.T)
 
     def cut(self, normal: FloatArray, offset: float) -> list[Slice]:
         """Return the connected parts of the section where normal . x = offset, longest first."""
         d = self.vertices @ normal - offset
-        d = np.where(d == 0.0, 1e-12, d)
-        crossing = (d[self.edges[:, 0]] > 0) != (d[self.edges[:, 1]] > 0)
-        first, second, third = (crossing[self.face_edges[:, k]] for k in range(3))
-        faces = np.flatnonzero(first | second | third)
+        d[d == 0.0] = 1e-12
+        above = d > 0.0
+        first, second, third = (above[corners] for corners in self._corners)
+        faces = np.flatnonzero((first != second) | (first != third))
         if not len(faces):
             return []
         # Two of a cut triangle's edges cross the plane: which two, by the one that does not.
+        first, second, third = first[faces, None], second[faces, None], third[faces, None]
         edges = self.face_edges[faces]
         pairs = np.where(
-            ~first[faces, None], edges[:, [1, 2]], np.where(~second[faces, None], edges[:, [0, 2]], edges[:, [0, 1]])
+            first == second, edges[:, [1, 2]], np.where(second == third, edges[:, [0, 2]], edges[:, [0, 1]])
         )
         used, local = np.unique(pairs, return_inverse=True)
         local = np.ravel(local).reshape(-1, 2)
         a, b = self.edges[used].T
         t = (d[a] / (d[a] - d[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
-        label = join_labels(len(used), local[:, 0], local[:, 1])
+        label = _part_labels(len(used), local)
         length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
         loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
         parts = [
             Slice(points=points[label == i], length=float(length[i]), closed=not loose[i]) for i in np.argsort(-length)
         ]
         return [p for p in parts if len(p.points) > 3]
+
+
+def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
+    """Return #size, the part of each point that the pairs join; quicker than a sparse graph for a section's few points."""
+    root = list(range(size))
+    for a, b in pairs.tolist():
+        while root[a] != a:
+            root[a] = a = root[root[a]]
+        while root[b] != b:
+            root[b] = b = root[root[b]]
+        if a < b:
+            root[b] = a
+        else:
+            root[a] = b
+    for i, above in enumerate(root):
+        root[i] = root[above]
+    return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
 
 
 def turn_scan_upright(
@@ -149,7 +169,8 @@ def turn_scan_upright(
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
-    points, triangles = _welded(vertices, faces)
+    points, triangles, holes = close_holes(*_welded(vertices, faces))
+    points, noise = smooth_noise(points, triangles)
     notes: list[str] = []
     candidates = [options.up] if options.up else list(_AXES)
     slicer = Slicer(points, triangles)
@@ -189,6 +210,15 @@ def turn_scan_upright(
     new[:, 1] -= new[:, 1].min()
     trunk = Slicer(new, triangles).cut(np.array([0.0, 1.0, 0.0]), 0.55 * size)
     new[:, 0] -= 0.5 * (trunk[0].points[:, 0].min() + trunk[0].points[:, 0].max())
+    if noise:
+        notes.append(f"the scan is noisy by {1000.0 * noise * _UNITS[unit]:.1f} mm; it was smoothed")
+    if holes:
+        length, place = max(holes, key=lambda hole: hole[0])
+        x, y, z = place @ frame.T * _UNITS[unit] + (new[0] - points[0] @ frame.T * _UNITS[unit])
+        notes.append(
+            f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
+            f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        )
     return new, triangles, notes
 
 

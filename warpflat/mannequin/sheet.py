@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,9 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.mannequin.layout import LEG_LEVELS, Layout
 
 __all__ = ["fill_fork", "sheet_laplacian"]
+
+# How strongly the fork is drawn to a scan, against one for its own smoothness, on a grid of 10 mm, and how often.
+_ATTRACT, _ATTRACT_ROUNDS = 0.25, 6
 
 
 def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDArray[np.int64]]:
@@ -28,14 +32,16 @@ def sheet_laplacian(layout: Layout, first_row: int) -> tuple[IntArray, Any, NDAr
     return _umbrella(layout, grids)
 
 
-def fill_fork(values: FloatArray, layout: Layout) -> None:
+def fill_fork(values: FloatArray, layout: Layout, attract: Callable[[FloatArray], FloatArray] | None = None) -> None:
     """Set the rows between the loops of hip and crotch curve and the thighs to the smoothest sheet through what is around.
 
     Args:
         values: layout.vertex_count by 3, places or displacements [m], changed in place.
         layout: the grid.
+        attract: maps places of the sheet, #P by 3 [m], to those that it is drawn to.
     """
-    from scipy.sparse.linalg import spsolve
+    from scipy import sparse
+    from scipy.sparse.linalg import factorized, spsolve
 
     ids, laplacian, local = _fork_laplacian(layout, 2)
     last = layout.leg_row["leg_thigh"]
@@ -49,6 +55,13 @@ def fill_fork(values: FloatArray, layout: Layout) -> None:
     unknown, fixed = operator[:, free], operator[:, known]
     right = -(unknown.T @ (fixed @ values[ids[known]]))
     values[ids[free]] = spsolve((unknown.T @ unknown).tocsc(), right)
+    if attract is None:
+        return
+    # The operator shrinks with the square of the edge.
+    pull = (_ATTRACT * (layout.resolution / 0.010) ** 2) ** 2
+    solve = factorized((unknown.T @ unknown + pull * sparse.identity(len(free))).tocsc())
+    for _ in range(_ATTRACT_ROUNDS):
+        values[ids[free]] = solve(np.asarray(right + pull * attract(values[ids[free]])))
 
 
 def _fork_laplacian(layout: Layout, rows: int) -> tuple[IntArray, Any, NDArray[np.int64]]:

@@ -1,0 +1,190 @@
+"""Holes in a scan's mesh, closed by patches that carry on the curvature of the skin around them."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from warpflat.core.arrays import BoolArray, FloatArray
+
+__all__ = ["close_holes"]
+
+# A longer border, as a share of the scan's greatest extent, is left open: nobody knows what was there.
+_LONGEST = 0.30
+# Skin around a hole faces one way; around the open end of a limb it faces all ways. Length of the mean unit normal.
+_ONE_WAY = 0.15
+# Least cotangent weight of an edge, which keeps the fairing stable where triangles are obtuse.
+_LEAST_WEIGHT = 0.05
+
+
+def close_holes(
+    points: FloatArray, triangles: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.int64], list[tuple[float, FloatArray]]]:
+    """Close the holes of a welded mesh; the open ends of limbs and long borders stay.
+
+    A hole is triangulated in its plane. Its inner vertices minimise the bending of patch and rim together.
+
+    Args:
+        points: #P by 3, any unit.
+        triangles: #T by 3.
+
+    Returns:
+        Vertices, the new ones last; triangles, the new ones last; each closed hole's border length and middle.
+
+    Source: Liepa, "Filling holes in meshes", 2003 (fairing by the second-order umbrella operator).
+    """
+    corners = points[triangles]
+    normal = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    span = float(np.ptp(points, axis=0).max())
+    holes: list[tuple[float, FloatArray]] = []
+    new_points, new_triangles, size = [points], [triangles], len(points)
+    for loop, faces in _border_loops(triangles):
+        rim = points[loop]
+        length = float(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum())
+        facing = normal[faces].mean(axis=0)
+        if not 3 <= len(loop) <= 1000 or length > _LONGEST * span or np.linalg.norm(facing) < _ONE_WAY:
+            continue
+        patch = _patch(rim, facing / np.linalg.norm(facing))
+        if patch is None:
+            continue
+        inner, filled = patch
+        names = np.concatenate([loop, size + np.arange(len(inner))])
+        if len(inner):
+            around = triangles[np.isin(triangles, loop).any(axis=1)]
+            inner = _fair(points, around, loop, inner, filled)
+        holes.append((length, rim.mean(axis=0)))
+        new_points.append(inner)
+        new_triangles.append(names[filled])
+        size += len(inner)
+    return np.concatenate(new_points), np.concatenate(new_triangles), holes
+
+
+def _border_loops(triangles: NDArray[np.int64]) -> list[tuple[NDArray[np.int64], NDArray[np.int64]]]:
+    """Return each closed border: its vertices, against the turn of the faces beside it, and those faces."""
+    tails, heads = triangles.ravel(), np.roll(triangles, -1, axis=1).ravel()
+    size = int(triangles.max()) + 1
+    keys = np.minimum(tails, heads) * size + np.maximum(tails, heads)
+    _, inverse, count = np.unique(keys, return_inverse=True, return_counts=True)
+    single = np.flatnonzero(count[np.ravel(inverse)] == 1)
+    # Against the face's turn, as the patch beyond the edge runs.
+    leaving: dict[int, list[tuple[int, int]]] = {}
+    for edge in single:
+        leaving.setdefault(int(heads[edge]), []).append((int(tails[edge]), int(edge) // 3))
+    loops = []
+    while leaving:
+        start = next(iter(leaving))
+        path, faces, place = [start], [], {start: 0}
+        while path[-1] in leaving:
+            ways = leaving[path[-1]]
+            vertex, face = ways.pop()
+            if not ways:
+                del leaving[path[-1]]
+            faces.append(face)
+            if vertex in place:
+                # A loop is closed; where holes touch at a vertex, the rest of the walk goes on.
+                first = place[vertex]
+                loops.append((np.array(path[first:]), np.array(faces[first:])))
+                for gone in path[first + 1 :]:
+                    del place[gone]
+                del path[first + 1 :], faces[first:]
+            else:
+                place[vertex] = len(path)
+                path.append(vertex)
+        leaving.pop(path[-1], None)
+    return loops
+
+
+def _patch(rim: FloatArray, facing: FloatArray) -> tuple[FloatArray, NDArray[np.int64]] | None:
+    """Return inner vertices (#I by 3, in the rim's mean plane) and triangles (of rim, then inner vertices) of a flat patch.
+
+    None where the rim's shadow along `facing` crosses itself.
+    """
+    from scipy.spatial import Delaunay, QhullError
+
+    middle = rim.mean(axis=0)
+    first = np.eye(3)[int(np.argmin(np.abs(facing)))]
+    first = first - facing * (first @ facing)
+    first /= np.linalg.norm(first)
+    axes = np.array([first, np.cross(facing, first)])
+    flat = (rim - middle) @ axes.T
+    if len(rim) == 3:
+        return np.empty((0, 3)), np.array([[0, 1, 2]])
+    sides = np.linalg.norm(flat - np.roll(flat, 1, axis=0), axis=1)
+    step = float(np.median(sides))
+    low, high = flat.min(axis=0), flat.max(axis=0)
+    if step <= 0.0 or np.prod((high - low) / step) > 2e4:
+        return None
+    x, y = np.meshgrid(np.arange(low[0], high[0], step), np.arange(low[1], high[1], 0.87 * step))
+    x[1::2] += 0.5 * step
+    grid = np.column_stack([x.ravel(), y.ravel()])
+    grid = grid[_inside(grid, flat)]
+    # On the rim's edges, too, or a long edge would lie close to a vertex of the grid.
+    halves = np.concatenate([flat, 0.5 * (flat + np.roll(flat, 1, axis=0))])
+    away = np.linalg.norm(grid[:, None] - halves, axis=2).min(axis=1) if len(grid) else np.empty(0)
+    grid = grid[away > 0.55 * step]
+    try:
+        cells = Delaunay(np.concatenate([flat, grid])).simplices
+    except (QhullError, ValueError):
+        return None
+    every = np.concatenate([flat, grid])
+    cells = cells[_inside(every[cells].mean(axis=1), flat)]
+    a, b, c = (every[cells[:, k]] for k in range(3))
+    turn = (b - a)[:, 0] * (c - a)[:, 1] - (b - a)[:, 1] * (c - a)[:, 0]
+    cells = np.where(turn[:, None] < 0.0, cells[:, ::-1], cells)[np.abs(turn) > 1e-12 * step * step]
+    if not len(cells):
+        return None
+    return middle + grid @ axes, cells.astype(np.int64)
+
+
+def _inside(points: FloatArray, polygon: FloatArray) -> BoolArray:
+    """Return which plane points lie inside a closed polygon, by the crossings of a ray to the right."""
+    (ax, ay), (bx, by) = polygon.T, np.roll(polygon, -1, axis=0).T
+    x, y = points[:, :1], points[:, 1:]
+    crosses = (ay > y) != (by > y)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        at = ax + (y - ay) / (by - ay) * (bx - ax)
+    return np.asarray((crosses & (x < at)).sum(axis=1) % 2 == 1)
+
+
+def _fair(
+    points: FloatArray, around: NDArray[np.int64], loop: NDArray[np.int64], inner: FloatArray, filled: NDArray[np.int64]
+) -> FloatArray:
+    """Return the inner vertices that minimise the squared curvature of the patch and of its rim.
+
+    Args:
+        points: #P by 3, the mesh.
+        around: its triangles at the rim.
+        loop: #R, the rim's vertices.
+        inner: #I by 3, a first guess.
+        filled: the patch's triangles, of the rim's vertices and then the inner ones.
+    """
+    outer = np.setdiff1d(around, loop)
+    place = np.empty(len(points), dtype=np.int64)
+    place[loop] = np.arange(len(loop))
+    place[outer] = len(loop) + len(inner) + np.arange(len(outer))
+    faces = np.concatenate([filled, place[around]])
+    where = np.concatenate([points[loop], inner, points[outer]])
+    rows = len(loop) + len(inner)
+    free = np.arange(len(loop), rows)
+    known = np.setdiff1d(np.arange(len(where)), free)
+    for _ in range(3):
+        bending = _laplacian(where, faces)[:rows]
+        where[free] = np.linalg.lstsq(bending[:, free], -bending[:, known] @ where[known], rcond=None)[0]
+    return where[free]
+
+
+def _laplacian(where: FloatArray, faces: NDArray[np.int64]) -> FloatArray:
+    """Return the mean-curvature operator of a small mesh, each row over the square root of its vertex's area."""
+    weights = np.zeros((len(where), len(where)))
+    area = np.zeros(len(where))
+    for k in range(3):
+        i, j, tip = faces[:, k], faces[:, (k + 1) % 3], faces[:, (k + 2) % 3]
+        a, b = where[i] - where[tip], where[j] - where[tip]
+        twice = np.linalg.norm(np.cross(a, b), axis=1)
+        cotangent = np.clip((a * b).sum(axis=1) / np.maximum(twice, 1e-300), _LEAST_WEIGHT, 1.0 / _LEAST_WEIGHT)
+        np.add.at(weights, (i, j), cotangent)
+        np.add.at(weights, (j, i), cotangent)
+        np.add.at(area, tip, twice / 6.0)
+    matrix = np.diag(weights.sum(axis=1)) - weights
+    return np.asarray(matrix / np.sqrt(np.maximum(area, 1e-300))[:, None])
