@@ -44,8 +44,8 @@ class Contact:
 
     centre: the nearest place of the body [m]. normal: outwards; zero where no body is near. friction: Coulomb's coefficient.
     longest_step: bound of the way in one step of relaxation [m]. skin: stiffness of the body [N/m]. pressed: the normal force at
-    no depth [N]. anchor: where friction does not act [m]. grip: stiffness of friction before it slides [N/m]. most: the
-    largest force of friction [N].
+    no depth [N]. rubbed: the force of friction when the planes were last renewed [N]. anchor: where friction does not act [m].
+    grip: stiffness of friction before it slides [N/m]. most: the largest force of friction [N].
     """
 
     centre: wp.array(dtype=wp.vec3d)
@@ -54,6 +54,7 @@ class Contact:
     longest_step: wp.float64
     skin: wp.array(dtype=wp.float64)
     pressed: wp.array(dtype=wp.float64)
+    rubbed: wp.array(dtype=wp.vec3d)
     anchor: wp.array(dtype=wp.vec3d)
     grip: wp.array(dtype=wp.float64)
     most: wp.array(dtype=wp.float64)
@@ -286,32 +287,70 @@ def load_contact(
     cell_force: wp.array(dtype=wp.vec3d),
     bending: Bending,
     moment: wp.array(dtype=wp.vec3d),
-    sticking: int,
     first: int,
 ):
-    """Set the normal forces and the anchors of friction so that the body carries what it can of the forces on the cloth.
+    """Set the forces of body and friction to what they can carry of the forces on cloth that dynamic relaxation has brought there.
 
-    motion, offset, entry, cell_force, moment: as of `gather_drape`. contact: pressed, anchor and most are set. sticking: 1 if
-    friction holds all that is near the body, whatever presses it there.
+    motion, offset, entry, cell_force, moment: as of `gather_drape`. contact: pressed and rubbed are set.
     """
     i = natural(wp.tid() + first)
-    zero = wp.float64(0.0)
-    x = motion.position[i]
     f = gather(i, offset, entry, cell_force, bending, moment)
     f[1] = f[1] - motion.weight[i]
     n = contact.normal[i]
-    push = zero
-    if wp.dot(n, n) > wp.float64(0.5) and wp.dot(x - contact.centre[i], n) < TOUCH:
-        push = wp.max(-wp.dot(f, n), zero)
+    push = wp.float64(0.0)
+    if wp.dot(n, n) > wp.float64(0.5) and wp.dot(motion.position[i] - contact.centre[i], n) < TOUCH:
+        push = wp.max(-wp.dot(f, n), push)
     contact.pressed[i] = push
-    most = contact.friction * push
-    if sticking != 0:
+    contact.rubbed[i] = -f
+
+
+@wp.func
+def friction_force(x: wp.vec3d, n: wp.vec3d, anchor: wp.vec3d, grip: wp.float64, most: wp.float64):
+    """Return the force of friction: a spring to the anchor in the plane, at most `most` [N]."""
+    off = anchor - x
+    off = off - n * wp.dot(off, n)
+    return off * wp.min(grip, most / wp.max(wp.length(off), TINY))
+
+
+@wp.kernel
+def carry_contact(motion: Motion, contact: Contact, first: int):
+    """Take over the forces of body and friction at the present places, and put back on its plane what presses on it.
+
+    This is the update of the augmented Lagrangian: where the body pushed by its depth, it then pushes at no depth.
+
+    motion: of which position is moved. contact: pressed and rubbed are set.
+    """
+    i = natural(wp.tid() + first)
+    zero = wp.float64(0.0)
+    n = contact.normal[i]
+    if wp.dot(n, n) < wp.float64(0.5):
         contact.pressed[i] = zero
-        most = wp.float64(1.0e3)
+        return
+    x = motion.position[i]
+    depth = wp.dot(contact.centre[i] - x, n)
+    push = wp.max(contact.pressed[i] + contact.skin[i] * depth, zero)
+    contact.rubbed[i] = friction_force(x, n, contact.anchor[i], contact.grip[i], contact.most[i])
+    contact.pressed[i] = push
+    if push > zero and motion.fixed[i] == wp.int8(0):
+        motion.position[i] = x + n * depth
+
+
+@wp.kernel
+def anchor_friction(motion: Motion, contact: Contact, first: int):
+    """Put the anchors of friction where its force is what was rubbed, within Coulomb's bound and in the present plane.
+
+    motion: of which position counts. contact: pressed, most and anchor are set.
+    """
+    i = natural(wp.tid() + first)
+    n = contact.normal[i]
+    if wp.dot(n, n) < wp.float64(0.5):
+        contact.pressed[i] = wp.float64(0.0)
+    most = contact.friction * contact.pressed[i]
+    f = contact.rubbed[i]
     f = f - n * wp.dot(f, n)
-    pull = wp.length(f)
+    f = f * wp.min(wp.float64(1.0), most / wp.max(wp.length(f), TINY))
     contact.most[i] = most
-    contact.anchor[i] = x - f * (wp.min(most, pull) / wp.max(pull, TINY) / contact.grip[i])
+    contact.anchor[i] = motion.position[i] + f / contact.grip[i]
 
 
 @wp.kernel

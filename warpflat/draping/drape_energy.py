@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import warp as wp
-from scipy.sparse import bsr_array, coo_array, csc_array, csr_array, diags_array
+from scipy.sparse import bsr_array, csc_array
 from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import BoolArray, FloatArray, IntArray
@@ -15,10 +15,13 @@ from warpflat.core.sums import range_offsets
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.fabric.fabric import Fabric
 from warpflat.kernels.drape import (
     Bending,
     Contact,
     Motion,
+    anchor_friction,
+    carry_contact,
     evaluate_cloth,
     evaluate_curvature,
     find_planes,
@@ -27,6 +30,7 @@ from warpflat.kernels.drape import (
     stiffen_cloth,
     stiffen_contact,
 )
+from warpflat.kernels.membrane import Cloth
 from warpflat.model.membrane import make_cloth
 from warpflat.solver.quasi_newton import Point, Solve
 
@@ -40,6 +44,8 @@ _LONGEST_STEP = 0.05
 # and no step of dynamic relaxation longer than this [m].
 _LONGEST_EXPLICIT_STEP = 1e-3
 _REACH = 0.15  # [m]
+# Least share of the tensile stiffness under compression in the metric. Steps by a softer one are too long where cloth becomes taut.
+_METRIC_COMPRESSION = 0.3
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,16 +69,16 @@ class DrapeEnergy:
     """
 
     def __init__(self, cloth: SewnCloth, body: Body | None, options: DrapeOptions, held: BoolArray) -> None:
-        """Build the cells, the bending and the pattern of the stiffness; the contact is that of the first `renew_contact`."""
+        """Build the cells, the bending and the pattern of the stiffness; the contact is that of `load_contact`."""
         self.device = device = wp.get_device("cpu") if body is None else body.device
         self._count = count = len(cloth.designed)
         self._ground = float(cloth.designed[:, 1].mean())
         corner, _, gradient, area = cloth.cells()
         laplacian, stiffness = cloth.laplacian()
-        self._pattern = _BlockPattern(corner, csr_array(laplacian.T @ diags_array(stiffness) @ laplacian))
+        self._pattern = _BlockPattern(corner, count)
         fabric, vertex_area = cloth.fabric, cloth.vertex_areas()
-        soft = replace(fabric, compression_factor=min(fabric.compression_factor, options.compression))
-        law = make_cloth(soft, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), device)
+        law = _law(fabric, options.compression, device)
+        self._metric_law = _law(fabric, max(options.compression, _METRIC_COMPRESSION), device)
         self.weight = fabric.areal_density * options.gravity * vertex_area
         self.motion = Motion()
         self.motion.position, self.motion.velocity = self._zeros(wp.vec3d), self._zeros(wp.vec3d)
@@ -116,17 +122,21 @@ class DrapeEnergy:
     def _zeros(self, dtype: type) -> wp.array:
         return wp.zeros(self._count, dtype, self.device)
 
-    def renew_contact(self, positions: FloatArray, *, sticking: bool = False) -> None:
-        """Find the body's planes anew; body and friction carry what they can of the forces that act there.
-
-        Args:
-            positions: #V by 3, where the cloth is [m].
-            sticking: friction holds all that is near the body, whatever presses it there.
-        """
-        self.motion.position.assign(positions)
+    def load_contact(self) -> None:
+        """Set the forces of body and friction by those on the cloth where dynamic relaxation has left it."""
         self._renew.launch()
-        inputs = [self.motion, self.contact, *self.forces_of, int(sticking)]
-        launch_each(load_contact, self._count, inputs, [], device=self.device, least=512)
+        self._each(load_contact, [self.motion, self.contact, *self.forces_of])
+        self._each(anchor_friction, [self.motion, self.contact])
+
+    def carry_contact(self, positions: FloatArray) -> None:
+        """Take over the forces of body and friction at #V by 3 places [m], lay the cloth on its planes, and find the planes anew."""
+        self.motion.position.assign(positions)
+        self._each(carry_contact, [self.motion, self.contact])
+        self._renew.launch()
+        self._each(anchor_friction, [self.motion, self.contact])
+
+    def _each(self, kernel: wp.Kernel, inputs: list[object]) -> None:
+        launch_each(kernel, self._count, inputs, [], device=self.device, least=512)
 
     def at(self, positions: FloatArray) -> WornPoint:
         """Evaluate the cloth at #V by 3 places [m]."""
@@ -142,6 +152,8 @@ class DrapeEnergy:
     def factor(self, positions: FloatArray, pull: float) -> None:
         """Factor the stiffness of the cloth under an additional tension in all directions, from where on it is the metric.
 
+        Bending is left out: it would treble the entries of the factor, and L-BFGS learns it as fast.
+
         Args:
             positions: #V by 3, where the cloth is [m].
             pull: [N/m].
@@ -151,7 +163,8 @@ class DrapeEnergy:
         vertices = self._zeros(wp.mat33d)
         least = float(self.weight.mean()) / _LONGEST_STEP
         at = {"device": self.device, "least": 512}
-        launch_each(stiffen_cloth, len(self._cell_energy), [*self._cells, pull], [cells], **at)
+        inputs = [*self._cells[:-1], self._metric_law, pull]
+        launch_each(stiffen_cloth, len(self._cell_energy), inputs, [cells], **at)
         launch_each(stiffen_contact, self._count, [self.motion, self.contact, least], [vertices], **at)
         matrix = self._pattern.matrix(cells.numpy(), vertices.numpy())
         factor = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
@@ -163,9 +176,15 @@ class DrapeEnergy:
         return self._solve
 
 
+def _law(fabric: Fabric, compression: float, device: wp.Device) -> Cloth:
+    """Return the membrane's law with at most a share of the tensile stiffness under compression."""
+    soft = replace(fabric, compression_factor=min(fabric.compression_factor, compression))
+    return make_cloth(soft, (np.array([0.0, 1.0]), np.array([1.0, 0.0])), device)
+
+
 def _contact(area: FloatArray, options: DrapeOptions, device: wp.Device) -> Contact:
     contact = Contact()
-    for name in ("centre", "normal", "anchor"):
+    for name in ("centre", "normal", "rubbed", "anchor"):
         setattr(contact, name, wp.zeros(len(area), wp.vec3d, device))
     contact.friction, contact.longest_step = options.friction, _LONGEST_EXPLICIT_STEP
     contact.skin, contact.grip = (wp.array(each * area, dtype=wp.float64, device=device) for each in (_SKIN, _GRIP))
@@ -174,25 +193,22 @@ def _contact(area: FloatArray, options: DrapeOptions, device: wp.Device) -> Cont
 
 
 class _BlockPattern:
-    """Where the blocks of cells, vertices and bending go in a symmetric matrix of 3 by 3 blocks."""
+    """Where the blocks of cells and vertices go in a symmetric matrix of 3 by 3 blocks."""
 
-    def __init__(self, corner: IntArray, bending: csr_array) -> None:
-        count = bending.shape[0]
-        stiff = coo_array(bending)
+    def __init__(self, corner: IntArray, count: int) -> None:
         own = np.arange(count)
-        rows = np.concatenate([np.repeat(corner, 3, axis=1).ravel(), own, stiff.row])
-        columns = np.concatenate([np.tile(corner, (1, 3)).ravel(), own, stiff.col])
+        rows = np.concatenate([np.repeat(corner, 3, axis=1).ravel(), own])
+        columns = np.concatenate([np.tile(corner, (1, 3)).ravel(), own])
         key = rows.astype(np.int64) * count + columns
         self._order = np.argsort(key, kind="stable")
         places, self._begin = np.unique(key[self._order], return_index=True)
         self._columns = (places % count).astype(np.int32)
         self._offset = np.searchsorted(places // count, np.arange(count + 1)).astype(np.int32)
-        self._bending = stiff.data[:, None] * np.eye(3).ravel()
         self._size = 3 * count
 
     def matrix(self, cells: FloatArray, vertices: FloatArray) -> csc_array:
-        """Return the sum of the blocks of cells (9 #C by 3 by 3) and of vertices (#V by 3 by 3), and of bending."""
-        values = np.concatenate([cells.reshape(-1, 9), vertices.reshape(-1, 9), self._bending])
+        """Return the sum of the blocks of cells (9 #C by 3 by 3) and of vertices (#V by 3 by 3)."""
+        values = np.concatenate([cells.reshape(-1, 9), vertices.reshape(-1, 9)])
         blocks = np.add.reduceat(values[self._order], self._begin, axis=0).reshape(-1, 3, 3)
         rows = bsr_array((blocks, self._columns, self._offset), shape=(self._size, self._size)).tocsr()
         # It is symmetric.

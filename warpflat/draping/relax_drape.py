@@ -1,9 +1,10 @@
 """The sewn cloth comes to rest on the body: minimisation over a sparse factor, and dynamic relaxation.
 
-L-BFGS over the factor of a stiffness (`warpflat.draping.drape_energy`) moves the garment as a whole near to rest: what would
-swing for ten thousand explicit steps takes some dozens. It leaves local forces behind, where cloth wrinkles as fine as the
-mesh and no step may be long. Dynamic relaxation takes these away. What it does not halve is slow, and a few steps of L-BFGS
-follow. Cloth that lies on the body is left to dynamic relaxation.
+Dynamic relaxation brings the cloth out of the body first. Rounds of an augmented Lagrangian follow (Simo and Laursen 1992): each
+minimises by L-BFGS over the factor of a stiffness (`warpflat.draping.drape_energy`), with the normal forces and the bounds of friction
+of the round before; then body and friction take over the forces that they had at its end, whether the cloth lies a micrometre in the
+body or beside it. What would swing for ten thousand explicit steps takes some dozens. Dynamic relaxation does the rest, and says
+whether the cloth is at rest.
 
 Each step of dynamic relaxation gathers the forces at every vertex, lets the body and its friction act on them, and moves the
 vertex by its velocity. Masses are fictitious: the sums of the stiffness around each vertex, so that any step is stable. The body is one
@@ -39,16 +40,14 @@ _STEPS_PER_CHECK = 100
 _MASS_SCALE = 2.0
 # No vertex may have more force left than so many times the mean that is allowed.
 _WORST = 100.0
-# Cloth hangs, and swings, where a larger share of its vertices is farther from the body than this [m]. Dynamic relaxation alone
-# brings cloth that lies on a body to rest in half of the time.
-_FREE, _HANGING_SHARE = 0.01, 0.2
-# Rounds of the minimisation at the start, and steps in each. A round that releases less than this share of all is the last.
-_MOST_ROUNDS, _STEPS_PER_ROUND, _SMALL_RELEASE = 6, 60, 0.005
-# Tension that is added to the factor [N/m], and by how much it falls from round to round. Cloth without tension has next to no
-# stiffness across its plane: steps would be too long there.
-_PULL, _PULL_FALLS = 20.0, 0.6
-# After so many steps of dynamic relaxation that have not halved the residual, so many of L-BFGS over a factor with little tension.
-_STEPS_PER_LOOK, _STEPS_PER_CORRECTION, _SMALL_PULL = 300, 6, 0.3
+# Steps of dynamic relaxation at the start: they bring the cloth out of the body and find what it presses on.
+_FIRST_STEPS = 300
+# Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone, and steps of L-BFGS in each.
+_MOST_ROUNDS, _STEPS_PER_ROUND = 40, 40
+# Tension that is added to the factor [N/m]. Cloth without tension has next to no stiffness across its plane: steps would be too long.
+_PULL = 10.0
+# A round ends when the mean force is at most this share of what is allowed; dynamic relaxation takes over from so many times that.
+_ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
 _BLOCKS = 64
 
 
@@ -61,7 +60,8 @@ class DrapedCloth:
         pressing: #V, normal force on the body [N].
         residual: mean force that is left over a vertex's mean weight.
         converged: whether the cloth is at rest.
-        steps: that were taken.
+        steps: of dynamic relaxation.
+        rounds: of minimisation between them.
         seconds: wall clock.
     """
 
@@ -70,6 +70,7 @@ class DrapedCloth:
     residual: float
     converged: bool
     steps: int
+    rounds: int
     seconds: float
 
 
@@ -153,12 +154,19 @@ def relax_drape(
     start = cloth.designed if start is None else start
     energy = DrapeEnergy(cloth, body, options, np.zeros(len(start), bool) if held is None else held)
     relaxation = _DynamicRelaxation(cloth, energy)
-    hangs = body is None or float(np.mean(body.gaps(start) > _FREE)) > _HANGING_SHARE
-    energy.motion.position.assign(_minimise(energy, start) if hangs else start)
+    energy.motion.position.assign(start)
+    steps, rounds, residual, converged = 0, 0, np.inf, False
     observe = observer or (lambda _: None)
     observe(start)
-    steps, residual, before, converged = 0, np.inf, np.inf, False
     while steps < options.max_steps and not converged:
+        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS:
+            if rounds == 0:
+                energy.load_contact()
+            rounds += 1
+            left = _minimise(energy, options.tolerance)
+            observe(energy.motion.position.numpy())
+            if left > _NEARLY_AT_REST * options.tolerance:
+                continue
         relaxation.run(_STEPS_PER_CHECK)
         steps += _STEPS_PER_CHECK
         residual, worst = relaxation.check()
@@ -166,50 +174,32 @@ def relax_drape(
         converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
         if callback is not None:
             callback(steps, residual)
-        if hangs and not converged and steps < options.max_steps and steps % _STEPS_PER_LOOK == 0:
-            if residual > 0.5 * before:
-                _correct(energy)
-            before = residual
     return DrapedCloth(
         positions=energy.motion.position.numpy().copy(), pressing=relaxation.pressing.numpy().copy(),
-        residual=residual, converged=converged, steps=steps,
+        residual=residual, converged=converged, steps=steps, rounds=rounds,
         seconds=time.perf_counter() - began,
     )  # fmt: skip
 
 
-def _minimise(energy: DrapeEnergy, start: FloatArray) -> FloatArray:
-    """Minimise the energy coarsely by rounds of L-BFGS, each with planes and a factor of its own.
+def _minimise(energy: DrapeEnergy, tolerance: float) -> float:
+    """Take a round of the augmented Lagrangian: some steps of L-BFGS, then body and friction take over the forces that they had.
 
     Args:
-        energy: of the cloth.
-        start: #V by 3 [m].
+        energy: of the cloth, which is moved.
+        tolerance: as of the options.
 
     Returns:
-        #V by 3, places [m] from where the next round would release little.
+        the mean force that was left, over the mean weight of a vertex.
     """
-    x, released, gain = start, 0.0, np.inf
-    for number in range(_MOST_ROUNDS):
-        energy.renew_contact(x, sticking=number == 0)
-        energy.factor(x, _PULL * _PULL_FALLS**number)
-        descent = Descent(energy, energy.at(x))
-        for _ in range(_STEPS_PER_ROUND):
-            if not descent.step():
-                break
-        x, gain = descent.point.positions, descent.history[0] - descent.point.energy
-        released += gain
-        if gain <= _SMALL_RELEASE * released:
-            break
-    return x
-
-
-def _correct(energy: DrapeEnergy) -> None:
-    """Move what is slow, as the swing of a skirt, by a few steps of L-BFGS; what is quick is left to dynamic relaxation."""
     x = energy.motion.position.numpy().copy()
-    energy.renew_contact(x)
-    energy.factor(x, _SMALL_PULL)
-    descent = Descent(energy, energy.at(x))
-    for _ in range(_STEPS_PER_CORRECTION):
-        if not descent.step():
-            break
-    energy.motion.position.assign(descent.point.positions)
+    energy.factor(x, _PULL)
+    descent, weight = Descent(energy, energy.at(x)), float(energy.weight.mean())
+
+    def left() -> float:
+        return float(np.linalg.norm(descent.point.force, axis=1).mean()) / weight
+
+    while descent.iterations < _STEPS_PER_ROUND and left() > _ROUND_ENDS * tolerance and descent.step():
+        pass
+    energy.carry_contact(descent.point.positions)
     energy.motion.velocity.zero_()
+    return left()
