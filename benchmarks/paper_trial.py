@@ -218,6 +218,16 @@ def find_piece(cuts: list[Cut], piece: DraftedPiece) -> Cut:
     if found is None or best > 0.01 * wanted.area:
         raise SystemExit(f"{piece.name} is not among the printed pieces")
     cut, matrix = found
+    # Cloth that shrinks has shrunk before it is sewn.
+    across, along = piece.enlarged
+    matrix = [
+        matrix[0] / across,
+        matrix[1] / across,
+        matrix[2] / along,
+        matrix[3] / along,
+        matrix[4] / across,
+        matrix[5] / along,
+    ]
     return Cut(
         affine_transform(cut.outline, matrix),
         {role: [affine_transform(line, matrix) for line in rows] for role, rows in cut.lines.items()},
@@ -231,7 +241,7 @@ class PrintedSide:
         self.joints, self.notches = [0.0], []
         for part in side:
             cut, edge = cuts[part.piece], pieces[part.piece].edge(part.edge)
-            line = shapely.LineString(1000 * edge.line)
+            line = shapely.LineString(1000 * edge.line / np.array(pieces[part.piece].enlarged))
             corridor = line.buffer(NEAR, cap_style="flat")
             roles = ("sew", "hem", "dart", "internal") if edge.kind == "dart" else ("sew", "hem")
             # A stroke of this edge lies in its corridor; a neighbour's only touches it at the corner.

@@ -395,6 +395,8 @@ class Marker(Entry):
     utilisation: float | None = None
     pieces: int | None = None
     garments: int | None = None
+    folded: bool | None = None
+    """Whether the cloth lies double; the width is that of the half."""
     not_made: str | None = None
 
 

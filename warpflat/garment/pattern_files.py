@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from warpflat.core.activity import report_activity
 from warpflat.core.errors import InputError, nearest
-from warpflat.core.text import format_count
+from warpflat.core.text import format_count, plain_letters
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.linings import add_interfacing, add_lining
 from warpflat.pattern.shrinkage import Shrinkage, enlarged
@@ -348,35 +348,49 @@ def _marker(
     from warpflat.core.atomic_files import file_in
     from warpflat.core.json_file import write_json
     from warpflat.export.svg import write_marker_svg
+    from warpflat.pattern.cut_list import cloths_of
     from warpflat.pattern.marker import make_marker
+    from warpflat.pattern.matched_lay import Stripes
 
     report_activity(f"laying the marker, {seconds} s at most")
-    try:
-        marker = make_marker(drafted, cloth, seconds=seconds)
-    except InputError as error:
-        return [], (f"no marker was made: {error}",), {"not_made": str(error)}
-    files = [file_in(folder, name, ending) for ending in (".marker.svg", ".marker.json")]
-    write_marker_svg(marker, files[0])
-    placements: list[dict[str, Any]] = [
-        {
-            "piece": copy.piece.name,
-            "size": copy.piece.size,
-            "mirrored": copy.mirrored,
-            "turned": copy.turned,
-            "matrix": copy.matrix.tolist(),
+    cloths = list(dict.fromkeys(each for row in drafted.pieces.values() for piece in row for each in cloths_of(piece)))
+    names, remarks, plans = list[str](), list[str](), list[dict[str, Any]]()
+    for number, fabric in enumerate(cloths):
+        own = cloth if number == 0 else replace(cloth, stripes=Stripes())
+        try:
+            marker = make_marker(drafted, own, fabric=fabric if len(cloths) > 1 else "", seconds=seconds)
+        except InputError as error:
+            remarks.append(f"no marker was made: {error}")
+            plans.append({"not_made": str(error)})
+            continue
+        # The shell's marker has no more than the garment's name.
+        stem = name if number == 0 else f"{name}.{plain_letters(fabric).replace(' ', '_')}"
+        files = [file_in(folder, stem, ending) for ending in (".marker.svg", ".marker.json")]
+        write_marker_svg(marker, files[0])
+        placements: list[dict[str, Any]] = [
+            {
+                "piece": copy.piece.name,
+                "size": copy.piece.size,
+                "mirrored": copy.mirrored,
+                "turned": copy.turned,
+                "matrix": copy.matrix.tolist(),
+            }
+            for copy in marker.placements
+        ]
+        measures: dict[str, Any] = {
+            "width_m": marker.width,
+            "length_m": marker.length,
+            "utilisation": marker.utilisation,
+            "pieces": len(placements),
+            "garments": len(drafted.pieces),
+            "folded": marker.folded,
         }
-        for copy in marker.placements
-    ]
-    measures: dict[str, Any] = {
-        "width_m": marker.width,
-        "length_m": marker.length,
-        "utilisation": marker.utilisation,
-        "pieces": len(placements),
-        "garments": len(drafted.pieces),
-    }
-    write_json(files[1], {"schema": 1, **measures, "placements": placements})
-    remarks = (
-        f"marker: {marker.length:.2f} m of cloth {marker.width:.2f} m wide, {marker.utilisation:.1%} of it used by "
-        f"{format_count(len(placements), 'piece')}"
-    )
-    return [file.name for file in files], (remarks,), measures
+        write_json(files[1], {"schema": 1, **measures, "placements": placements})
+        names += [file.name for file in files]
+        plans.append(measures)
+        wide = f"{marker.width:.2f} m wide" + (" when folded" if marker.folded else "")
+        remarks.append(
+            f"marker{'' if number == 0 else f' of {fabric}'}: {marker.length:.2f} m of cloth {wide}, {marker.utilisation:.1%} of it "
+            f"used by {format_count(len(placements), 'piece')}"
+        )
+    return names, tuple(remarks), plans[0]

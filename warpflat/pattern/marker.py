@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -14,6 +14,7 @@ from warpflat.core.text import size_words
 from warpflat.pattern.cut_list import cloths_of
 from warpflat.pattern.drafted import DraftedEdge, DraftedGarment, DraftedPiece
 from warpflat.pattern.label import Label, fit_label, printed_size
+from warpflat.pattern.matched_lay import Stripes
 from warpflat.pattern.pieces import unknown_size
 from warpflat.pattern.words import printed_in, translate
 
@@ -40,12 +41,21 @@ class Cloth:
         reversible: both faces are equal, so that pairs may be cut either way up; otherwise one of each pair is
             mirrored.
         gap: between pieces, and to the selvedges and ends [m].
+        folded: lengthwise; halves lie against its fold, pairs are cut at once. All pieces point the same way.
+        stripes: that meet at seams. All pieces point the same way.
     """
 
     width: float
     one_way: bool = False
     reversible: bool = False
     gap: float = 0.002
+    folded: bool = False
+    stripes: Stripes = field(default_factory=Stripes)
+
+    @property
+    def by_rule(self) -> bool:
+        """Whether pieces have to lie where the fold or the stripes want them."""
+        return self.folded or bool(self.stripes.seams and self.stripes.repeat.any())
 
     def __post_init__(self) -> None:
         if not 0.1 <= self.width <= 10:
@@ -96,6 +106,7 @@ class Marker:
         fabric: which pieces it holds; "" for all.
         width, length: of the cloth, which lies from 0 to `length` along x and from 0 to `width` across [m].
         placements: the copies.
+        folded: the cloth lies double, its fold along y = 0; the width is that of the half.
     """
 
     name: str
@@ -103,6 +114,7 @@ class Marker:
     width: float
     length: float
     placements: tuple[Copy, ...]
+    folded: bool = False
 
     @property
     def utilisation(self) -> float:
@@ -141,6 +153,8 @@ def make_marker(
         InputError: an unknown size or fabric, or a piece wider than the cloth.
     """
     wanted = dict.fromkeys(garment.pieces, 1) if sizes is None else sizes
+    if cloth.by_rule:
+        return _marker_by_rule(garment, cloth, fabric, wanted)
     copies = _copies(garment, fabric, wanted)
     tries = [copies]
     if cloth.reversible and any(mirrored for _, mirrored in copies):
@@ -156,6 +170,51 @@ def make_marker(
         length=_length(placements) + cloth.gap,
         placements=tuple(placements),
     )
+    _check(marker)
+    return marker
+
+
+def _marker_by_rule(garment: DraftedGarment, cloth: Cloth, fabric: str, sizes: Mapping[str, int]) -> Marker:
+    """Lay the pieces on folded cloth, or so that stripes meet."""
+    from warpflat.pattern.half_pieces import halved
+    from warpflat.pattern.matched_lay import Laid, lay_by_rule
+
+    garment = halved(garment) if cloth.folded else garment
+    copies, once = list[Laid](), dict[tuple[str, str], int]()
+    for piece, mirrored in _copies(garment, fabric, sizes):
+        on_fold = cloth.folded and piece.piece.on_fold
+        key = piece.name, piece.size
+        once[key] = once.get(key, 0) + 1
+        if cloth.folded and not on_fold and once[key] % 2 == 0:
+            continue  # the second layer
+        linear = _onto_cloth(mirrored and not cloth.folded)
+        if (
+            on_fold
+            and (piece.cut_line @ linear.T)[:, 1].min() < (piece.fold_edges[0].line @ linear.T)[:, 1].min() - 1e-6
+        ):
+            linear = _onto_cloth(True)
+        outline = piece.cut_line if on_fold else unfold_piece(piece)
+        copies.append(Laid(piece=piece, mirrored=mirrored, linear=linear, outline=outline, at_fold=on_fold))
+    width = 0.5 * cloth.width if cloth.folded else cloth.width
+    laid = lay_by_rule(copies, width, cloth.gap, cloth.stripes, garment)
+    placements = [
+        _placed(
+            each.piece,
+            each.mirrored,
+            each.linear,
+            0.0,
+            (1e3 * each.shift[0], 1e3 * each.shift[1]),
+            0.0,
+            half=each.at_fold,
+        )
+        for each in laid
+    ]
+    with printed_in(garment.garment.words):
+        placements = [_named(copy) for copy in sorted(placements, key=lambda copy: tuple(copy.cut_line.min(axis=0)))]
+    marker = Marker(
+        name=garment.name, fabric=fabric, width=width, length=_length(placements) + cloth.gap,
+        placements=tuple(placements), folded=cloth.folded,
+    )  # fmt: skip
     _check(marker)
     return marker
 
@@ -286,9 +345,17 @@ def _simpler(cut: FloatArray) -> FloatArray:
 
 
 def _placed(
-    piece: DraftedPiece, mirrored: bool, linear: FloatArray, degrees: float, shift: tuple[float, float], margin: float
+    piece: DraftedPiece,
+    mirrored: bool,
+    linear: FloatArray,
+    degrees: float,
+    shift: tuple[float, float],
+    margin: float,
+    *,
+    half: bool = False,
 ) -> Copy:
-    """Return a copy at the solver's place."""
+    """Return a copy at the solver's place; a half one where it lies against the fold of the cloth."""
+    both = (lambda lines: lines) if half else (lambda lines: _of_both_halves(piece, lines))
     angle = np.radians(degrees)
     turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
     matrix = np.column_stack([turn @ linear, np.array(shift) / 1000 + margin])
@@ -301,12 +368,12 @@ def _placed(
         mirrored=mirrored,
         turned=abs(np.cos(angle) + 1) < 1e-6,
         matrix=matrix,
-        cut_line=moved(unfold_piece(piece)),
-        cutouts=tuple(moved(line) for line in _of_both_halves(piece, [c.cut_line for c in piece.cutouts.values()])),
+        cut_line=moved(piece.cut_line if half else unfold_piece(piece)),
+        cutouts=tuple(moved(line) for line in both([c.cut_line for c in piece.cutouts.values()])),
         fold_lines=tuple(moved(edge.line) for edge in piece.fold_edges),
         grain=moved(piece.grain),
         name=None,
-        notches=tuple(moved(slit) for slit in _of_both_halves(piece, _slits(piece))),
+        notches=tuple(moved(slit) for slit in both(_slits(piece))),
     )
 
 

@@ -18,7 +18,7 @@ from warpflat.core.arrays import BoolArray, FloatArray, IntArray
 if TYPE_CHECKING:
     from shapely import Polygon
 
-__all__ = ["TurnedShape", "nest_on_strip", "nest_on_tiles"]
+__all__ = ["CELL", "Mask", "Places", "TurnedShape", "nest_on_strip", "nest_on_tiles", "orders"]
 
 
 #: Cells are about this wide [m], at most.
@@ -43,7 +43,7 @@ class TurnedShape:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class _Mask:
+class Mask:
     """A shape in one position as cells, rows downwards."""
 
     cells: BoolArray
@@ -90,13 +90,13 @@ def nest_on_tiles(
     needed = int(np.ceil(total / float(np.prod(step))))
     tallest = max(min(m.cells.shape[0] for m in row) for row in masks)
     least_rows = int(np.ceil((tallest - shared[0]) / per_tile[0]))
-    best: tuple[float, list[tuple[_Mask, int, int]]] | None = None
+    best: tuple[float, list[tuple[Mask, int, int]]] | None = None
     for columns in _column_counts(masks, per_tile, shared, needed):
         rows = min(MOST_TILES, least_rows + needed // columns + 2)
         grid = _Grid(cell=cell, per_tile=(per_tile[0], per_tile[1]), shared=shared, tiles=(rows, columns))
         shape = rows * per_tile[0] + shared[0], columns * per_tile[1] + shared[1]
-        sheet = _Places(shape)
-        for order in _orders(masks):
+        sheet = Places(shape)
+        for order in orders(masks):
             laid = _lay(masks, order, grid, sheet)
             if laid is not None and (best is None or laid[0] < best[0]):
                 best = laid
@@ -116,8 +116,8 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
     if any(row[0].cells.shape[1] > across for row in masks):
         return None
     longest = sum(row[0].cells.shape[0] for row in masks)
-    lengths, places = [], _Places((longest, across))
-    for order in _orders(masks):
+    lengths, places = [], Places((longest, across))
+    for order in orders(masks):
         places.clear()
         length = 0
         for k in order:
@@ -129,14 +129,14 @@ def nest_on_strip(shapes: Sequence[Polygon], *, width: float, gap: float) -> flo
     return min(lengths) * float(cell[1])
 
 
-def _highest(places: _Places, mask: _Mask) -> tuple[int, int]:
+def _highest(places: Places, mask: Mask) -> tuple[int, int]:
     """Return the first free place (row, column) of a mask."""
     free = places.free(mask)
     row = int(np.argmax(free.any(axis=1)))
     return row, int(np.argmax(free[row]))
 
 
-def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[_Mask]:
+def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -> list[Mask]:
     """Return a shape as cells in its positions, grown by half of the gap; a cell that it touches is its own."""
     import shapely
     from shapely.affinity import rotate
@@ -152,12 +152,12 @@ def _masks(shape: Polygon, cell: FloatArray, gap: float, turns: Sequence[int]) -
         y = high[1] - cell[1] * np.arange(1, rows + 1)
         boxes = shapely.box(x[None, :], y[:, None], x[None, :] + cell[0], y[:, None] + cell[1])
         extent = np.array(turned.bounds[2:]) - np.array(turned.bounds[:2])
-        found.append(_Mask(cells=shapely.intersects(grown, boxes), quarters=quarters, extent=extent))
+        found.append(Mask(cells=shapely.intersects(grown, boxes), quarters=quarters, extent=extent))
     return found
 
 
 def _column_counts(
-    masks: Sequence[Sequence[_Mask]], per_tile: tuple[int, ...], shared: tuple[int, int], needed: int
+    masks: Sequence[Sequence[Mask]], per_tile: tuple[int, ...], shared: tuple[int, int], needed: int
 ) -> list[int]:
     """Return the numbers of columns that are tried: around a square sheet, and wide enough for every shape."""
     narrowest = max(min(mask.cells.shape[1] for mask in row) for row in masks)
@@ -166,7 +166,7 @@ def _column_counts(
     return list(range(least, max(least, square) + 3))
 
 
-def _orders(masks: Sequence[Sequence[_Mask]]) -> list[list[int]]:
+def orders(masks: Sequence[Sequence[Mask]]) -> list[list[int]]:
     """Return orders of the shapes: by falling area, by falling height, and some at random near these."""
     area = np.array([row[0].cells.sum() for row in masks], dtype=float)
     tall = np.array([row[0].cells.shape[0] for row in masks], dtype=float)
@@ -178,14 +178,14 @@ def _orders(masks: Sequence[Sequence[_Mask]]) -> list[list[int]]:
 
 
 def _lay(
-    masks: Sequence[Sequence[_Mask]], order: Sequence[int], grid: _Grid, sheet: _Places
-) -> tuple[float, list[tuple[_Mask, int, int]]] | None:
+    masks: Sequence[Sequence[Mask]], order: Sequence[int], grid: _Grid, sheet: Places
+) -> tuple[float, list[tuple[Mask, int, int]]] | None:
     """Lay shapes in an order; return the price in tiles and each one's mask, row and column; None if one finds no room."""
     sheet.clear()
     used = np.zeros(grid.tiles, dtype=bool)
-    places: dict[int, tuple[_Mask, int, int]] = {}
+    places: dict[int, tuple[Mask, int, int]] = {}
     for k in order:
-        best: tuple[float, _Mask, int, int] | None = None
+        best: tuple[float, Mask, int, int] | None = None
         for mask in masks[k]:
             if (np.array(mask.cells.shape) > sheet.occupied.shape).any():
                 continue
@@ -266,7 +266,7 @@ def _touched(cells: BoolArray, row: int, column: int, grid: _Grid) -> BoolArray:
     return tiles
 
 
-class _Places:
+class Places:
     """The free places of masks on one sheet, by correlation with what is occupied; transforms are kept."""
 
     def __init__(self, shape: tuple[int, int]) -> None:
@@ -278,13 +278,13 @@ class _Places:
         self._masks: dict[int, Any] = {}
         self._here: Any = None
 
-    def take(self, mask: _Mask, row: int, column: int) -> None:
+    def take(self, mask: Mask, row: int, column: int) -> None:
         """Lay a mask."""
         down, across = mask.cells.shape
         self.occupied[row : row + down, column : column + across] |= mask.cells
         self._here = None
 
-    def free(self, mask: _Mask) -> BoolArray:
+    def free(self, mask: Mask) -> BoolArray:
         """Return the places (row, column of the upper left) at which a mask meets nothing that is occupied."""
         from scipy.fft import irfft2
 
@@ -305,7 +305,7 @@ class _Places:
 
 
 def _places(
-    laid: Sequence[tuple[_Mask, int, int]], cell: FloatArray, step: FloatArray, overlap: float, gap: float
+    laid: Sequence[tuple[Mask, int, int]], cell: FloatArray, step: FloatArray, overlap: float, gap: float
 ) -> tuple[list[TurnedShape], FloatArray]:
     """Return places on the sheet [m], y upwards, and its size, without unused rows and columns at its end."""
     margin = gap / 2 + CELL / 20

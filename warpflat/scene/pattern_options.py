@@ -24,10 +24,19 @@ def pattern_options(
         InputError: a gap that is wide against the cloth.
     """
     from warpflat.pattern.marker import Cloth
+    from warpflat.pattern.matched_lay import Stripes
 
     cloth = None
     if marker is not None:
-        cloth = Cloth(width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap)
+        stripes = Stripes()
+        if cut_from is not None:
+            stripes = Stripes(
+                warp=cut_from.repeat_warp_mm / 1000, weft=cut_from.repeat_weft_mm / 1000, seams=tuple(cut_from.match)
+            )
+        cloth = Cloth(
+            width=marker.width, one_way=marker.one_way, reversible=marker.reversible, gap=marker.gap, folded=marker.folded,
+            stripes=stripes,
+        )  # fmt: skip
     return PatternOptions(
         formats=tuple(table.formats),
         dialect=table.dialect,

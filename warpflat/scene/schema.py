@@ -332,6 +332,11 @@ class ClothTable(Table):
     shrinkage_weft: Annotated[float, Field(ge=0, le=0.25)] = 0.0
     lining: Annotated[str, Field(max_length=40)] = ""
     """What the lining is called; with a name the shell's pieces are lined."""
+    repeat_warp_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    """Repeat of stripes or checks along the warp; 0 where there is none."""
+    repeat_weft_mm: Annotated[float, Field(ge=0, le=1000)] = 0.0
+    match: list[str] = Field(default_factory=list)
+    """Seams at whose first notch both sides lie on the same stripe in the marker."""
     interfacing: Annotated[str, Field(max_length=40)] = ""
     """What the interfacing is called; with a name facings and waistbands are cut from it too."""
 
@@ -344,6 +349,8 @@ class MarkerTable(Table):
     reversible: bool = False
     gap: Annotated[float, Field(ge=0, le=0.1)] = 0.002
     seconds: Annotated[int, Field(ge=1, le=600)] = 5
+    folded: bool = False
+    """The cloth is folded lengthwise: halves lie against its fold, pairs are cut at once."""
 
 
 _RELAX_FIELDS: dict[str, Any] = {
