@@ -11,7 +11,7 @@ from pathlib import Path
 
 from packaging.requirements import Requirement
 
-EXTRAS = ("batch",)
+EXTRAS = ("batch", "studio")
 
 
 def find_packages(name: str, extras: tuple[str, ...] = ()) -> dict[str, Distribution]:
@@ -62,8 +62,8 @@ def licences_page() -> str:
     """Return the page."""
     lines = [
         "# Third-party licences", "",
-        "warpflat is under Apache 2.0. It contains no code of others. An installation, with the extra `batch`, brings these packages",
-        "(`python docs/make_licences.py` reads them from the packages themselves):", "",
+        "warpflat is under Apache 2.0. It contains no code of others. An installation, with the extras `batch` and `studio`, brings",
+        "these packages (`python docs/make_licences.py` reads them from the packages themselves):", "",
         "| package | licence | page |", "|---|---|---|",
     ]  # fmt: skip
     for name, package in find_packages("warpflat", EXTRAS).items():

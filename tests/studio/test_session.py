@@ -269,6 +269,11 @@ def test_stop_keeps_what_has_been_reached_and_frames_come_ten_a_second(tmp_path:
     assert session.solution is not None
     assert not session.solution.at_rest
     assert len(frames) == 1
+    whole = session.solution
+    frames.clear()
+    session.watch("trial")
+    assert frames[0].stage == "plain step 0"
+    assert session.solution is whole
     watch = Watch(Ticket(), lambda name, frame: None)
     assert [watch.is_time("a"), watch.is_time("a"), watch.is_time("b")] == [True, False, True]
 

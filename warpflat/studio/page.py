@@ -52,7 +52,7 @@ class Page:
         self.server = _serve(host, port)
         self.url = f"http://{host}:{self.server.get_port()}"
         self._kind = "energy"
-        self._scale: Scale | None = None
+        self.scale: Scale | None = None
         self._two_points, self._points = False, list[Hit]()
         self._picked: tuple[str, str] | None = None
         self._frames: dict[str, PieceFrame] = {}
@@ -60,14 +60,14 @@ class Page:
         self._body: Mannequin | None = None
         self._seen = False  # whether a camera has been set upon the first picture
         self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
-        self._dirty, self._closed, self._told = threading.Event(), False, True
-        self._stage = Stage(self.server)
+        self._dirty, self._closed, self._told, self._drawing = threading.Event(), False, True, False
+        self.stage = Stage(self.server)
         actions = Actions(
             choose_map=self._choose_map,
             choose_line=self._choose_line,
             choose_mode=self._choose_mode,
             try_again=self._try_part,
-            view=self._stage.show_all,
+            view=self.stage.show_all,
         )
         self._panel = Panel(self.server, self.session, actions, name=free_name(scene))
         self.server.on_client_connect(self._greet)
@@ -75,6 +75,11 @@ class Page:
         self._painter = threading.Thread(target=self._paint, name="painter", daemon=True)
         self._painter.start()
         self.session.begin()
+
+    @property
+    def is_idle(self) -> bool:
+        """Whether nothing is being solved or waits to be drawn."""
+        return not (self._worker.is_busy or self._dirty.is_set() or self._drawing)
 
     def close(self) -> None:
         """End the studio."""
@@ -100,6 +105,7 @@ class Page:
             self._dirty.wait()
             if self._closed:
                 return
+            self._drawing = True
             self._dirty.clear()
             begun = time.monotonic()
             try:
@@ -107,6 +113,7 @@ class Page:
             except Exception:
                 # The next picture may be a better one; the fault is told where programs tell them.
                 traceback.print_exc()
+            self._drawing = False
             time.sleep(max(0.0, _BETWEEN - (time.monotonic() - begun)))
 
     def _draw(self) -> None:
@@ -131,13 +138,13 @@ class Page:
 
     def _draw_pieces(self, pieces: Mapping[str, Shown], kind: str, drape: Drape | None, *, at_rest: bool) -> None:
         """Draw pieces; while they are being relaxed the scale and their places on the table stay."""
-        if at_rest or self._scale is None or self._scale.kind != kind:
+        if at_rest or self.scale is None or self.scale.kind != kind:
             frames = [piece.frame for piece in pieces.values()]
-            self._scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
-            self._panel.show_scale(self._scale)
+            self.scale = drape_scale(drape) if drape is not None and kind == "drape" else piece_scale(kind, frames)
+            self._panel.show_scale(self.scale)
         if at_rest:
-            self._stage.lay_out(pieces)
-        self._stage.draw(pieces, self._scale, tentative=self.session.preview is not None)
+            self.stage.lay_out(pieces)
+        self.stage.draw(pieces, self.scale, tentative=self.session.preview is not None)
 
     def _pieces(
         self, solution: Solution | None, live: Mapping[str, PieceFrame], kind: str, drape: Drape | None
@@ -165,15 +172,15 @@ class Page:
 
     def _after_rest(self, solution: Solution) -> None:
         """Write what does not change while pieces are being relaxed: names, the body, the camera of the first picture."""
-        self._stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
+        self.stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
         body = None if solution.plan is None else solution.plan.mannequin
         if body is not self._body:
-            self._stage.draw_body(None if body is None else body.surface())
+            self.stage.draw_body(None if body is None else body.surface())
             self._body = body
         if not self._seen:
             self._seen = True
             for client in self.server.get_clients().values():
-                self._stage.show_all(client)
+                self.stage.show_all(client)
 
     def _update_panel(self) -> None:
         solution = self.session.solution
@@ -186,7 +193,7 @@ class Page:
         if self._picked is not None and solution is not None:
             piece, line = self._picked
             marked = solution.pieces[piece].surface, known[piece][line]
-        self._stage.mark(marked, self._points)
+        self.stage.mark(marked, self._points)
 
     def _cuttable(self, solution: Solution | None) -> dict[str, dict[str, IntArray]]:
         """Return by piece the lines that can be cut."""
@@ -197,12 +204,20 @@ class Page:
         return self._lines[1]
 
     def _greet(self, client: viser.ClientHandle) -> None:
-        """Set the camera of a page that has been opened, and follow it."""
-        client.camera.on_update(lambda camera: self._stage.face(camera.wxyz))
-        self._stage.show_all(client)
+        """Set the camera of a page that has been opened, and follow it; a window of another shape shows all again."""
+        shape = [0.0]
+
+        def follow(camera: viser.CameraHandle) -> None:
+            if abs(camera.aspect - shape[0]) > 0.01 * camera.aspect:
+                shape[0] = camera.aspect
+                self.stage.show_all(client)
+            self.stage.face(camera.wxyz)
+
+        client.camera.on_update(follow)
+        follow(client.camera)
 
     def _click(self, event: viser.SceneClickEvent) -> None:
-        hit, solution = self._stage.pick(event.ray_origin, event.ray_direction), self.session.solution
+        hit, solution = self.stage.pick(event.ray_origin, event.ray_direction), self.session.solution
         if hit is None or solution is None:
             return
         if self._two_points:

@@ -300,6 +300,8 @@ class Session:
                 options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
             garment = solution.garment or next(iter(solution.pieces.values()))
             step.drape = drape(garment, hold=() if table is None else table.hold, options=options, callback=go_on)
+            if not step.drape.converged:
+                self.note = 'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'
 
         self._run("draping", job)
 

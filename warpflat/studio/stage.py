@@ -70,6 +70,12 @@ class Stage:
         self._boxes = np.zeros((2, 2, 3))  # form and pattern: low and high
         self._pieces: dict[str, Shown] = {}
         self._nodes: dict[str, Any] = {}
+        self._sides: dict[int, float] = {}
+
+    @property
+    def form_position(self) -> FloatArray:
+        """Where the form stands, 3 [m]."""
+        return np.asarray(self._form.position)
 
     def lay_out(self, pieces: Mapping[str, Shown]) -> None:
         """Choose the places of pieces on the table, and of form and pattern beside each other."""
@@ -200,13 +206,15 @@ class Stage:
             self._turn = turn
             self._place()
 
-    def show_all(self, client: Any, side: float = 0.0) -> None:
+    def show_all(self, client: Any, side: float | None = None) -> None:
         """Move a client's camera so that form and pattern fill its window.
 
         Args:
             client: of the server.
-            side: from where the form is seen: 0 the front, 90 its left side, 180 the back [degrees].
+            side: from where the form is seen: 0 the front, 90 its left side, 180 the back [degrees]; as before if not given.
         """
+        side = self._sides.setdefault(client.client_id, 0.0) if side is None else side
+        self._sides[client.client_id] = side
         width, height = self._size()
         aspect = client.camera.aspect or 1.5
         half = np.tan(0.5 * _FOV)

@@ -1,0 +1,159 @@
+"""The studio's page in headless Chromium: pick a line, cut, change the cloth, undo, save; nothing leaves the machine."""
+
+from __future__ import annotations
+
+import io
+import shutil
+import socket
+import time
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from warpflat.cli.main import main
+from warpflat.core.errors import InputError
+from warpflat.scene.load import load_scene, make_scene
+
+viser = pytest.importorskip("viser", reason="the extra `studio` (viser) is not installed")
+BROWSER = shutil.which("chromium") or shutil.which("google-chrome")
+SCENE = {
+    "surface": {"shape": "bodice", "resolution": 17},
+    "datum": "centre",
+    "output": {"frames": 0, "picture": False},
+    "pattern": {"formats": []},
+}
+
+
+def free_port() -> int:
+    with socket.socket() as trial:
+        trial.bind(("127.0.0.1", 0))
+        return int(trial.getsockname()[1])
+
+
+def test_a_taken_port_is_one_line(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    with socket.socket() as other:
+        other.bind(("127.0.0.1", 0))
+        other.listen()
+        scene = tmp_path / "trial.toml"
+        scene.write_text('[surface]\nshape = "dome"\n')
+        port = other.getsockname()[1]
+        assert main(["studio", str(scene), "--port", str(port), "--no-open"]) == 2
+    assert capsys.readouterr().err.startswith(f"warpflat: cannot serve on 127.0.0.1:{port}: address already in use")
+
+
+@pytest.mark.skipif(BROWSER is None, reason="needs Chromium")
+def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
+    from chromium import chromium
+
+    from warpflat.studio.page import Page
+
+    scene = make_scene(SCENE, name="trial", folder=tmp_path, where="trial")
+    page = Page(scene, host="127.0.0.1", port=free_port(), out=tmp_path / "out")
+    head, tried = (
+        "document.querySelector('#studio-head')?.innerText",
+        "document.querySelector('#studio-preview')?.innerText",
+    )
+    try:
+        with chromium(str(BROWSER), tmp_path / "profile", 900, 600) as browser:
+            browser.send("Page.navigate", url=page.url)
+            browser.wait(f"{head}?.includes('at rest') && {head}")
+            whole = page.session.solution
+            assert whole is not None
+            client = wait_for(lambda: next(iter(page.server.get_clients().values()), None))
+            # That there is no graphics card is told over the form.
+            browser.run("document.querySelectorAll('.mantine-Notification-closeButton').forEach(e => e.click())")
+            width, height = (
+                browser.run(f"document.querySelector('canvas').client{way}") for way in ("Width", "Height")
+            )
+            # The camera follows the window's shape, which the panel changes.
+            wait_for(lambda: abs(client.camera.aspect - width / height) < 0.01)
+            wait_for(lambda: np.allclose(client.camera.position[:2], 0.0) and client.camera.fov < 0.5)
+            surface = whole.pieces["trial"].surface
+            place = surface.vertices[surface.lines["bust"][4]] + page.stage.form_position
+            x, y = on_screen(client.camera, place, width, height)
+            browser.click(x, y)
+            words = browser.wait(tried)
+            assert words.startswith("bust releases ")
+            assert " mm" in words
+            assert page.session.scene.settings.cuts == []
+            browser.press("Apply")
+            wait_for(lambda: page.session.can_undo)
+            assert page.session.scene.settings.cuts[0].line == "bust"
+            browser.choose("cloth", "denim")
+            wait_for(lambda: page.session.scene.settings.fabric == "denim" and not page.session.activity)
+            browser.press("Undo")
+            wait_for(lambda: page.session.scene.settings.fabric != "denim")
+            browser.press("Save and run")
+            browser.wait(f"{head}?.includes('run from scratch')")
+            assert [cut.line for cut in load_scene(tmp_path / "trial.toml").settings.cuts] == ["bust"]
+            assert (tmp_path / "out" / "trial" / "metrics.json").is_file()
+            browser.press("Save and run")
+            browser.wait("document.body.innerText.includes('Replace the file?')")
+            browser.press("Keep it")
+            assert browser.faults == []
+            hosts = {urlsplit(url).hostname for url in browser.requests} - {None}
+            assert hosts == {"127.0.0.1"}
+            assert shows_the_scale(browser, page, client)
+    finally:
+        page.close()
+
+
+def test_pages_of_other_sites_are_refused(tmp_path: Path) -> None:
+    from websockets.exceptions import ConnectionClosed
+    from websockets.sync.client import connect
+
+    from warpflat.studio.page import Page
+
+    scene = make_scene({"surface": {"shape": "dome", "resolution": 5}}, name="trial", folder=tmp_path, where="trial")
+    page = Page(scene, host="127.0.0.1", port=free_port(), out=tmp_path)
+    try:
+        address = page.url.replace("http", "ws")
+        protocol = [f"viser-v{viser.__version__}"]
+        foreign = connect(address, origin="https://example.com", subprotocols=protocol)
+        with pytest.raises(ConnectionClosed, match="own page only"):
+            take_all(foreign)
+        with connect(address, origin=page.url, subprotocols=protocol) as own:
+            assert own.recv(timeout=20.0)
+        with pytest.raises(InputError, match="give another --port"):
+            Page(scene, host="127.0.0.1", port=page.server.get_port(), out=tmp_path)
+    finally:
+        page.close()
+
+
+def take_all(connection) -> None:
+    while True:
+        connection.recv(timeout=20.0)
+
+
+def wait_for(what, seconds: float = 60.0):
+    end = time.monotonic() + seconds
+    while time.monotonic() < end:
+        found = what()
+        if found:
+            return found
+        time.sleep(0.05)
+    raise AssertionError("it did not come true")
+
+
+def on_screen(camera, point, width: float, height: float) -> tuple[float, float]:
+    """Return where a point is seen [CSS pixels]; the camera looks along -z."""
+    away = np.asarray(point) - camera.position
+    scale = 0.5 * height / np.tan(0.5 * camera.fov) / -away[2]
+    return 0.5 * width + scale * away[0], 0.5 * height - scale * away[1]
+
+
+def shows_the_scale(browser, page, client) -> bool:
+    """Return whether the pattern is seen in the colours of its scale."""
+    import base64
+
+    data = base64.b64decode(browser.send("Page.captureScreenshot", format="png")["data"])
+    pixels = np.asarray(Image.open(io.BytesIO(data)).convert("RGB"), dtype=float)
+    canvas = pixels[:, : browser.run("document.querySelector('canvas').clientWidth")]
+    expected = 255.0 * page.scale.colours(np.linspace(page.scale.low, page.scale.high, 64))
+    right = canvas[:, canvas.shape[1] // 2 :].reshape(-1, 3)
+    seen = right[np.abs(right - 255.0).max(axis=1) > 3.0]
+    near = np.abs(seen[:, None] - expected).max(axis=2).min(axis=1) < 6.0
+    return bool(near.mean() > 0.7)
