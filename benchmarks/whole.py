@@ -1,11 +1,12 @@
 """Whole commands, part by part: `run` of scenes, with and without what a scene can leave out, and `flatten` of large meshes.
 
-    OMP_NUM_THREADS=1 python benchmarks/whole.py [--only paper_block tshirt 40000] [--variants] [--repeats 3] [--imports] [--json FILE]
+    OMP_NUM_THREADS=1 python benchmarks/whole.py [--only paper_block tshirt 40000] [--variants] [--repeats 3] [--json FILE]
 
-Each command is a process of its own, with compiled kernels. Seconds are wall time; `cpu` is that of all its threads and children. A part's
-seconds are those spent in its functions less those in other parts that these call. `rest` is main-thread time in no part. `beside` is
-processor time of other threads and of child processes, which lies beside the parts. The command with the least processor time of all
-repeats is shown. `--variants` runs each scene without its marker, picture, film and drape, and with a marker and a drape.
+Each command is a process of its own, with compiled kernels. Of each part it prints wall time, then processor time of the main thread: what
+its functions take less what others take that they call. `waiting` is for processes that write files beside it, `rest` is time in no part,
+`beside` processor time of other threads and of those processes. The command with the least processor time of all repeats is shown. Memory
+is the largest sum of all its processes, shared pages counted once, looked at ten times a second. `--variants` runs each scene without its
+picture, film and pattern files, and with a marker and a drape.
 """
 
 from __future__ import annotations
@@ -22,8 +23,11 @@ import tempfile
 import time
 from collections import defaultdict
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
+
+import psutil
 
 SCENES = Path(__file__).parents[1] / "scenes"
 NAMES = ("paper_block", "tshirt", "basic_block", "princess_dress")
@@ -71,8 +75,10 @@ PARTS = {
     "pattern, JSON": ("export.pattern_json:write_pattern_json",),
     "marker": ("garment.pattern_files:_marker",),
     "drape": ("scene.drape:write_drape",),
+    "film for the page": ("review.page:pack_frames",),
     "review": ("review.page:write_review",),
     "metrics, hashes": ("core.manifest:remove_stale",),
+    "waiting": ("core.beside:Beside.result",),
     "report": ("cli.run:report_run",),
 }  # fmt: skip
 # The parts in order, with those that are measured by themselves.
@@ -190,6 +196,16 @@ def measured(arguments: list[str], repeats: int) -> dict[str, Any]:
         if not best or found["cpu"] < best["cpu"]:
             best = found
     return best
+
+
+def memory_of(pid: int) -> float:
+    """Return the memory of a process and its children [GB]: a page that several share is counted once."""
+    total = 0.0
+    with suppress(psutil.Error):
+        process = psutil.Process(pid)
+        for each in (process, *process.children(recursive=True)):
+            total += each.memory_full_info().pss / 1e9
+    return total
 
 
 def show(name: str, found: dict[str, Any]) -> None:

@@ -38,11 +38,12 @@ def run_and_report(
     scene: Scene, out: Path | None, *, quiet: bool, verbose: bool, as_json: bool, device: str | None
 ) -> int:
     from warpflat.cli.progress_bar import ProgressBar
+    from warpflat.core.beside import work_beside
     from warpflat.scene.run import run_scene
 
     start_warp_silently()
     folder = out if out is not None else Path("out") / scene.name
-    with ProgressBar(scene.name, hidden=quiet or as_json) as bar:
+    with ProgressBar(scene.name, hidden=quiet or as_json) as bar, work_beside():
         result = run_scene(scene, folder, on_progress=bar, device=device)
     return report_run(result, folder, quiet=quiet, verbose=verbose, as_json=as_json)
 

@@ -30,9 +30,11 @@ from warpflat.core.input_files import is_among, listening_to_reads, refuse_to_re
 from warpflat.core.replace_file import is_open_elsewhere, replace_file
 
 __all__ = [
+    "adopt_files",
     "atomic_path",
     "expect_files",
     "file_in",
+    "files_written",
     "hidden_file",
     "is_input",
     "latest_file",
@@ -395,6 +397,18 @@ def latest_file(path: Path) -> Path:
     """Return the path of an output file's latest content: the hidden one while an :func:`output_folder` is open."""
     run = _run_into(path.parent)
     return path if run is None or path.name not in run.names else run.new / path.name
+
+
+def files_written() -> list[tuple[str, str]]:
+    """Return the complete files of the runs that write at present: folder and name of each."""
+    return [(str(run.folder), name) for run in _going_on() for name in run.names]
+
+
+def adopt_files(files: Iterable[tuple[str, str]]) -> None:
+    """Add files to the runs that write at present, which a fork of this process has completed for them."""
+    for folder, name in files:
+        if run := _run_into(Path(folder)):
+            run.names[name] = None
 
 
 def is_input(path: Path) -> bool:

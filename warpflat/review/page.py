@@ -5,7 +5,7 @@ from __future__ import annotations
 import base64
 import io
 import json
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from html import escape
 from importlib import resources
 from pathlib import Path
@@ -17,7 +17,7 @@ from warpflat.core.errors import InputError
 from warpflat.review.film import open_film, pack_film
 from warpflat.review.tables import energy_table, ledger_table, piece_table, seam_table, size_table, summary_cards
 
-__all__ = ["read_run", "review_folder", "write_review"]
+__all__ = ["pack_frames", "read_run", "review_folder", "write_review"]
 
 # Nothing on the page may ask for anything from elsewhere, nor from the disk.
 _POLICY = "default-src 'none'; img-src data:; script-src 'unsafe-inline'; style-src 'unsafe-inline'"
@@ -66,7 +66,23 @@ def review_folder(folder: str | Path) -> Path:
     return folder / "review.html"
 
 
-def write_review(folder: Path, metrics: Mapping[str, Any], files: Sequence[str], *, name: str) -> str:
+def pack_frames(folder: Path) -> dict[str, Any] | None:
+    """Pack the `frames.usdc` of a folder for the page; None if it is too large for one.
+
+    Raises:
+        InputError: it is no USD file.
+    """
+    return pack_film(open_film(latest_file(folder / "frames.usdc")))
+
+
+def write_review(
+    folder: Path,
+    metrics: Mapping[str, Any],
+    files: Sequence[str],
+    *,
+    name: str,
+    film: Callable[[], Mapping[str, Any] | None] | None = None,
+) -> str:
     """Write `review.html` and return its name.
 
     Args:
@@ -74,6 +90,7 @@ def write_review(folder: Path, metrics: Mapping[str, Any], files: Sequence[str],
         metrics: as `metrics.json`.
         files: what the run has written, by name.
         name: of the run.
+        film: gives what `pack_frames` has made of this folder, if it was called before.
 
     Raises:
         InputError: a file cannot be read as what it is, or the page cannot be written.
@@ -81,7 +98,7 @@ def write_review(folder: Path, metrics: Mapping[str, Any], files: Sequence[str],
     report_activity("writing the review page")
     path = folder / "review.html"
     try:
-        page = _page(folder, metrics, files, name)
+        page = _page(folder, metrics, files, name, film or (lambda: pack_frames(folder)))
     except (KeyError, TypeError, AttributeError, ValueError, IndexError) as error:
         raise InputError(f"{folder}: a file of the run is damaged ({error}); run the scene again") from error
     with atomic_path(path) as temporary:
@@ -89,10 +106,16 @@ def write_review(folder: Path, metrics: Mapping[str, Any], files: Sequence[str],
     return path.name
 
 
-def _page(folder: Path, metrics: Mapping[str, Any], files: Sequence[str], name: str) -> str:
+def _page(
+    folder: Path,
+    metrics: Mapping[str, Any],
+    files: Sequence[str],
+    name: str,
+    packed_film: Callable[[], Mapping[str, Any] | None],
+) -> str:
     film, packed = "", None
     if "frames.usdc" in files:
-        packed = pack_film(open_film(latest_file(folder / "frames.usdc")))
+        packed = packed_film()
         film = _film_section(packed) if packed else "<p>The film is too large for a page; see frames.usdc.</p>"
     notes = [(f"{piece}: {note}") for piece, entry in metrics["pieces"].items() for note in entry.get("notes", ())]
     sections = [

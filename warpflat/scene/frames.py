@@ -14,6 +14,7 @@ import numpy as np
 
 from warpflat.core.activity import report_activity
 from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.atomic_files import require_writable
 from warpflat.scene.frames_keys import FilmStage, Frame, Key, KeyFile
 from warpflat.scene.schema import OutputTable
 from warpflat.surface.half_edges import half_edges
@@ -21,6 +22,7 @@ from warpflat.surface.mesh import Surface
 
 if TYPE_CHECKING:
     from warpflat.cutting.cut_plan import CutPlan
+    from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
 
@@ -64,19 +66,16 @@ class Film:
         return FrameSchedule(self._output, at_most=self._most)
 
     def __enter__(self) -> Film:
-        """Open the files.
+        """Open the file of layouts. The USD library, which takes a while to load, is not needed before the end.
 
         Raises:
             InputError: the place cannot be written.
         """
         if self.wanted:
-            from warpflat.export.usd import FrameWriter
-
+            require_writable(self._folder / "frames.usdc")
             with ExitStack() as stack:
-                self._writer = stack.enter_context(FrameWriter(self._folder / "frames.usdc"))
                 self._keys = stack.enter_context(KeyFile(self._folder))
                 for name, surface in self._surfaces.items():
-                    self._writer.add_piece(name, surface)
                     self.recorders[name] = FrameRecorder(self._keys, surface, self._schedule)
                 stack.push(self._write_at_end)
                 self._stack = stack.pop_all()
@@ -90,10 +89,15 @@ class Film:
 
     def _write_at_end(self, kind: type[BaseException] | None, *_: object) -> None:
         if kind is None:
-            report_activity("writing the film")
-            self._write()
+            from warpflat.export.usd import FrameWriter
 
-    def _write(self) -> None:
+            report_activity("writing the film")
+            with FrameWriter(self._folder / "frames.usdc") as writer:
+                for name, surface in self._surfaces.items():
+                    writer.add_piece(name, surface)
+                self._write(writer)
+
+    def _write(self, writer: FrameWriter) -> None:
         pieces = {name: recorder.stages for name, recorder in self.recorders.items()}
         for number in range(max(len(stages) for stages in pieces.values())):
             shots = {name: self._shot(stages, number) for name, stages in pieces.items()}
@@ -102,7 +106,7 @@ class Film:
             for frame in range(count):
                 for name, (stage, _, _) in shots.items():
                     begins = frame == 0 and number < len(pieces[name])
-                    self._write_frame(name, stage, next(frames[name]), number=number, begins=begins)
+                    self._write_frame(writer, name, stage, next(frames[name]), number=number, begins=begins)
 
     def _shot(self, stages: Sequence[FilmStage], number: int) -> tuple[FilmStage, list[Key], int]:
         """Return a stage of a piece, the keys that are shown and the number of frames that it needs.
@@ -133,8 +137,10 @@ class Film:
             self._keys.frames(stage, [key], 1 if key is not keys[-1] else count - len(keys) + 1) for key in keys
         )
 
-    def _write_frame(self, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool) -> None:
-        self._writer.write(
+    def _write_frame(
+        self, writer: FrameWriter, name: str, stage: FilmStage, frame: Frame, *, number: int, begins: bool
+    ) -> None:
+        writer.write(
             name,
             positions=frame.positions,
             face_energy_density=frame.face_energy_density,

@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from contextlib import ExitStack
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Literal
 
+from warpflat.core.activity import report_activity
+from warpflat.core.beside import Beside
 from warpflat.core.errors import InputError
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.scene.cuts import CutSequence
@@ -20,7 +24,7 @@ from warpflat.scene.load import (
     scene_wear,
 )
 from warpflat.scene.surface import scene_surface
-from warpflat.scene.write import SceneResult, write_surface
+from warpflat.scene.write import SceneResult, write_pieces, write_surface
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.mesh import Surface
 
@@ -87,6 +91,7 @@ def _run_surface(
 ) -> SceneResult:
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
+    from warpflat.garment.pattern_files import surface_files
     from warpflat.scene.drape import write_drape
     from warpflat.scene.frames import Film
     from warpflat.scene.pattern_options import pattern_options
@@ -101,27 +106,32 @@ def _run_surface(
     _check_edges(scene, sequence, drawing)
     wanted = FrameSchedule(settings.output).wanted
     require_memory_for_run(len(sequence.surface.vertices), frames=wanted)
-    with Film(folder, settings.output, [sequence.surface]) as film:
-        recorder = film.recorders[sequence.surface.name]
+    with ExitStack() as beside:
+        with Film(folder, settings.output, [sequence.surface]) as film:
+            recorder = film.recorders[sequence.surface.name]
 
-        def each_step(progress: Progress) -> bool | None:
-            recorder(progress)
-            return None if on_progress is None else on_progress(progress)
+            def each_step(progress: Progress) -> bool | None:
+                recorder(progress)
+                return None if on_progress is None else on_progress(progress)
 
-        result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
-    pieces = [advise(piece) for piece in separate(result)]
-    drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
-    return write_surface(
-        scene,
-        pieces,
-        folder,
-        drawing=drawing,
-        seams=seams,
-        more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
-        files=drape_files,
-        frames=wanted,
-        notes=(*result.messages, *sequence.notes),
-    )
+            result, sewn = flatten_scene(scene, sequence, recorder=recorder, callback=each_step, device=device)
+            report_activity("measuring how it fits")
+            pieces = [advise(piece) for piece in separate(result)]
+            pictures = beside.enter_context(Beside(partial(write_pieces, scene, pieces, folder)))
+            drawn = partial(surface_files, pieces, folder, name=scene.name, options=drawing, seams=seams)
+            pattern = beside.enter_context(Beside(drawn))
+        drape_metrics, drape_files = write_drape(scene, result, folder, device=device)
+        return write_surface(
+            scene,
+            pieces,
+            folder,
+            pictures=pictures,
+            pattern=pattern,
+            more={**({} if sewn is None else sewn.metrics()), **drape_metrics},
+            files=drape_files,
+            frames=wanted,
+            notes=(*result.messages, *sequence.notes),
+        )
 
 
 def files_of_run(scene: Scene) -> list[str]:

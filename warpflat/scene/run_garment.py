@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from warpflat.core.activity import report_activity
+from warpflat.core.beside import Beside
 from warpflat.core.manifest import remove_stale
 from warpflat.core.memory_limit import require_memory_for_run
 from warpflat.fabric.library import as_fabric
@@ -19,7 +22,7 @@ from warpflat.garment.ease import SeamWish, cap_wishes, seam_ratios
 from warpflat.garment.form_plan import check_fold_grain, find_fold_lines, plan_form
 from warpflat.garment.garment import Garment, flatten_form
 from warpflat.garment.openings import Opening, part_at_centres, place_opening
-from warpflat.garment.pattern_files import PatternOptions, check_names, garment_files
+from warpflat.garment.pattern_files import PatternOptions, WrittenPattern, check_names, garment_files
 from warpflat.mannequin.bricks import select_bricks
 from warpflat.mannequin.darts import dart_along
 from warpflat.mannequin.ease import ease_from
@@ -34,7 +37,7 @@ from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fab
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
 from warpflat.scene.seams import scene_constraints, scene_wishes
-from warpflat.scene.write import SceneResult, review_files
+from warpflat.scene.write import SceneResult, packed_film, review_files
 
 __all__ = ["GarmentPlan", "plan_garment", "run_garment", "scene_form", "scene_recipe"]
 
@@ -197,16 +200,22 @@ def run_garment(
     if scene.settings.drape is not None:
         expect_files(out, [f"{name}.draped.obj" for name in plan.form.pieces])
     others = _other_sizes(scene)
-    garment = _flatten_with_frames(plan, out, on_progress=on_progress)
-    report_activity("measuring how it fits")
-    garment = replace(garment, pieces=_advised(plan, garment))
     report = on_progress or (lambda progress: None)
-    graded = {
-        size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
-        for size, (body, form) in others.items()
-    }
-    draped = write_drape(scene, garment, out, device=device)
-    return _write_garment(plan, garment, graded, out, draped=draped)
+    with ExitStack() as beside:
+        with _film(plan, out) as film:
+            garment = _flatten_with_frames(plan, film, on_progress=on_progress)
+            report_activity("measuring how it fits")
+            garment = replace(garment, pieces=_advised(plan, garment))
+            pictures = beside.enter_context(Beside(partial(_write_pieces, plan, garment, out)))
+            graded = {
+                size: replace(plan, mannequin=body, form=form).flatten(callback=lambda _, progress: report(progress))
+                for size, (body, form) in others.items()
+            }
+            pattern = beside.enter_context(
+                Beside(partial(_write_pattern, plan, {**graded, _own_size(plan): garment}, out))
+            )
+        draped = write_drape(scene, garment, out, device=device)
+        return _finish(plan, garment, graded, out, draped=draped, pictures=pictures, pattern=pattern)
 
 
 def _advised(plan: GarmentPlan, garment: Garment) -> dict[str, Flattening]:
@@ -230,35 +239,78 @@ def _advised(plan: GarmentPlan, garment: Garment) -> dict[str, Flattening]:
     return found
 
 
-def _flatten_with_frames(
-    plan: GarmentPlan, out: Path, *, on_progress: Callable[[Progress], bool | None] | None = None
-) -> Garment:
-    """Flatten and sew the garment, and write `frames.usdc` if the scene wants frames."""
+def _film(plan: GarmentPlan, out: Path) -> Film:
+    """Return the film of the garment's pieces, for a ``with`` block."""
     output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
     require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=FrameSchedule(output).wanted)
-    with Film(out, output, surfaces) as film:
+    return Film(out, output, surfaces)
 
-        def each_step(name: str, progress: Progress) -> bool | None:
-            film.recorders[name](progress)
-            return None if on_progress is None else on_progress(progress)
 
-        garment = plan.flatten(callback=each_step)
-        for name, piece in garment.pieces.items():
-            if piece.unsewn is not None:
-                film.recorders[name].record_result(piece.unsewn)
-            film.recorders[name].record_result(piece)
+def _flatten_with_frames(
+    plan: GarmentPlan, film: Film, *, on_progress: Callable[[Progress], bool | None] | None = None
+) -> Garment:
+    """Flatten and sew the garment, and record its layouts."""
+
+    def each_step(name: str, progress: Progress) -> bool | None:
+        film.recorders[name](progress)
+        return None if on_progress is None else on_progress(progress)
+
+    garment = plan.flatten(callback=each_step)
+    for name, piece in garment.pieces.items():
+        if piece.unsewn is not None:
+            film.recorders[name].record_result(piece.unsewn)
+        film.recorders[name].record_result(piece)
     return garment
 
 
-def _write_garment(
+def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
+    """Write an OBJ per piece and the pictures of the flattened garment; return their names."""
+    settings = plan.scene.settings
+    files = garment.write_files(out, picture=settings.output.picture)
+    if settings.wear is not None and settings.output.picture:
+        from warpflat.flattening.fit_picture import write_wear_sheet
+
+        files.append("wear.png")
+        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
+    return files
+
+
+def _own_size(plan: GarmentPlan) -> str:
+    """Return the size of the mannequin; empty if it has none."""
+    table = plan.scene.settings.mannequin
+    return "" if table is None else table.size_name
+
+
+def _write_pattern(plan: GarmentPlan, sizes: Mapping[str, Garment], out: Path) -> WrittenPattern:
+    """Write the files of the pattern in all sizes, and the picture of its seams, which is among the files that are returned."""
+    scene, settings = plan.scene, plan.scene.settings
+    pattern = garment_files(
+        {size: sizes[size] for size in _in_order(sizes, settings.pattern.sizes)},
+        out,
+        name=scene.name,
+        options=plan.drawing,
+        sample_size=_own_size(plan),
+    )
+    if not (settings.output.picture and pattern.walked):
+        return pattern
+    from warpflat.export.picture_walked import write_walked_picture
+
+    file = "walked.png"
+    write_walked_picture(out / file, pattern.walked, title=scene.name)
+    return replace(pattern, files=(*pattern.files, file))
+
+
+def _finish(
     plan: GarmentPlan,
     garment: Garment,
     graded: Mapping[str, Garment],
     out: Path,
     *,
     draped: tuple[dict[str, Any], list[str]],
+    pictures: Beside[list[str]],
+    pattern: Beside[WrittenPattern],
 ) -> SceneResult:
-    """Write all files of a garment but its frames, and remove what earlier runs have left.
+    """Write the last files of a garment when all others are there, and remove what earlier runs have left.
 
     Args:
         plan: what was asked for.
@@ -266,40 +318,24 @@ def _write_garment(
         graded: the garment in the other sizes of the pattern.
         out: an existing folder.
         draped: entries and files of the drape.
+        pictures, pattern: write the pieces with their pictures, and the pattern.
     """
     from warpflat.export.letters import note_on_names
 
     scene, settings = plan.scene, plan.scene.settings
-    files = [*garment.write_files(out, picture=settings.output.picture), *draped[1], "metrics.json"]
-    if settings.wear is not None and settings.output.picture:
-        from warpflat.flattening.fit_picture import write_wear_sheet
-
-        files.append("wear.png")
-        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
+    measured, film = garment.metrics(), packed_film(scene, out)
+    files = [*pictures.result(), *draped[1], "metrics.json"]
     if FrameSchedule(settings.output).wanted:
         files.append("frames.usdc")
-    own = settings.mannequin.size_name if settings.mannequin is not None else ""
-    sizes = {**graded, own: garment}
-    pattern = garment_files(
-        {size: sizes[size] for size in _in_order(sizes, settings.pattern.sizes)},
-        out,
-        name=scene.name,
-        options=plan.drawing,
-        sample_size=own,
-    )
-    measured = {**garment.metrics(), **_metrics_of_sizes(graded), **draped[0], **pattern.metrics}
+    written = pattern.result()
+    measured |= {**_metrics_of_sizes(graded), **draped[0], **written.metrics}
     if settings.mannequin is not None:
         measured["mannequin"] = {**measured["mannequin"], "table": settings.mannequin.model_dump(exclude_defaults=True)}
-    files += pattern.files
-    if settings.output.picture and pattern.walked:
-        from warpflat.export.picture_walked import write_walked_picture
-
-        files.append("walked.png")
-        write_walked_picture(out / files[-1], pattern.walked, title=scene.name)
-    files += [*review_files(scene, measured, out, tuple(files))]
+    files += written.files
+    files += [*review_files(scene, measured, out, tuple(files), film)]
     metrics, manifest_notes = remove_stale(out, measured, name=scene.name, files=files)
     name_notes = note_on_names(garment.pieces) if settings.output.picture else ()
-    notes = (*garment.notes, *pattern.notes, *name_notes, *manifest_notes)
+    notes = (*garment.notes, *written.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
 
 

@@ -7,13 +7,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-if TYPE_CHECKING:
-    from warpflat.flattening.result import Flattening
-    from warpflat.garment.pattern_files import PatternOptions
-    from warpflat.scene.load import Scene
-    from warpflat.surface.border_seams import NamedSeam
+from warpflat.scene.frames import FrameSchedule
 
-__all__ = ["SceneResult", "review_files", "write_surface"]
+if TYPE_CHECKING:
+    from warpflat.core.beside import Beside
+    from warpflat.flattening.result import Flattening
+    from warpflat.garment.pattern_files import WrittenPattern
+    from warpflat.scene.load import Scene
+
+__all__ = ["SceneResult", "packed_film", "review_files", "write_pieces", "write_surface"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,26 +33,46 @@ class SceneResult:
     notes: tuple[str, ...]
 
 
+def write_pieces(scene: Scene, pieces: Sequence[Flattening], folder: Path) -> list[str]:
+    """Write an OBJ per piece and the pictures of a flattened surface; return their names.
+
+    Raises:
+        InputError: the folder cannot be written.
+    """
+    from warpflat.core.atomic_files import file_in
+    from warpflat.flattening.result import write_files
+
+    settings = scene.settings
+    files = write_files(pieces, folder, picture=settings.output.picture, frames=False)
+    if settings.wear is not None and settings.output.picture:
+        from warpflat.flattening.fit_picture import write_wear_picture
+
+        for piece in pieces:
+            picture = file_in(folder, piece.surface.name, ".wear.png")
+            write_wear_picture(picture, piece)
+            files.append(picture.name)
+    return files
+
+
 def write_surface(
     scene: Scene,
     pieces: Sequence[Flattening],
     folder: Path,
     *,
-    drawing: PatternOptions,
-    seams: Sequence[NamedSeam],
+    pictures: Beside[list[str]],
+    pattern: Beside[WrittenPattern],
     more: Mapping[str, Any],
     files: Sequence[str] = (),
     frames: bool,
     notes: Sequence[str],
 ) -> SceneResult:
-    """Write all files of a flattened surface but its frames, and remove what earlier runs have left.
+    """Write the last files of a flattened surface when all others are there, and remove what earlier runs have left.
 
     Args:
         scene: the scene.
         pieces: the pieces into which cuts have parted its surface.
         folder: an existing one.
-        drawing: options of the pattern files.
-        seams: named seams of the surface's border.
+        pictures, pattern: write the pieces with their pictures, and the pattern.
         more: entries of `metrics.json` besides the pieces.
         files: that have been written already, by name.
         frames: whether `frames.usdc` has been written.
@@ -59,34 +81,38 @@ def write_surface(
     Raises:
         InputError: the folder cannot be written.
     """
-    from warpflat.core.atomic_files import file_in
     from warpflat.core.manifest import remove_stale
     from warpflat.export.letters import note_on_names
-    from warpflat.flattening.result import run_metrics, write_files
-    from warpflat.garment.pattern_files import surface_files
+    from warpflat.flattening.result import run_metrics
 
     settings = scene.settings
-    files = [*files, *write_files(pieces, folder, picture=settings.output.picture, frames=False), "metrics.json"]
-    if settings.wear is not None and settings.output.picture:
-        from warpflat.flattening.fit_picture import write_wear_picture
-
-        for piece in pieces:
-            picture = file_in(folder, piece.surface.name, ".wear.png")
-            write_wear_picture(picture, piece)
-            files.append(picture.name)
+    entries = {piece.surface.name: piece.measures for piece in pieces}
+    film = packed_film(scene, folder)
+    files = [*files, *pictures.result(), "metrics.json"]
     if frames:
         files.append("frames.usdc")
-    pattern = surface_files(pieces, folder, name=scene.name, options=drawing, seams=seams)
-    entries = {piece.surface.name: piece.measures for piece in pieces}
-    measured = {**run_metrics(entries, pieces[0].network.device, more), **pattern.metrics}
-    files += [*pattern.files, *review_files(scene, measured, folder, (*files, *pattern.files))]
+    drawn = pattern.result()
+    measured = {**run_metrics(entries, pieces[0].network.device, more), **drawn.metrics}
+    files += [*drawn.files, *review_files(scene, measured, folder, (*files, *drawn.files), film)]
     metrics, manifest_notes = remove_stale(folder, measured, name=scene.name, files=files)
     name_notes = note_on_names(piece.surface.name for piece in pieces) if settings.output.picture else ()
-    notes = (*notes, *pattern.notes, *name_notes, *manifest_notes)
+    notes = (*notes, *drawn.notes, *name_notes, *manifest_notes)
     return SceneResult(metrics=metrics, files=tuple(files), notes=notes)
 
 
-def review_files(scene: Scene, metrics: Mapping[str, Any], folder: Path, files: Sequence[str]) -> list[str]:
+def packed_film(scene: Scene, folder: Path) -> Mapping[str, Any] | None:
+    """Return the film that has been written, packed for `review.html`; None if the scene wants no such page, or it is too large for one."""
+    output = scene.settings.output
+    if not (output.picture and output.review and FrameSchedule(output).wanted):
+        return None
+    from warpflat.review.page import pack_frames
+
+    return pack_frames(folder)
+
+
+def review_files(
+    scene: Scene, metrics: Mapping[str, Any], folder: Path, files: Sequence[str], film: Mapping[str, Any] | None
+) -> list[str]:
     """Write `review.html` if the scene wants it, and return its name in a list.
 
     Args:
@@ -94,10 +120,11 @@ def review_files(scene: Scene, metrics: Mapping[str, Any], folder: Path, files: 
         metrics: of the run.
         folder: in which all else has been written.
         files: that all else, by name.
+        film: of :func:`packed_film`.
     """
     output = scene.settings.output
     if not (output.picture and output.review):
         return []
     from warpflat.review.page import write_review
 
-    return [write_review(folder, metrics, files, name=scene.name)]
+    return [write_review(folder, metrics, files, name=scene.name, film=lambda: film)]

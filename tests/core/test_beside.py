@@ -1,0 +1,86 @@
+"""A function runs in a fork of the process, and its files, result or error are those of the caller."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+from warpflat.core.atomic_files import atomic_path, output_folder
+from warpflat.core.beside import Beside, work_beside
+from warpflat.core.errors import InputError
+
+
+@pytest.fixture(autouse=True)
+def two_cores(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setenv("WARPFLAT_THREADS", "2")
+    if sys.platform != "linux":
+        pytest.skip("processes are forked on Linux only")
+
+
+def write(folder: Path, name: str) -> int:
+    with atomic_path(folder / name) as temporary:
+        temporary.write_text(name)
+    return os.getpid()
+
+
+def test_files_of_another_process_appear_with_those_of_the_run(tmp_path: Path):
+    out = tmp_path / "out"
+    with work_beside(), output_folder(out), Beside(lambda: write(out, "a.txt")) as work:
+        assert write(out, "b.txt") == os.getpid()
+        assert work.result() != os.getpid()
+        assert not (out / "a.txt").exists()
+    assert sorted(path.name for path in out.iterdir()) == ["a.txt", "b.txt"]
+
+
+def test_only_a_program_has_other_processes(monkeypatch: pytest.MonkeyPatch):
+    with Beside(os.getpid) as work:
+        assert work.result() == os.getpid()
+    monkeypatch.setenv("WARPFLAT_THREADS", "1")
+    with work_beside(), Beside(os.getpid) as work:
+        assert work.result() == os.getpid()
+
+
+def test_an_error_is_raised_where_the_result_is_asked_for(tmp_path: Path):
+    def fail() -> None:
+        raise InputError("the disk is full")
+
+    def run() -> None:
+        with work_beside(), output_folder(out), Beside(fail) as work:
+            write(out, "b.txt")
+            work.result()
+
+    out = tmp_path / "out"
+    with pytest.raises(InputError, match=r"^the disk is full$"):
+        run()
+    assert not out.exists()
+
+
+def test_a_function_whose_process_dies_runs_again():
+    own = os.getpid()
+
+    def die() -> str:
+        if os.getpid() != own:
+            os.kill(os.getpid(), signal.SIGKILL)
+        return "done"
+
+    with work_beside(), Beside(die) as work:
+        assert work.result() == "done"
+
+
+def test_a_process_ends_with_its_block():
+    begun = time.monotonic()
+    with pytest.raises(KeyboardInterrupt), work_beside(), Beside(lambda: time.sleep(60)) as work:
+        raise KeyboardInterrupt
+    assert time.monotonic() - begun < 30
+    with pytest.raises(ProcessLookupError):
+        os.kill(work.process, 0)
+
+
+def test_a_result_larger_than_a_pipe_arrives():
+    with work_beside(), Beside(lambda: b"x" * 1_000_000) as work:
+        assert len(work.result()) == 1_000_000

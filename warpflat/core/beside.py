@@ -1,0 +1,137 @@
+"""Work beside the main process: a function writes its files in a fork of the process, on another core.
+
+Only a program allows it, by :func:`work_beside`: a fork has no thread but its own, so the function must wait for no other.
+Everywhere else, and where there is one core, a function runs when its result is asked for.
+"""
+
+from __future__ import annotations
+
+import os
+import pickle
+import signal
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from contextvars import ContextVar
+from typing import Any, Generic, TypeVar
+
+from warpflat.core.activity import activity_listener
+from warpflat.core.atomic_files import adopt_files, files_written
+from warpflat.core.threads import thread_count
+
+__all__ = ["Beside", "work_beside"]
+
+Result = TypeVar("Result")
+
+_is_allowed: ContextVar[bool] = ContextVar("beside", default=False)
+
+
+@contextmanager
+def work_beside() -> Iterator[None]:
+    """Allow functions to run in forks of the process in the block."""
+    before = _is_allowed.set(True)
+    try:
+        yield
+    finally:
+        _is_allowed.reset(before)
+
+
+class Beside(Generic[Result]):
+    """A function without arguments that runs in a process of its own while the caller goes on; used in a ``with`` block.
+
+    Its result must be picklable. Files that it writes into an output folder belong to the caller's run. At the end of the block the process
+    is ended if its result has not been taken.
+
+    Attributes:
+        process: the number of the other process; 0 if there was none.
+    """
+
+    def __init__(self, function: Callable[[], Result]) -> None:
+        """Prepare a function; it runs from the beginning of the block, or in `result` where there is no other process."""
+        self._function = function
+        self.process = self._child = 0
+        self._pipe = -1
+
+    def __enter__(self) -> Beside[Result]:
+        if not _is_allowed.get() or not _can_fork():
+            return self
+        read, write = os.pipe()
+        try:
+            child = os.fork()
+        except OSError:  # no memory, or no process, for it
+            os.close(read)
+            os.close(write)
+            return self
+        if child == 0:
+            os.close(read)
+            _run_in_child(self._function, write)
+        os.close(write)
+        self.process = self._child = child
+        self._pipe = read
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._child:
+            with suppress(ProcessLookupError):
+                os.kill(self._child, signal.SIGKILL)
+            self._wait()
+
+    def result(self) -> Result:
+        """Wait for the function and return its result, or raise its error.
+
+        Where its process has died, which the system does where memory is short, the function runs again in this one.
+        """
+        if not self._child:
+            return self._function()
+        parts = []
+        while part := os.read(self._pipe, 1 << 20):
+            parts.append(part)
+        self._wait()
+        if not parts:
+            return self._function()
+        good, value, files = pickle.loads(b"".join(parts))
+        adopt_files(files)
+        if not good:
+            raise value
+        return value
+
+    def _wait(self) -> None:
+        child, self._child = self._child, 0
+        os.close(self._pipe)
+        with suppress(ChildProcessError):
+            os.waitpid(child, 0)
+
+
+def _can_fork() -> bool:
+    """Return whether a fork gains time and does no harm: frameworks of macOS do not bear it, nor does a process with a CUDA device."""
+    warp = sys.modules.get("warp")
+    return sys.platform == "linux" and thread_count() > 1 and (warp is None or not warp.is_cuda_available())
+
+
+def _run_in_child(function: Callable[[], Any], pipe: int) -> None:
+    """Run the function, write its result or error into the pipe, and end the process without any cleaning up of the parent's."""
+    try:
+        for name in ("SIGINT", "SIGTERM", "SIGHUP"):
+            signal.signal(getattr(signal, name), signal.SIG_DFL)
+        before = files_written()
+        try:
+            with activity_listener(lambda activity: None):
+                answer: tuple[bool, Any] = True, function()
+        except Exception as error:
+            answer = False, error
+        new = [(folder, name) for folder, name in files_written() if (folder, name) not in before]
+        content = memoryview(_pickled(*answer, new))
+        while content:
+            content = content[os.write(pipe, content) :]
+    finally:
+        os._exit(0)
+
+
+def _pickled(good: bool, value: Any, files: list[tuple[str, str]]) -> bytes:
+    try:
+        content = pickle.dumps((good, value, files))
+        pickle.loads(content)  # an exception may not be made again from its arguments
+    except Exception as error:
+        what = f"{type(value).__name__}: {value}" if not good else f"{type(error).__name__}: {error}"
+        content = pickle.dumps((False, RuntimeError(what), files))
+    return content
