@@ -27,7 +27,7 @@ from warpflat.surface.connectivity import border_of
 from warpflat.surface.injective import border_edges_of, crack_edges_of, crossings, is_injective, near_edges
 from warpflat.surface.mesh import Surface
 
-__all__ = ["NO_CONTACTS", "Barrier", "ContactPoint", "Contacts", "open_cracks", "relax_with_contact"]
+__all__ = ["NO_CONTACTS", "Barrier", "ContactPoint", "Contacts", "open_cracks", "relax_with_contact", "swirl"]
 
 # Two places of the border have the whole gap between them if the way between them along the border is at least this [m],
 _FULL_GAP_WAY = 0.025
@@ -63,6 +63,14 @@ def open_cracks(surface: Surface, positions: FloatArray) -> FloatArray:
         if is_injective(surface, opened):
             return opened
     return positions
+
+
+def swirl(positions: FloatArray, turn: float) -> FloatArray:
+    """Return a layout (#V by 2 [m]) turned by an angle [rad] in its middle, and by less and less farther out."""
+    middle, size = positions.mean(axis=0), np.linalg.norm(np.ptp(positions, axis=0))
+    place = (positions - middle) @ np.array([1.0, 1.0j])
+    place = place * np.exp(1j * turn * np.exp(-4.0 * np.abs(place / size) ** 2))
+    return middle + np.stack([place.real, place.imag], axis=1)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -20,9 +20,9 @@ class RelaxOptions:
 
     Attributes:
         time_step: h [s]. The minimum does not depend on it; the number of steps to it stops falling above 1e-3.
-        energy_left, outline_left_mm: L-BFGS ends when by estimate (`warpflat.solver.remainder`) at most this share of the energy is
-            still to be released, and no point of the outline will move by more than so many millimetres. With 0, or where one of the
-            tolerances below is stricter than its default, it ends by the tolerances alone.
+        energy_left, outline_left_mm: L-BFGS, with or without contact, ends when by estimate (`warpflat.solver.remainder`) at most this
+            share of the energy is still to be released, and no point of the outline will move by more than so many millimetres. With 0,
+            or where one of the tolerances below is stricter than its default, it ends by the tolerances alone.
         energy_tolerance: eq. (11): relative change of the energy per step.
         residual_tolerance: largest force on a vertex over the mean force of the springs. After Gauss-Newton steps
             (`warpflat.solver.gauss_newton`) a piece also counts as at rest when its forces could release next to no
@@ -35,7 +35,8 @@ class RelaxOptions:
             "plain", the paper's steps alone.
         gap_mm: a flat piece that would lie over itself is parted by contact (`warpflat.solver.contact`), which acts where its border
             comes nearer to itself than this [mm]; 0 leaves the piece as it lies.
-        contact_share: where contact costs more than this share of the model energy, a note names the cut that would restore it.
+        contact_share: where contact costs more than this share of the model energy, it also starts from its layout swirled, and a note
+            names the cut that would restore it.
     """
 
     time_step: float = 0.01
