@@ -227,7 +227,7 @@ def _biceps(arm: ScanArm, armpit: FloatArray, beyond: float) -> ScanMeasure:
     middle = arm.line[rows].mean(axis=0)
     end = float((arm.frame(arm.elbow)[0] - middle) @ way) - 0.02
     tapes = []
-    for at in np.arange(float((armpit - middle) @ way) + beyond, end, 0.004):
+    for at in np.arange(float((armpit - middle) @ way) + beyond, end, 0.002):
         tapes.append(tape_around(arm.cut(middle + at * way, way), way))
     girths = smooth(np.array([girth for _, girth in tapes]), 1.0)
     bellies = 1 + np.flatnonzero((girths[1:-1] >= girths[:-2]) & (girths[1:-1] > girths[2:]))
