@@ -109,8 +109,7 @@ def plan_curves(
 ) -> list[PlannedCurve]:
     """Return the lines that the edges of a form's pieces are to be.
 
-    Folds, legs of darts and edges that a constraint is about stay. Two edges that are each other's mirror images stay
-    so.
+    Folds, legs of darts and edges that a constraint is about stay.
 
     Args:
         layout: the body's grid.
@@ -126,7 +125,6 @@ def plan_curves(
         for run in seam.runs
         for name, edge in zip(seam.pieces, run.edges, strict=True)
     }
-    drawn: dict[Any, tuple[IntArray, FloatArray, bool]] = {}
     plans = []
     for name, piece in form.pieces.items():
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
@@ -137,23 +135,12 @@ def plan_curves(
             mirrored = vertices[0] in on_fold, vertices[-1] in on_fold
             book, wanted = _book_line(layout, form, grid, piece.parts.get(edge, edge), free=(name, edge) not in sewn)
             away = fair_line(own, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
-            image = layout.mirror[grid]
-            twin = (name.replace("right", "left"), *min(sorted(grid.tolist()), sorted(image.tolist())))
-            if twin not in drawn:
-                straight = bool(wanted.any()) and away <= bound
-                kept = wanted if straight else None
-                wave = shortest_wave(own, bound, straight=kept, mirrored=mirrored)
-                if wave is None:
-                    continue
-                shape = fair_line(own, wave, straight=kept, mirrored=mirrored).points
-                if (image[::-1] == grid).all():
-                    shape -= shape.mean(axis=0)
-                    shape = 0.5 * (shape + shape[::-1] * [-1.0, 1.0])
-                drawn[twin] = grid, shape, straight
-            first, shape, straight = drawn[twin]
-            if not (first == grid).all():
-                place = {vertex: number for number, vertex in enumerate(first.tolist())}
-                shape = shape[[place[vertex] for vertex in image.tolist()]] * [-1.0, 1.0]
+            straight = bool(wanted.any()) and away <= bound
+            kept = wanted if straight else None
+            wave = shortest_wave(own, bound, straight=kept, mirrored=mirrored)
+            if wave is None:
+                continue
+            shape = fair_line(own, wave, straight=kept, mirrored=mirrored).points
             line = DrawnLine(piece=name, line=edge, vertices=vertices, shape=shape)
             plans.append(PlannedCurve(line=line, before=own, book=book, straight=straight, away=away))
     return plans

@@ -55,6 +55,7 @@ class Garment:
         finishing: of its free edges, in the pattern.
         pockets: in the pattern.
         curves: its borders as they are drawn; None if they are as the cloth rests.
+        remarks: what could not be had of girths and curves, one sentence each.
     """
 
     name: str
@@ -67,6 +68,7 @@ class Garment:
     finishing: Sequence[Finishing] = ()
     pockets: Sequence[Pocket] = ()
     curves: Curves | None = None
+    remarks: tuple[str, ...] = ()
 
     def __repr__(self) -> str:
         energy = sum(piece.stages[-1].strain_energy_j for piece in self.pieces.values())
@@ -105,7 +107,7 @@ class Garment:
     def notes(self) -> tuple[str, ...]:
         """Notes on completions, repairs and choices, one sentence each."""
         of_pieces = (f"{name}: {note}" for name, piece in self.pieces.items() for note in piece.messages)
-        return (*self.mannequin.notes, *of_pieces)
+        return (*self.mannequin.notes, *of_pieces, *self.remarks)
 
     @property
     def rings(self) -> list[GarmentRing]:
@@ -326,7 +328,10 @@ class _SewAgain:
         if not girths:
             return garment, self
         kept, outcome = self(garment, girths)
-        return kept, replace(self, held=[*self.held, *girths]) if outcome.converged else self
+        if not outcome.converged:
+            words = "the girths are as the cloth has them: seams and constraints leave no room for the ease that is asked for"
+            return replace(kept, remarks=(*kept.remarks, words)), self
+        return kept, replace(self, held=[*self.held, *girths])
 
     def with_curves(self, garment: Garment, bound: float) -> Garment:
         """Return the garment with its borders drawn as by hand, within a bound [m]."""
@@ -336,12 +341,13 @@ class _SewAgain:
             return garment
         drawn, outcome = self(garment, [plan.line for plan in plans])
         if not outcome.converged:
-            return garment
+            words = "the borders stay as the cloth rests: drawn by hand, seams or constraints could not be kept"
+            return replace(garment, remarks=(*garment.remarks, words))
         lines = measure_curves(
             garment.form, plans, _positions(drawn), [each for each in outcome.results if each.kind == "curve"]
         )
-        price = outcome.energy_after - garment.sewn.energy_after
-        return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=price, lines=lines))
+        assert drawn.sewn is not None
+        return replace(drawn, curves=Curves(bound_mm=1e3 * bound, price_j=drawn.sewn.drawing_cost, lines=lines))
 
 
 def _positions(garment: Garment) -> dict[str, FloatArray]:

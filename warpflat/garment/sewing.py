@@ -113,6 +113,7 @@ class Sewn:
         results: every seam, fold and constraint with its cost, in the order in which they were given.
         seconds: wall clock.
         offsets: by kind and name of what is held, the offsets of its equations at the end [m].
+        drawing_cost: what lines drawn afterwards have cost [J].
     """
 
     pieces: Mapping[str, Flattening]
@@ -124,6 +125,7 @@ class Sewn:
     results: tuple[ConstraintResult, ...]
     seconds: float
     offsets: Mapping[tuple[str, str], FloatArray] = field(default_factory=dict, repr=False)
+    drawing_cost: float = 0.0
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `metrics.json`."""
@@ -146,18 +148,20 @@ class Sewn:
         amiss = {(each.kind, each.name): each.violation for each in later.results}
         before = {(each.kind, each.name) for each in self.results}
         added = [each for each in later.results if (each.kind, each.name) not in before and each.kind != "curve"]
+        draws = any(each.kind == "curve" for each in later.results)
         return replace(
             later,
             steps=self.steps + later.steps,
             energy_before=self.energy_before,
             results=(*(replace(each, violation=amiss[each.kind, each.name]) for each in self.results), *added),
             seconds=self.seconds + later.seconds,
+            drawing_cost=self.drawing_cost + (later.energy_after - self.energy_after if draws else 0.0),
         )
 
     @property
     def cost(self) -> float:
-        """Energy that all seams, folds and constraints cost together [J]."""
-        return self.energy_after - self.energy_before
+        """Energy that all seams, folds and constraints cost together, without drawn lines [J]."""
+        return self.energy_after - self.energy_before - self.drawing_cost
 
     @property
     def largest_difference(self) -> float:

@@ -32,6 +32,8 @@ __all__ = [
 # Tolerances of an edge's length, and of the sum along a line [m].
 _EDGE_TOLERANCE = 2e-5
 _SUM_TOLERANCE = 1e-4
+# Tolerance of a girth around several pieces [m].
+_GIRTH_TOLERANCE = 5e-4
 # Tolerance of a vertex's distance from its line or from its mirror image [m].
 _PLACE_TOLERANCE = 5e-5
 # Waves up to this length [m] are kept out of a line of prescribed lengths, by springs of this stiffness over the
@@ -40,7 +42,7 @@ WAVE, SMOOTH = 0.04, 0.3
 # Stiffness of equations that hold together, over the stiffer thread's.
 _SHARED = 1.0
 # The part of an offset by which the residual of such a group is expected to fall, at first, and at least.
-_RESPONSE, _LEAST_RESPONSE = 0.3, 0.02
+_RESPONSE, _LEAST_RESPONSE = 0.3, 0.1
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -200,7 +202,7 @@ def girth_equations(edges: IntArray, lengths: FloatArray, shares: FloatArray) ->
         shares: #E.
     """
     equations = _equations(
-        np.column_stack([edges, edges]), LENGTHS, target=lengths, tolerance=np.inf, sum_tolerance=_SUM_TOLERANCE
+        np.column_stack([edges, edges]), LENGTHS, target=lengths, tolerance=np.inf, sum_tolerance=_GIRTH_TOLERANCE
     )
     return replace(equations, soft=_SHARED * shares, share=shares)
 
