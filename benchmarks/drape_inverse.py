@@ -70,7 +70,7 @@ def recover(name: str, flat: Place, space: Place, holds: Place, sizes: list[tupl
     worn = relax_drape(cloth, far, held=held[1], options=OPTIONS)
     designed = Body(second.designed, second.faces, device=far.device)
     drape = Drape(cloth=cloth, worn=worn, body=far, designed=designed, options=OPTIONS)
-    found = correct_pattern(drape, hold=["held"])
+    found = correct_pattern(drape, hold=["held"], bridging=False)
     for when, each in (("wrong", found.before), ("found", found.after)):
         flats, shapes = (
             apart(each.cloth.flat, second.flat),

@@ -22,6 +22,7 @@ from scipy.sparse.linalg import splu
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
+from warpflat.core.sums import weighted_percentiles
 from warpflat.draping.body import Body
 from warpflat.draping.drape_garment import held_vertices
 from warpflat.draping.relax_drape import relax_drape
@@ -145,19 +146,21 @@ def correct_pattern(
     hold: Sequence[str] = (),
     fabric: Fabric | None = None,
     worn_shape: bool = False,
+    bridging: bool = True,
     rounds: int = 6,
     wanted: float = 0.0,
     callback: Callable[[int, Round], None] | None = None,
 ) -> Correction:
     """Change the flat pieces until the worn garment lies on the designed surface, or no nearer.
 
-    Cloth that bridges a hollow is not asked to follow it.
+    Cloth that bridges a hollow is not asked to follow it, unless the shape that is wanted is one that cloth has taken.
 
     Args:
         drape: of the pattern as it is.
         hold: lines that stay where they are, as in :func:`warpflat.drape`.
         fabric: another cloth for the corrected pattern; that of the drape if not given.
         worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
+        bridging: whether the designed surface may have hollows that cloth cannot follow; without effect for a worn shape.
         rounds: the most.
         wanted: misfit on the mean at which it ends [m].
         callback: called with the number of each round and its misfit.
@@ -167,6 +170,7 @@ def correct_pattern(
     """
     if not drape.converged:
         raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    bridging = bridging and not worn_shape
     device, held = drape.body.device, held_vertices(drape.cloth, hold)
     shape = drape.positions if worn_shape else drape.cloth.designed
     cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
@@ -181,16 +185,16 @@ def correct_pattern(
     before = drape
     seams = _seam_edges(cloth)
     difference = _edge_lengths(cloth.flat, seams[:, 0]) - _edge_lengths(cloth.flat, seams[:, 1])
-    history, reason = [_round(drape, 0.0)], f"{rounds} rounds"
+    history, reason = [_round(drape, 0.0, bridging)], f"{rounds} rounds"
     for number in range(1, rounds + 1):
         if history[-1].misfit <= wanted:
             reason = "the misfit is as wanted"
             break
-        step = _step(drape, seams, difference)
+        step = _step(drape, seams, difference, bridging)
         best, share = None, _largest_share(drape.cloth, step)
         for _ in range(_HALVINGS + 1):
             trial = wear(replace(drape.cloth, flat=drape.cloth.flat + share * step))
-            now = _round(trial, share)
+            now = _round(trial, share, bridging)
             if (
                 trial.converged
                 and now.misfit < history[-1].misfit
@@ -216,28 +220,32 @@ def _pieces(garment: Garment | Flattening) -> dict[str, Flattening]:
     return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
 
 
-def _round(drape: Drape, share: float) -> Round:
-    measures = drape.measures()
-    strained = max(measures[f"strain_{name}"]["beyond_limit"] for name in ("warp", "weft"))
-    misfit = measures["misfit_m"]
-    return Round(misfit=misfit["mean"], misfit_p95=misfit["p95"], strained=strained, share=share)
+def _round(drape: Drape, share: float, bridging: bool) -> Round:
+    limit, faces = drape.cloth.fabric.strain_limit, drape.face_areas
+    strained = max(float(faces[np.abs(drape.strains[name]) > limit].sum() / faces.sum()) for name in ("warp", "weft"))
+    off = drape.misfit if bridging else drape.distance
+    mean = float((off * drape.areas).sum() / drape.areas.sum())
+    return Round(
+        misfit=mean, misfit_p95=weighted_percentiles(off, drape.areas, [0.95])[0], strained=strained, share=share
+    )
 
 
-def _step(drape: Drape, seams: IntArray, difference: FloatArray) -> FloatArray:
+def _step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
     """Return the displacement of the flat vertices (#P by 2 [m]) that follows best what the cells ask for.
 
     Args:
         drape: of the present pattern.
         seams: #S by 2 by 2, the edges of the outline that are sewn together.
         difference: #S, the wanted difference of their lengths [m].
+        bridging: whether what bridges a hollow is as it should be.
     """
     cloth = drape.cloth
     corner, face, gradient, area = cloth.cells()
     corner_flat, _, _ = corner_triangles(cloth.flat_faces)
     wanted = _lengths(cloth.designed[corner], gradient) - _lengths(drape.positions[corner], gradient)
-    # What bridges a hollow is as it should be.
-    share = drape.misfit / np.maximum(drape.distance, 1e-9)
-    wanted *= share[corner].mean(axis=1)[:, None]
+    if bridging:
+        share = drape.misfit / np.maximum(drape.distance, 1e-9)
+        wanted *= share[corner].mean(axis=1)[:, None]
     fabric = cloth.fabric
     threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
     shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)
