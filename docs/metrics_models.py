@@ -436,6 +436,33 @@ class Place(Entry):
     words: str
 
 
+class CorrectionRound(Entry):
+    """The misfit after a round of the correction."""
+
+    misfit_m: float
+    misfit_p95_m: float
+    beyond_limit: float
+    share: float
+
+
+class CorrectedEdge(Entry):
+    """How far an edge of the outline moves outwards, and how much longer it becomes."""
+
+    mean_m: float
+    max_m: float
+    longer_m: float
+
+
+class Correction(Entry):
+    """The corrected pattern."""
+
+    reason: str
+    fabric: str
+    rounds: list[CorrectionRound]
+    seam_difference_m: float
+    edges: dict[str, CorrectedEdge]
+
+
 class Drape(Entry):
     """The garment on its body."""
 
@@ -459,6 +486,7 @@ class Drape(Entry):
     strain_bias: DrapeStrain
     pressure_pa: Pressure
     places: list[Place]
+    correction: Correction | None = None
 
 
 class Metrics(Entry):

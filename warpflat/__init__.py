@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from warpflat.cutting.ledger import make_ledger
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
+    from warpflat.draping.correct_pattern import Correction, correct_pattern
     from warpflat.draping.drape_garment import drape
     from warpflat.draping.options import DrapeOptions
     from warpflat.draping.result import Drape
@@ -93,6 +94,7 @@ _find_kernels()
 _HOME = {
     "Cloth": "pattern.marker",
     "CutPlan": "cutting.cut_plan",
+    "Correction": "draping.correct_pattern",
     "Drape": "draping.result",
     "DrapeOptions": "draping.options",
     "EdgeRules": "garment.edge_rules",
@@ -121,6 +123,7 @@ _HOME = {
     "compare_fabrics": "scene.compare",
     "cut": "cutting.cut_piece",
     "draft_garment": "pattern.draft",
+    "correct_pattern": "draping.correct_pattern",
     "drape": "draping.drape_garment",
     "find_fabric": "fabric.library",
     "flatten": "flattening.flatten_piece",
@@ -160,6 +163,7 @@ _HOME = {
 
 __all__ = [
     "Cloth",
+    "Correction",
     "CutPlan",
     "Drape",
     "DrapeOptions",
@@ -188,6 +192,7 @@ __all__ = [
     "change_fabric",
     "change_surface",
     "compare_fabrics",
+    "correct_pattern",
     "cut",
     "draft_garment",
     "drape",

@@ -128,3 +128,23 @@ def test_a_scene_with_a_drape_reports_it(tmp_path: Path):
     fallen = {**result.metrics, "drape": {**entry, "converged": False, "distance_m": {"mean": 2.0}}}
     assert any("slipped off its body" in line for line in warnings_of(fallen))
     assert {"distance_m", "misfit_m", "bridged_m", "gap_m", "strain_warp", "pressure_pa", "places"} <= set(entry)
+
+
+def test_a_corrected_pattern_halves_the_misfit_and_keeps_its_seams(bodice: warpflat.Garment, worn: warpflat.Drape):
+    found = warpflat.correct_pattern(worn, rounds=2)
+    assert found.after.converged
+    assert found.rounds[-1].misfit < 0.5 * found.rounds[0].misfit
+    assert found.rounds[0].misfit == pytest.approx(worn.measures()["misfit_m"]["mean"])
+    assert found.seam_difference() < 5e-5
+    new = found.apply(bodice)
+    assert isinstance(new, warpflat.Garment)
+    # Without darts the armhole gapes: it must become shorter.
+    edges = found.edges(bodice)
+    for side in ("left", "right"):
+        assert -0.02 < edges[f"front.armhole {side}"]["longer_m"] < -0.002
+    for name, piece in new.pieces.items():
+        moved = np.linalg.norm(piece.positions - bodice.pieces[name].positions, axis=1)
+        assert 1e-3 < moved.max() < 0.03
+    # What is draped again is what was found.
+    again = warpflat.drape(new)
+    np.testing.assert_allclose(again.positions, found.after.positions, atol=1e-9)

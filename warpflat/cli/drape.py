@@ -28,6 +28,9 @@ Of a pattern the last two and metrics.json come out alone."""
 @click.option("--seams", type=click.Path(path_type=Path), metavar="FILE", help="Of a pattern: TOML with its [[seams]].")
 @click.option("--size", metavar="SIZE", help="Of a graded pattern.  [default: its sample size]")
 @click.option(
+    "--correct", is_flag=True, help="Of a scene: change the pattern until the worn garment lies where it was designed."
+)
+@click.option(
     "--edges", is_flag=True, help="Print the edges of a pattern's pieces, to name them in [[seams]]; drape nothing."
 )
 @output_options()
@@ -43,6 +46,7 @@ def drape(
     seams: Path | None,
     size: str | None,
     edges: bool,
+    correct: bool,
 ) -> int:
     """Put a sewn garment on its body: a scene's, that of a run's folder, or a pattern's (pattern.json, DXF or SVG).
 
@@ -52,6 +56,7 @@ def drape(
     \b
     Examples:
       warpflat drape scenes/basic_block.toml
+      warpflat drape scenes/basic_block.toml --correct
       warpflat drape out/dress --fabric denim
       warpflat drape shirt.dxf --edges
       warpflat drape shirt.dxf --seams shirt.toml --body "EU 38"
@@ -64,6 +69,8 @@ def drape(
     from warpflat.scene.schema import DrapeTable
 
     if is_pattern_file(scene):
+        if correct:
+            raise InputError(f"--correct: {scene} has no designed surface; it is for a scene")
         if edges:
             click.echo(edge_table(scene, sewing=seams))
             return DONE
@@ -82,6 +89,8 @@ def drape(
     if loaded.settings.half:
         raise InputError(f"{scene}: half: a drape needs the whole garment; leave out half = true")
     table = loaded.settings.drape or DrapeTable()
+    if correct:
+        table = table.model_copy(update={"correct": True})
     loaded = replace(loaded, settings=loaded.settings.model_copy(update={"drape": table}))
     return run_and_report(loaded, out, quiet=quiet, verbose=verbose, as_json=as_json, device=device)
 

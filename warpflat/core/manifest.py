@@ -22,8 +22,8 @@ Record = dict[str, dict[str, str]]
 
 #: Files that bear no name: in a folder with several runs they are taken to be the last one's.
 _NAMELESS = (
-    "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "walked.png", "pattern.pdf", "pattern.json", "review.html",
-    "film.webp", "contact_sheet.png",
+    "frames.usdc", "picture.png", "wear.png", "drape.png", "drape.webp", "corrected.png", "walked.png", "pattern.pdf", "pattern.json",
+    "review.html", "film.webp", "contact_sheet.png",
 )  # fmt: skip
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named
 
 if TYPE_CHECKING:
+    from warpflat.draping.result import Drape
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment
 
@@ -46,4 +48,42 @@ def write_drape(
         draped = drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
     output = scene.settings.output
     files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)
-    return {"drape": draped.measures()}, files
+    metrics = {"drape": draped.measures()}
+    if table.correct or table.correct_fabric is not None:
+        entry, more = _write_correction(scene, garment, draped, folder)
+        metrics["drape"]["correction"] = entry
+        files += more
+    return metrics, files
+
+
+def _write_correction(
+    scene: Scene, garment: Garment | Flattening, draped: Drape, folder: Path
+) -> tuple[dict[str, Any], list[str]]:
+    """Correct the pattern, and write it beside the first."""
+    from warpflat.draping.correct_pattern import correct_pattern
+    from warpflat.draping.correction_picture import write_correction_picture
+    from warpflat.fabric.library import find_fabric
+    from warpflat.garment.garment import Garment
+    from warpflat.garment.pattern_files import garment_files, surface_files
+    from warpflat.scene.pattern_options import pattern_options
+
+    settings = scene.settings
+    table = settings.drape
+    assert table is not None
+    report_activity("correcting the pattern")
+    with errors_named(scene.where):
+        other = None if table.correct_fabric is None else find_fabric(table.correct_fabric)
+        found = correct_pattern(draped, hold=table.hold, fabric=other, worn_shape=other is not None)
+        drawing = pattern_options(settings.pattern, None)
+    files = []
+    if settings.output.picture:
+        files.append("corrected.png")
+        write_correction_picture(folder / files[-1], found)
+    corrected, name = found.apply(garment), f"{scene.name}.corrected"
+    # The PDF and the JSON have one name in a folder, which is the first pattern's.
+    drawing = replace(drawing, formats=[each for each in drawing.formats if each in ("dxf", "svg")], cloth=None)
+    if isinstance(corrected, Garment):
+        written = garment_files({"": corrected}, folder, name=name, options=drawing)
+    else:
+        written = surface_files([corrected], folder, name=name, options=drawing)
+    return found.measures(garment), [*files, *written.files]

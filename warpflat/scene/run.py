@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from warpflat.garment.pattern_files import PatternOptions
     from warpflat.garment.sew_surface import SewnSurface
     from warpflat.scene.frames import FrameRecorder
+    from warpflat.scene.schema import SceneTable
 
 __all__ = ["files_of_run", "flatten_scene", "run_scene", "scene_cuts", "scene_ledger"]
 
@@ -134,6 +135,10 @@ def _run_surface(
         )
 
 
+def _corrects(settings: SceneTable) -> bool:
+    return settings.drape is not None and (settings.drape.correct or settings.drape.correct_fabric is not None)
+
+
 def files_of_run(scene: Scene) -> list[str]:
     """Return the files that a run will write, as far as they are known; those of a form's pieces or of parts of a cut are not."""
     settings, name = scene.settings, scene.name
@@ -145,6 +150,7 @@ def files_of_run(scene: Scene) -> list[str]:
         "frames.usdc": FrameSchedule(output).wanted,
         "picture.png": output.picture,
         "drape.png": output.picture and settings.drape is not None,
+        "corrected.png": output.picture and _corrects(settings),
         "drape.webp": output.picture and settings.drape is not None and FrameSchedule(output).wanted,
         f"{name}.draped.obj": settings.drape is not None and not garment,
         "review.html": output.picture and output.review,
@@ -153,6 +159,7 @@ def files_of_run(scene: Scene) -> list[str]:
         "walked.png": output.picture and garment and bool(formats or settings.marker is not None),
         **{f"{name}.{ending}": ending in formats for ending in ("dxf", "svg")},
         **{f"pattern.{ending}": ending in formats for ending in ("pdf", "json")},
+        **{f"{name}.corrected.{ending}": ending in formats and _corrects(settings) for ending in ("dxf", "svg")},
         f"{name}.marker.svg": settings.marker is not None,
         f"{name}.marker.json": settings.marker is not None,
     }

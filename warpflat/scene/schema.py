@@ -199,6 +199,10 @@ class DrapeTable(Table):
     max_steps: Annotated[int, Field(ge=1, le=10_000_000)] = 20_000
     hold: list[str] = Field(default_factory=list)
     """Lines and edges that stay where they are: "piece.line", or "line" for every piece that has one."""
+    correct: bool = False
+    """Whether the pattern is corrected until the worn garment lies on the designed surface, or no nearer."""
+    correct_fabric: str | None = None
+    """Another cloth for the corrected pattern, in which it is to be worn in the same shape."""
 
 
 class OutputTable(Table):

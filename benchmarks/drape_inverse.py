@@ -1,0 +1,122 @@
+"""Patterns recovered from draped shapes: a sheet hung at three points and a circle skirt, draped on one mesh, found on another.
+
+    python benchmarks/drape_inverse.py
+
+The second mesh is given the draped shape and a wrong pattern: 3 % too wide, 2 % too short, sheared by 3 %. Millimetres.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import warp as wp
+from scipy.interpolate import RegularGridInterpolator
+
+from warpflat.draping.body import Body
+from warpflat.draping.correct_pattern import correct_pattern
+from warpflat.draping.options import DrapeOptions
+from warpflat.draping.relax_drape import relax_drape
+from warpflat.draping.result import Drape
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.fabric.library import find_fabric
+
+OPTIONS = DrapeOptions(tolerance=2e-3, max_steps=8000)
+Place = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def cloth_of(flat: Place, space: Place, rows: int, columns: int, closed: bool) -> SewnCloth:
+    """A grid over the unit square, its first and last column sewn together if it is closed."""
+    v, u = (each.ravel() for each in np.meshgrid(np.linspace(0, 1, rows), np.linspace(0, 1, columns), indexing="ij"))
+    i = np.arange(rows * columns, dtype=np.int32).reshape(rows, columns)
+    faces = np.stack([i[:-1, :-1], i[:-1, 1:], i[1:, 1:], i[1:, :-1]], axis=-1).reshape(-1, 4)
+    sewn = i.copy()
+    if closed:
+        sewn[:, -1] = sewn[:, 0]
+    _, first, welded = np.unique(sewn.ravel(), return_index=True, return_inverse=True)
+    welded = welded.astype(np.int32)
+    return SewnCloth(
+        fabric=find_fabric("woven"), designed=space(u, v)[first], faces=welded[faces], flat_faces=faces, flat=flat(u, v),
+        welded=welded, warp=np.tile([0.0, 1.0], (len(faces), 1)), weft=np.tile([1.0, 0.0], (len(faces), 1)),
+        piece_faces={"piece": slice(0, len(faces))}, piece_vertices={"piece": slice(0, rows * columns)}, lines={},
+    )  # fmt: skip
+
+
+def apart(p: np.ndarray, q: np.ndarray) -> np.ndarray:
+    """Distances [mm] after the best rigid motion."""
+    p, q = p - p.mean(axis=0), q - q.mean(axis=0)
+    u, _, v = np.linalg.svd(p.T @ q)
+    return 1e3 * np.linalg.norm(p @ (u @ v) - q, axis=1)
+
+
+def recover(name: str, flat: Place, space: Place, holds: Place, sizes: list[tuple[int, int]], closed: bool) -> None:
+    began = time.process_time()
+    cloths = [cloth_of(flat, space, *size, closed) for size in sizes]
+    held = [holds(*np.array(space_uv(*size, closed)).T) for size in sizes]
+    given = relax_drape(cloths[0], None, held=held[0], options=OPTIONS)
+    on_grid = given.positions[cloths[0].welded].reshape(*sizes[0], 3)
+    axes = [np.linspace(0, 1, n) for n in sizes[0]]
+    shape = RegularGridInterpolator(axes, on_grid, method="cubic")
+    second = cloth_of(flat, lambda u, v: shape(np.column_stack([v, u])), *sizes[1], closed)
+    wrong = second.flat * [1.03, 0.98] + 0.03 * second.flat[:, 1:] * [1.0, 0.0]
+    # A body that is out of reach.
+    far = Body(
+        np.array([[9.0, 0, 9], [9.1, 0, 9], [9, 0, 9.1]]), np.array([[0, 1, 2, -1]], dtype=np.int32),
+        device=wp.get_device("cpu"),
+    )  # fmt: skip
+    cloth = replace(second, flat=wrong, lines={"piece.held": np.flatnonzero(held[1]).astype(np.int32)})
+    worn = relax_drape(cloth, far, held=held[1], options=OPTIONS)
+    designed = Body(second.designed, second.faces, device=far.device)
+    drape = Drape(cloth=cloth, worn=worn, body=far, designed=designed, options=OPTIONS)
+    found = correct_pattern(drape, hold=["held"], bridging=False)
+    for when, each in (("wrong", found.before), ("found", found.after)):
+        flats, shapes = (
+            apart(each.cloth.flat, second.flat),
+            1e3 * np.linalg.norm(each.positions - second.designed, axis=1),
+        )
+        rest = "" if each.converged and given.converged else "  NOT AT REST"
+        print(
+            f"{name:12} {when}: pattern {flats.mean():.3f} mean {flats.max():.3f} max, worn {shapes.mean():.3f} {shapes.max():.3f}{rest}"
+        )
+    print(f"{'':12} {len(found.rounds) - 1} rounds, {found.reason}; {time.process_time() - began:.1f} s", flush=True)
+
+
+def space_uv(rows: int, columns: int, closed: bool) -> list[tuple[float, float]]:
+    """The places in the unit square of the sewn vertices."""
+    last = columns - 1 if closed else columns
+    return [(k / (columns - 1), j / (rows - 1)) for j in range(rows) for k in range(last)]
+
+
+def main() -> None:
+    wp.config.log_level = wp.LOG_ERROR
+    side, inner, outer = 0.4, 0.11, 0.45
+    recover(
+        "sheet",
+        lambda u, v: side * np.column_stack([u, v]),
+        lambda u, v: side * np.column_stack([0.95 * u, v, 0.075 * np.sin(np.pi * u)]),
+        lambda u, v: (v == 1.0) & np.isin(u, (0.0, 0.5, 1.0)),
+        [(33, 33), (25, 25)],
+        False,
+    )
+
+    def ring(u: np.ndarray, v: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return 2 * np.pi * u, outer + (inner - outer) * v
+
+    def folds(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        """Hanging in eight folds."""
+        angle, r = ring(u, v)
+        down = r - inner
+        radius = inner + 0.35 * down * (1 + 0.5 * np.cos(8 * angle))
+        return np.column_stack([radius * np.cos(angle), -0.85 * down, radius * np.sin(angle)])
+
+    def annulus(u: np.ndarray, v: np.ndarray) -> np.ndarray:
+        angle, r = ring(u, v)
+        return np.column_stack([r * np.cos(angle), r * np.sin(angle)])
+
+    recover("circle skirt", annulus, folds, lambda u, v: v == 1.0, [(25, 97), (19, 81)], True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,346 @@
+"""The pattern corrected: the flat pieces are changed until the worn cloth lies where it should.
+
+A round compares the metric of the worn cloth with that of the shape that is wanted. Where the worn cloth is longer along a thread, the
+pattern is too long there by as much. All cells together are flat, so the pattern moves by the displacement u that is nearest to what
+the cells ask for, in the cloth's own stiffness: the minimum over u of
+
+    sum of area * (K_warp (e_warp - t_warp)^2 + K_weft (e_weft - t_weft)^2 + G (gamma - t_gamma)^2),
+
+where e and gamma are the strains of u and t is half the difference of the squared lengths. Both sides of a seam change their lengths
+equally. Cloth is stiff: its worn lengths follow those of the pattern nearly one to one, so that a round leaves a small share of
+what the plane allows (the fixed point has t = 0, or a t that no flat piece can follow).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse.linalg import splu
+
+from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.errors import InputError
+from warpflat.core.sums import weighted_percentiles
+from warpflat.draping.body import Body
+from warpflat.draping.drape_garment import held_vertices
+from warpflat.draping.relax_drape import relax_drape
+from warpflat.draping.result import Drape
+from warpflat.draping.sewn_cloth import SewnCloth
+from warpflat.export.geometry import outline_edges
+from warpflat.fabric.fabric import Fabric
+from warpflat.flattening.result import Flattening
+from warpflat.garment.garment import Garment
+from warpflat.surface.triangles import corner_triangles
+
+__all__ = ["Correction", "Round", "correct_pattern"]
+
+# Shear counts at least as this share of the threads' stiffness: a pattern that shears freely gets a ragged outline.
+_LEAST_SHEAR = 0.05
+# Weight of equal changes on both sides of a seam, over the threads' stiffness; and of what holds a piece as a whole.
+_SEAM, _HOLD = 1e3, 1e-8
+# A round that lowers the misfit by less than this share is the last; a step that does not lower it is halved so often.
+_LEAST_GAIN, _HALVINGS = 0.02, 2
+# No cell shrinks below this share of its area in a round.
+_LEAST_AREA = 0.5
+# So much more of the area may be strained beyond the cloth's limit.
+_MORE_STRAINED = 0.01
+
+
+@dataclass(frozen=True, kw_only=True)
+class Round:
+    """Misfit after a round: mean and 95th percentile over the area [m], the share of the area that is strained beyond the limit, and
+    the share of the step that was taken."""
+
+    misfit: float
+    misfit_p95: float
+    strained: float
+    share: float
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Correction:
+    """A pattern before and after its correction.
+
+    Attributes:
+        before, after: the drapes of both patterns.
+        rounds: the misfit before the first round, and after each.
+        reason: why it ended.
+    """
+
+    before: Drape
+    after: Drape
+    rounds: tuple[Round, ...]
+    reason: str
+
+    def moved(self) -> dict[str, FloatArray]:
+        """Return how far each vertex of each piece (#P) has moved across the old outline, outwards [m]; 0 inside."""
+        old, new = self.before.cloth, self.after.cloth
+        edges = _directed(outline_edges(old.flat_faces), old.flat_faces)
+        along = old.flat[edges[:, 1]] - old.flat[edges[:, 0]]
+        outwards = np.zeros_like(old.flat)
+        for end in range(2):
+            np.add.at(outwards, edges[:, end], np.column_stack([along[:, 1], -along[:, 0]]))
+        length = np.linalg.norm(outwards, axis=1, keepdims=True)
+        across = np.einsum("ij,ij->i", new.flat - old.flat, outwards / np.maximum(length, 1e-30))
+        return {name: across[rows] for name, rows in old.piece_vertices.items()}
+
+    def edges(self, garment: Garment | Flattening) -> dict[str, dict[str, float]]:
+        """Return by "piece.edge" how far the outline moves outwards [m], on the mean and at most, and how much longer it becomes [m]."""
+        old, new, moved = self.before.cloth, self.after.cloth, self.moved()
+        found = {}
+        for name, piece in _pieces(garment).items():
+            begin = old.piece_vertices[name].start
+            on_outline = set(np.unique(outline_edges(piece.faces)).tolist())
+            for edge, ids in piece.network.surface.lines.items():
+                if len(ids) < 2 or not on_outline.issuperset(ids.tolist()):
+                    continue
+                across = moved[name][ids]
+                longer = _length(new.flat[ids + begin]) - _length(old.flat[ids + begin])
+                found[f"{name}.{edge}"] = {
+                    "mean_m": float(across.mean()), "max_m": float(across[np.abs(across).argmax()]), "longer_m": longer,
+                }  # fmt: skip
+        return found
+
+    def seam_difference(self) -> float:
+        """Return by how much the two sides of any edge of a seam differ more in length than before [m]."""
+        old, new = self.before.cloth, self.after.cloth
+        seams = _seam_edges(old)
+        if not len(seams):
+            return 0.0
+        before, after = (
+            _edge_lengths(each.flat, seams[:, 0]) - _edge_lengths(each.flat, seams[:, 1]) for each in (old, new)
+        )
+        return float(np.abs(after - before).max())
+
+    def apply(self, garment: Garment | Flattening) -> Garment | Flattening:
+        """Return the garment, or the piece, with the corrected pattern."""
+        cloth = self.after.cloth
+        pieces = {
+            name: replace(piece, positions=cloth.flat[cloth.piece_vertices[name]], fabric=cloth.fabric)
+            for name, piece in _pieces(garment).items()
+        }
+        return replace(garment, pieces=pieces) if isinstance(garment, Garment) else next(iter(pieces.values()))
+
+    def measures(self, garment: Garment | Flattening) -> dict[str, object]:
+        """Return the entry `correction` of `metrics.json`."""
+        rows = [
+            {
+                "misfit_m": each.misfit,
+                "misfit_p95_m": each.misfit_p95,
+                "beyond_limit": each.strained,
+                "share": each.share,
+            }
+            for each in self.rounds
+        ]
+        return {
+            "reason": self.reason, "fabric": self.after.cloth.fabric.name, "rounds": rows,
+            "seam_difference_m": self.seam_difference(), "edges": self.edges(garment),
+        }  # fmt: skip
+
+
+def correct_pattern(
+    drape: Drape,
+    *,
+    hold: Sequence[str] = (),
+    fabric: Fabric | None = None,
+    worn_shape: bool = False,
+    bridging: bool = True,
+    rounds: int = 6,
+    wanted: float = 0.0,
+    callback: Callable[[int, Round], None] | None = None,
+) -> Correction:
+    """Change the flat pieces until the worn garment lies on the designed surface, or no nearer.
+
+    Cloth that bridges a hollow is not asked to follow it, unless the shape that is wanted is one that cloth has taken.
+
+    Args:
+        drape: of the pattern as it is.
+        hold: lines that stay where they are, as in :func:`warpflat.drape`.
+        fabric: another cloth for the corrected pattern; that of the drape if not given.
+        worn_shape: whether the shape as it is worn in `drape` is wanted, rather than the designed one.
+        bridging: whether the designed surface may have hollows that cloth cannot follow; without effect for a worn shape.
+        rounds: the most.
+        wanted: misfit on the mean at which it ends [m].
+        callback: called with the number of each round and its misfit.
+
+    Raises:
+        InputError: the drape is not at rest.
+    """
+    if not drape.converged:
+        raise InputError("correct: the drape is not at rest; raise max_steps in [drape]")
+    bridging = bridging and not worn_shape
+    device, held = drape.body.device, held_vertices(drape.cloth, hold)
+    shape = drape.positions if worn_shape else drape.cloth.designed
+    cloth = replace(drape.cloth, designed=shape, fabric=fabric or drape.cloth.fabric)
+    designed = Body(shape, cloth.faces, device=device) if worn_shape else drape.designed
+
+    def wear(pattern: SewnCloth) -> Drape:
+        worn = relax_drape(pattern, drape.body, options=drape.options, held=held)
+        return replace(drape, cloth=pattern, worn=worn, designed=designed)
+
+    if worn_shape or fabric is not None:
+        drape = wear(cloth)
+    before = drape
+    seams = _seam_edges(cloth)
+    difference = _edge_lengths(cloth.flat, seams[:, 0]) - _edge_lengths(cloth.flat, seams[:, 1])
+    history, reason = [_round(drape, 0.0, bridging)], f"{rounds} rounds"
+    for number in range(1, rounds + 1):
+        if history[-1].misfit <= wanted:
+            reason = "the misfit is as wanted"
+            break
+        step = _step(drape, seams, difference, bridging)
+        best, share = None, _largest_share(drape.cloth, step)
+        for _ in range(_HALVINGS + 1):
+            trial = wear(replace(drape.cloth, flat=drape.cloth.flat + share * step))
+            now = _round(trial, share, bridging)
+            if (
+                trial.converged
+                and now.misfit < history[-1].misfit
+                and now.strained <= history[0].strained + _MORE_STRAINED
+            ):
+                best = trial
+                break
+            share *= 0.5
+        if best is None:
+            reason = "no step lowers the misfit"
+            break
+        drape, gain = best, 1.0 - now.misfit / history[-1].misfit
+        history.append(now)
+        if callback is not None:
+            callback(number, now)
+        if gain < _LEAST_GAIN:
+            reason = "the misfit hardly falls any more"
+            break
+    return Correction(before=before, after=drape, rounds=tuple(history), reason=reason)
+
+
+def _pieces(garment: Garment | Flattening) -> dict[str, Flattening]:
+    return dict(garment.pieces) if isinstance(garment, Garment) else {garment.surface.name: garment}
+
+
+def _round(drape: Drape, share: float, bridging: bool) -> Round:
+    limit, faces = drape.cloth.fabric.strain_limit, drape.face_areas
+    strained = max(float(faces[np.abs(drape.strains[name]) > limit].sum() / faces.sum()) for name in ("warp", "weft"))
+    off = drape.misfit if bridging else drape.distance
+    mean = float((off * drape.areas).sum() / drape.areas.sum())
+    return Round(
+        misfit=mean, misfit_p95=weighted_percentiles(off, drape.areas, [0.95])[0], strained=strained, share=share
+    )
+
+
+def _step(drape: Drape, seams: IntArray, difference: FloatArray, bridging: bool) -> FloatArray:
+    """Return the displacement of the flat vertices (#P by 2 [m]) that follows best what the cells ask for.
+
+    Args:
+        drape: of the present pattern.
+        seams: #S by 2 by 2, the edges of the outline that are sewn together.
+        difference: #S, the wanted difference of their lengths [m].
+        bridging: whether what bridges a hollow is as it should be.
+    """
+    cloth = drape.cloth
+    corner, face, gradient, area = cloth.cells()
+    corner_flat, _, _ = corner_triangles(cloth.flat_faces)
+    wanted = _lengths(cloth.designed[corner], gradient) - _lengths(drape.positions[corner], gradient)
+    if bridging:
+        share = drape.misfit / np.maximum(drape.distance, 1e-9)
+        wanted *= share[corner].mean(axis=1)[:, None]
+    fabric = cloth.fabric
+    threads = 0.5 * (fabric.stiffness_warp + fabric.stiffness_weft)
+    shear = max(fabric.shear_stiffness, _LEAST_SHEAR * threads)
+    along = np.stack([-(gradient[:, :2] + gradient[:, 2:]), gradient[:, :2], gradient[:, 2:]], axis=1)
+    warp, weft = cloth.warp[face][:, None, :], cloth.weft[face][:, None, :]
+    by_warp, by_weft = along[:, :, :1], along[:, :, 1:]
+    # #C by 3 corners by 2 coordinates, for the strain along warp, along weft and in shear.
+    rows = [warp * by_warp, weft * by_weft, warp * by_weft + weft * by_warp]
+    count, cells = 2 * len(cloth.flat), len(corner)
+    columns = (2 * corner_flat[:, :, None] + np.arange(2)).reshape(cells, 6)
+    matrix = csc_array((count, count))
+    right = np.zeros(count)
+    for values, target, stiffness in zip(
+        rows, wanted.T, (fabric.stiffness_warp, fabric.stiffness_weft, shear), strict=True
+    ):
+        places = (np.repeat(np.arange(cells), 6), columns.ravel())
+        b = coo_array((values.reshape(-1), places), shape=(cells, count)).tocsr()
+        weighted = diags_array(stiffness * area) @ b
+        matrix = matrix + b.T @ weighted
+        right += weighted.T @ target
+    if len(seams):
+        b = _seam_rows(cloth.flat, seams)
+        now = _edge_lengths(cloth.flat, seams[:, 0]) - _edge_lengths(cloth.flat, seams[:, 1])
+        weight = _SEAM * threads
+        matrix = matrix + weight * (b.T @ b)
+        right += weight * (b.T @ (difference - now))
+    matrix = csc_array(matrix + diags_array(np.full(count, _HOLD * threads)))
+    step = splu(matrix, permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}).solve(right)
+    return np.asarray(step.reshape(-1, 2))
+
+
+def _lengths(x: FloatArray, gradient: FloatArray) -> FloatArray:
+    """Return half the squared lengths of the threads and the product of both, of cells in space (#C by 3 by 3): #C by 3."""
+    d1, d2 = x[:, 1] - x[:, 0], x[:, 2] - x[:, 0]
+    warp = d1 * gradient[:, :1] + d2 * gradient[:, 2:3]
+    weft = d1 * gradient[:, 1:2] + d2 * gradient[:, 3:]
+    products = [0.5 * (warp * warp).sum(axis=1), 0.5 * (weft * weft).sum(axis=1), (warp * weft).sum(axis=1)]
+    return np.stack(products, axis=1)
+
+
+def _seam_edges(cloth: SewnCloth) -> IntArray:
+    """Return the edges of the outlines that are sewn together, #S by 2 edges by 2 vertices of `flat` in corresponding order."""
+    edges = outline_edges(cloth.flat_faces)
+    sewn = cloth.welded[edges]
+    turned = sewn[:, 0] > sewn[:, 1]
+    edges[turned], sewn[turned] = edges[turned][:, ::-1], sewn[turned][:, ::-1]
+    order = np.lexsort((sewn[:, 1], sewn[:, 0]))
+    same = (sewn[order][1:] == sewn[order][:-1]).all(axis=1) & (sewn[order][1:, 0] != sewn[order][1:, 1])
+    first = np.flatnonzero(same)
+    return np.stack([edges[order[first]], edges[order[first + 1]]], axis=1)
+
+
+def _edge_lengths(flat: FloatArray, edges: IntArray) -> FloatArray:
+    return np.asarray(np.linalg.norm(flat[edges[:, 1]] - flat[edges[:, 0]], axis=1))
+
+
+def _seam_rows(flat: FloatArray, seams: IntArray) -> coo_array:
+    """Return the change of the difference in length of the two sides by the displacement of the vertices, #S by 2 #P."""
+    rows, columns, values = [], [], []
+    for side, sign in ((0, 1.0), (1, -1.0)):
+        ends = seams[:, side]
+        along = flat[ends[:, 1]] - flat[ends[:, 0]]
+        unit = sign * along / np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-30)
+        for end, of_end in ((0, -unit), (1, unit)):
+            rows.append(np.repeat(np.arange(len(seams)), 2))
+            columns.append((2 * ends[:, end, None] + np.arange(2)).ravel())
+            values.append(of_end.ravel())
+    shape = (len(seams), 2 * len(flat))
+    return coo_array((np.concatenate(values), (np.concatenate(rows), np.concatenate(columns))), shape=shape).tocsr()
+
+
+def _largest_share(cloth: SewnCloth, step: FloatArray) -> float:
+    """Return the largest share of a step, of 1, 1/2, 1/4 ..., that leaves every cell enough of its area."""
+    corner, _, _ = corner_triangles(cloth.flat_faces)
+
+    def areas(flat: FloatArray) -> FloatArray:
+        a, b = flat[corner[:, 1]] - flat[corner[:, 0]], flat[corner[:, 2]] - flat[corner[:, 0]]
+        return np.asarray(a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0])
+
+    before, share = areas(cloth.flat), 1.0
+    while share > 1e-3 and (areas(cloth.flat + share * step) < _LEAST_AREA * before).any():
+        share *= 0.5
+    return share
+
+
+def _directed(edges: IntArray, faces: IntArray) -> IntArray:
+    """Return outline edges (#B by 2) in the direction in which their faces, wound counter-clockwise, have them."""
+    sides = []
+    for size, part in ((4, faces[faces[:, 3] >= 0]), (3, faces[faces[:, 3] < 0])):
+        sides += [part[:, [side, (side + 1) % size]] for side in range(size)]
+    all_sides = np.concatenate(sides).astype(np.int64)
+    stride = int(faces.max()) + 1
+    forward = np.isin(edges[:, 0].astype(np.int64) * stride + edges[:, 1], all_sides[:, 0] * stride + all_sides[:, 1])
+    return np.where(forward[:, None], edges, edges[:, ::-1])
+
+
+def _length(points: FloatArray) -> float:
+    return float(np.linalg.norm(np.diff(points, axis=0), axis=1).sum())
