@@ -78,13 +78,15 @@ def _pieces(garment: Garment | Flattening | Sequence[Flattening]) -> list[Flatte
 
 
 def _advised_cuts(pieces: Sequence[Flattening]) -> dict[str, list[tuple[str, FloatArray]]]:
-    """Return by piece what to cut, and where on the designed surface, of the cuts that `warpflat.advise` has found."""
-    return {
-        piece.surface.name: [
-            (remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies
-        ]
-        for piece in pieces
-    }
+    """Return by piece what to cut, and where on the designed surface, of the cuts that `warpflat.advise` has found.
+
+    A cut on one side stands for that on the other side of the body, too.
+    """
+    found = {}
+    for piece in pieces:
+        paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
+        found[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
+    return found
 
 
 def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:

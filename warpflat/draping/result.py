@@ -27,7 +27,7 @@ __all__ = ["Drape"]
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
 # A cut within this distance of a place may take it up [m].
-_NEAR_CUT = 0.12
+_NEAR_CUT = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
