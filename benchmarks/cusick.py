@@ -24,7 +24,10 @@ RADIUS, SUPPORT = 0.15, 0.09
 def disc(fabric: warpflat.Fabric, edge: float) -> SewnCloth:
     """A disc in rings, the support's edge among them."""
     radii = np.concatenate(
-        [np.linspace(0.0, SUPPORT, round(SUPPORT / edge) + 1), np.linspace(SUPPORT, RADIUS, round((RADIUS - SUPPORT) / edge) + 1)[1:]]
+        [
+            np.linspace(0.0, SUPPORT, round(SUPPORT / edge) + 1),
+            np.linspace(SUPPORT, RADIUS, round((RADIUS - SUPPORT) / edge) + 1)[1:],
+        ]
     )
     rows = []
     for number, radius in enumerate(radii):

@@ -39,7 +39,9 @@ def newton_drape(drape: warpflat.Drape, *, steps: int, step_s: float = 1.0 / 600
         tri_aniso_ke=wp.vec3(fabric.stiffness_weft, fabric.stiffness_warp, fabric.shear_stiffness),
         edge_aniso_ke=wp.vec3(fabric.bending),
     )  # fmt: skip
-    mesh: Any = newton.Mesh(body.vertices.astype(np.float32), body.triangles.ravel().astype(np.int32), compute_inertia=False)
+    mesh: Any = newton.Mesh(
+        body.vertices.astype(np.float32), body.triangles.ravel().astype(np.int32), compute_inertia=False
+    )
     friction = drape.options.friction
     builder.add_shape_mesh(body=-1, mesh=mesh, cfg=newton.ModelBuilder.ShapeConfig(mu=friction))
     model = builder.finalize("cpu")
@@ -62,10 +64,19 @@ def newton_drape(drape: warpflat.Drape, *, steps: int, step_s: float = 1.0 / 600
 
 def show(name: str, drape: warpflat.Drape) -> None:
     measures = drape.measures()
-    gaps = {line: 1e3 * gap for line, gap in measures["gap_m"].items() if "armhole" in line or line.endswith((".neck", ".bust"))}
-    print(f"\n{name}: distance to the designed surface [mm]", {k: round(1e3 * v, 2) for k, v in measures["distance_m"].items()})
+    gaps = {
+        line: 1e3 * gap
+        for line, gap in measures["gap_m"].items()
+        if "armhole" in line or line.endswith((".neck", ".bust"))
+    }
+    print(
+        f"\n{name}: distance to the designed surface [mm]",
+        {k: round(1e3 * v, 2) for k, v in measures["distance_m"].items()},
+    )
     print("  gaps [mm]:", ", ".join(f"{line} {gap:.1f}" for line, gap in gaps.items()))
-    print(f"  weft strain 95 % {100 * measures['strain_weft']['p95']:.2f} %, deepest {1e3 * measures['deepest_m']:.2f} mm")
+    print(
+        f"  weft strain 95 % {100 * measures['strain_weft']['p95']:.2f} %, deepest {1e3 * measures['deepest_m']:.2f} mm"
+    )
     for place in measures["places"]:
         print(f"  - {place['words']}")
 

@@ -467,6 +467,8 @@ class Drape(Entry):
     """The garment on its body."""
 
     converged: bool
+    fits: bool
+    """At rest, and no place that misfits the designed surface or is strained beyond the cloth's limit; against a body ease is no misfit."""
     residual: float
     steps: int
     seconds: float

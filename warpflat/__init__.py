@@ -28,10 +28,13 @@ if TYPE_CHECKING:
     from warpflat.cutting.separate_pieces import separate
     from warpflat.draping.correct_pattern import Correction, correct_pattern
     from warpflat.draping.drape_garment import drape
+    from warpflat.draping.drape_pattern import Placement, drape_pattern
     from warpflat.draping.options import DrapeOptions
     from warpflat.draping.result import Drape
     from warpflat.draping.write import save_drape
+    from warpflat.export.read_dxf import read_dxf
     from warpflat.export.read_pattern_json import read_pattern_json
+    from warpflat.export.read_svg import read_svg
     from warpflat.fabric.fabric import Fabric
     from warpflat.fabric.library import find_fabric, load_library
     from warpflat.flattening.edit import change_fabric, change_surface
@@ -107,6 +110,7 @@ _HOME = {
     "InputError": "core.errors",
     "Mannequin": "mannequin.mannequin",
     "PatternOptions": "garment.pattern_files",
+    "Placement": "draping.drape_pattern",
     "Progress": "flattening.progress",
     "RelaxOptions": "solver.options",
     "RelaxationStep": "flattening.step_by_step",
@@ -125,6 +129,7 @@ _HOME = {
     "draft_garment": "pattern.draft",
     "correct_pattern": "draping.correct_pattern",
     "drape": "draping.drape_garment",
+    "drape_pattern": "draping.drape_pattern",
     "find_fabric": "fabric.library",
     "flatten": "flattening.flatten_piece",
     "flatten_all": "flattening.flatten_all",
@@ -146,8 +151,10 @@ _HOME = {
     "make_surface": "surface.repair.validate",
     "move_dart": "cutting.dart_move",
     "pattern_of_garment": "garment.to_pattern",
+    "read_dxf": "export.read_dxf",
     "read_pattern_json": "export.read_pattern_json",
     "read_surface": "surface.io.read",
+    "read_svg": "export.read_svg",
     "relaxation": "flattening.step_by_step",
     "run_scene": "scene.run",
     "save_comparison": "scene.compare",
@@ -177,6 +184,7 @@ __all__ = [
     "InputError",
     "Mannequin",
     "PatternOptions",
+    "Placement",
     "Progress",
     "RelaxOptions",
     "RelaxationStep",
@@ -196,6 +204,7 @@ __all__ = [
     "cut",
     "draft_garment",
     "drape",
+    "drape_pattern",
     "find_fabric",
     "flatten",
     "flatten_all",
@@ -217,8 +226,10 @@ __all__ = [
     "make_surface",
     "move_dart",
     "pattern_of_garment",
+    "read_dxf",
     "read_pattern_json",
     "read_surface",
+    "read_svg",
     "relaxation",
     "run_scene",
     "save_comparison",

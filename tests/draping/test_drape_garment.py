@@ -54,8 +54,19 @@ def test_a_bodice_without_darts_gapes_at_the_armholes(worn: warpflat.Drape):
     assert worst["kind"] == "misfit"
     assert "armhole" in worst["line"]
     assert f"gapes by {1e3 * worst['gap_m']:.1f} mm" in worst["words"]
+    assert not measures["fits"]
     # What presses on the body carries the weight that does not hang from friction alone.
     assert worn.pressure[worn.gap > 2e-3].max() == 0.0
+
+
+def test_a_misfit_names_the_cut_that_may_take_it_up(worn: warpflat.Drape):
+    place = worn.places[0]
+    at = worn.cloth.designed[place.vertex]
+    near, far = (at[None] - np.array([[0.0, below, 0.0]]) for below in (0.05, 0.5))
+    cuts = {"front": [("a dart along waist", far), ("a dart along bust", near)], "back": [("a seam", at[None])]}
+    advised = dataclasses.replace(worn, cuts=cuts)
+    assert advised.places[0].words == f"{place.words}; a dart along bust may take it up"
+    assert dataclasses.replace(worn, cuts={"front": [("a dart", far)]}).places[0].words == place.words
 
 
 def test_a_drape_writes_worn_pieces_and_a_picture(worn: warpflat.Drape, tmp_path: Path):

@@ -198,3 +198,20 @@ def test_cuts_are_ranked_without_constraints_and_say_so(tmp_path: Path, capsys: 
     assert main(["cuts", str(tmp_path / "front.toml"), "--out", str(tmp_path / "out")]) == 0
     assert "note: candidates are compared without the scene's constraints; a run keeps them" in capsys.readouterr().err
     assert len(json.loads((tmp_path / "out" / "ledger.json").read_text())["notes"]) == 1
+
+
+def test_each_cloth_is_draped_on_demand(tmp_path: Path):
+    text = '[surface]\nshape = "dome"\nresolution = 9\n[drape]\nmax_steps = 200\n'
+    path = tmp_path / "dome.toml"
+    path.write_text(text)
+    comparison = compare_fabrics(load_scene(path), ["woven", "denim"], drape=True)
+    assert list(comparison.drapes) == ["woven", "denim"]
+    assert save_comparison(comparison, tmp_path / "out")[-1] == "compare-drape.png"
+    assert (tmp_path / "out" / "compare-drape.png").stat().st_size > 10_000
+    found = json.loads((tmp_path / "out" / "compare.json").read_text())["drapes"]
+    assert found["denim"]["steps"] <= 200
+    assert found["denim"]["bending_n_m"] > found["woven"]["bending_n_m"]
+    table = comparison_table(comparison)
+    worn = table[table.index("\nworn") :]
+    assert f"{1e3 * found['denim']['misfit_m']['max']:.1f}" in worn
+    assert "pressure, mean [Pa]" in worn

@@ -16,7 +16,8 @@ _COMPARED = """\b
 What comes out, in DIR:
   compare.json  measures of every piece in each fabric, and how far the outlines lie apart [m]
   compare.png   the outlines laid upon each other
-  compare.svg   the same in true size"""
+  compare.svg   the same in true size
+  compare-drape.png  with --drape: gap and strain of each, worn"""
 
 
 @click.command(cls=ComputingCommand, epilog=f"{_COMPARED}\n\n{EXIT_CODES}")
@@ -24,9 +25,16 @@ What comes out, in DIR:
 @click.option(
     "--fabric", "fabrics", multiple=True, metavar="NAME", help="One of those to compare; the first is the base."
 )
+@click.option("--drape", is_flag=True, help="Sew each of them and put it on its body: gap, strain and pressure, too.")
 @output_options(folder="out/NAME-compared", printed="compare.json", verbose=False)
 def compare(
-    scene: Path, fabrics: tuple[str, ...], out: Path | None, quiet: bool, as_json: bool, device: str | None
+    scene: Path,
+    fabrics: tuple[str, ...],
+    out: Path | None,
+    quiet: bool,
+    as_json: bool,
+    device: str | None,
+    drape: bool,
 ) -> int:
     """Run a scene in several fabrics and lay the outlines upon each other: table, compare.png, compare.svg, compare.json.
 
@@ -35,6 +43,7 @@ def compare(
     \b
     Examples:
       warpflat compare scenes/bodice.toml --fabric denim --fabric jersey --fabric power-net
+      warpflat compare scenes/dress.toml --fabric cotton --fabric denim --drape
     """
     from warpflat.cli.progress_bar import ProgressBar
     from warpflat.cli.tables import warnings_of
@@ -49,13 +58,19 @@ def compare(
         ProgressBar(job.name, hidden=quiet or as_json) as bar,
         output_folder(target, COMPARED_FILES, sources=job.sources) as folder,
     ):
-        comparison = compare_fabrics(job, fabrics, on_progress=lambda _, progress: bar(progress), device=device)
+        comparison = compare_fabrics(
+            job, fabrics, on_progress=lambda _, progress: bar(progress), device=device, drape=drape
+        )
         files = save_comparison(comparison, folder)
     warnings = [
         f"{fabric}: {line}"
         for fabric, pieces in comparison.results.items()
         for line in warnings_of(
-            {"pieces": {name: piece.measures for name, piece in pieces.items()}, **comparison.sewing[fabric]}
+            {
+                "pieces": {name: piece.measures for name, piece in pieces.items()},
+                **comparison.sewing[fabric],
+                **({"drape": comparison.drapes[fabric].measures()} if drape else {}),
+            }
         )
     ]
     for warning in warnings:

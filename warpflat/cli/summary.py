@@ -36,8 +36,12 @@ def summary_lines(metrics: Mapping[str, Any], files: Sequence[str], folder: str)
         lines.append(_girths_line(girths))
     wearer = metrics.get("wear", {}).get("wearer")
     if wearer:
-        lines.append(_clipped(wearer_words(wearer)))
-    lines += _fit_lines(metrics["pieces"], "lies on the form" if wearer else "fit")
+        lines.append(_clipped(wearer_words(wearer, draped="drape" in metrics)))
+    if "drape" in metrics:
+        head = "lies on the form" if wearer else "lies on the surface"
+    else:
+        head = "lies on the form" if wearer else "fit"
+    lines += _fit_lines(metrics["pieces"], head)
     if metrics.get("seams") or metrics.get("constraints"):
         lines.append(_seams_line(metrics.get("seams", ()), metrics.get("constraints", ())))
     if metrics.get("rings"):
@@ -158,7 +162,10 @@ def _within(millimetres: float) -> str:
 
 def _drape_line(drape: Mapping[str, Any]) -> str:
     mean, misfit = 1e3 * drape["distance_m"]["mean"], drape["misfit_m"]
-    parts = [f"worn {mean:.1f} mm from the {drape['compared_with']}", f"misfit {1e3 * misfit['mean']:.1f} mm"]
+    parts = [
+        f"fits: {'yes' if drape['fits'] else 'no'}; worn {mean:.1f} mm from the {drape['compared_with']}",
+        f"misfit {1e3 * misfit['mean']:.1f} mm",
+    ]
     parts.append(f"at most {1e3 * misfit['max']:.1f} mm")
     places = [place["words"] for place in drape["places"][:1]]
     return _clipped(f"drape: {'; '.join([', '.join(parts), *places])}")

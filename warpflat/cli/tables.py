@@ -189,8 +189,8 @@ def drape_lines(metrics: Mapping[str, Any]) -> list[str]:
     drape = metrics["drape"]
     misfit, distance = drape["misfit_m"], drape["distance_m"]
     first = (
-        f"worn: {1e3 * distance['mean']:.2f} mm from the {drape['compared_with']}, of which {1e3 * misfit['mean']:.2f} mm is misfit "
-        f"(95 %: {1e3 * misfit['p95']:.1f}, at most {1e3 * misfit['max']:.1f} mm)"
+        f"worn: fits: {'yes' if drape['fits'] else 'no'}; {1e3 * distance['mean']:.2f} mm from the {drape['compared_with']}, "
+        f"of which {1e3 * misfit['mean']:.2f} mm is misfit (95 %: {1e3 * misfit['p95']:.1f}, at most {1e3 * misfit['max']:.1f} mm)"
     )
     return [first, *(f"  {place['words']}" for place in drape["places"])]
 

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
 
 import numpy as np
 import warp as wp
 from numpy.typing import NDArray
 
-from warpflat.core.arrays import BoolArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
@@ -65,18 +64,29 @@ def drape(
         cloth, solid, options=options, held=held, callback=callback,
         observer=lambda places: frames.append(places.astype(np.float32)),
     )  # fmt: skip
-    sources = _sources(garment)
+    sources = tuple(source for piece in _pieces(garment) for source in piece.surface.sources)
     return Drape(
-        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames)
-    )
+        cloth=cloth, worn=worn, body=solid, designed=designed, options=options, sources=sources, frames=tuple(frames),
+        cuts=_advised_cuts(_pieces(garment)),
+    )  # fmt: skip
 
 
-def _sources(garment: Garment | Flattening | Sequence[Flattening]) -> tuple[Path, ...]:
-    """Return the files from which the pieces were read."""
+def _pieces(garment: Garment | Flattening | Sequence[Flattening]) -> list[Flattening]:
     if isinstance(garment, Garment):
-        garment = list(garment.pieces.values())
-    pieces = [garment] if isinstance(garment, Flattening) else garment
-    return tuple(source for piece in pieces for source in piece.surface.sources)
+        return list(garment.pieces.values())
+    return [garment] if isinstance(garment, Flattening) else list(garment)
+
+
+def _advised_cuts(pieces: Sequence[Flattening]) -> dict[str, list[tuple[str, FloatArray]]]:
+    """Return by piece what to cut, and where on the designed surface, of the cuts that `warpflat.advise` has found.
+
+    A cut on one side stands for that on the other side of the body, too.
+    """
+    found = {}
+    for piece in pieces:
+        paths = [(remedy.words.partition(",")[0], piece.surface.vertices[remedy.path]) for remedy in piece.remedies]
+        found[piece.surface.name] = [(words, np.concatenate([path, path * [-1.0, 1.0, 1.0]])) for words, path in paths]
+    return found
 
 
 def held_vertices(cloth: SewnCloth, hold: Sequence[str]) -> BoolArray:

@@ -19,7 +19,7 @@ from warpflat.export.picture_pen import DPI, GREY, PAGE_WIDTH, Pen
 from warpflat.export.picture_png import save_png
 from warpflat.export.picture_views import DrawnView, View, make_facets
 
-__all__ = ["write_drape_picture"]
+__all__ = ["body_around", "draw_scale", "seen_from", "write_drape_picture"]
 
 _VIEWS = (("front", 0.0), ("left side", 90.0), ("back", 180.0))
 _SKIN = (0.80, 0.79, 0.77)
@@ -41,8 +41,8 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
 
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    points, faces, cloth = _joined(drape)
-    views = [_view(points, faces, degrees) for _, degrees in _VIEWS]
+    points, faces, cloth = body_around(drape)
+    views = [seen_from(points, faces, degrees) for _, degrees in _VIEWS]
     room = PAGE_WIDTH - _BAR - 0.2 * (len(views) + 1)
     scale = min(room / sum(float(view.size[0]) for view in views), _TALLEST / float(views[0].size[1]))
     tall = scale * float(views[0].size[1])
@@ -63,7 +63,7 @@ def write_drape_picture(path: str | os.PathLike[str], drape: Drape) -> None:
             pen.write(left + 0.5 * scale * float(view.size[0]), bottom + tall + 0.12, side, 9, color=GREY, ha="center")
             left += scale * float(view.size[0]) + 0.2
         pen.write(0.3, bottom + tall + 0.32, title, 11, fontweight="bold")
-        _bar(figure, (PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall, height), low, high, colours)
+        draw_scale(figure, (PAGE_WIDTH - 0.75, bottom + 0.1 * tall, 0.16, 0.75 * tall, height), low, high, colours)
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
 
@@ -90,7 +90,7 @@ def _maps(drape: Drape) -> list[tuple[str, FloatArray, float, float, str]]:
     ]
 
 
-def _joined(drape: Drape) -> tuple[FloatArray, IntArray, int]:
+def body_around(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     """Return the worn cloth and the part of the body around it as one mesh, and the number of the cloth's faces."""
     body, x = drape.body, drape.positions
     normals = vertex_normals(area_vectors(body.vertices, body.triangles), body.triangles, len(body.vertices))
@@ -105,7 +105,7 @@ def _joined(drape: Drape) -> tuple[FloatArray, IntArray, int]:
     return np.concatenate([x, inner]), faces, len(drape.cloth.faces)
 
 
-def _view(points: FloatArray, faces: IntArray, degrees: float) -> View:
+def seen_from(points: FloatArray, faces: IntArray, degrees: float) -> View:
     """Return the mesh as seen by somebody who walked `degrees` around the body to its left."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, 0.0, -s], [0.0, 1.0, 0.0], [s, 0.0, c]])
@@ -114,7 +114,10 @@ def _view(points: FloatArray, faces: IntArray, degrees: float) -> View:
     return View(points=points @ turn.T, facets=facets, lines={}, vectors=vectors @ turn.T)
 
 
-def _bar(figure: Any, place: tuple[float, float, float, float, float], low: float, high: float, colours: str) -> None:
+def draw_scale(
+    figure: Any, place: tuple[float, float, float, float, float], low: float, high: float, colours: str
+) -> None:
+    """Draw a colour scale at left, bottom, width and height on a page of a height, all in inches."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 

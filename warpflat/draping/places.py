@@ -31,6 +31,7 @@ class Place:
         gap: the distance from the body there [m].
         area: flat area [m2].
         words: a sentence.
+        vertex: the worst one, of the sewn mesh.
     """
 
     kind: str
@@ -39,6 +40,7 @@ class Place:
     gap: float
     area: float
     words: str
+    vertex: int
 
     def as_dict(self) -> dict[str, Any]:
         """Return the entry of `metrics.json`."""
@@ -86,7 +88,15 @@ def find_places(
                     f"limit of {100 * limit:g} %, over {1e4 * area:.0f} cm2"
                 )
                 found.append(
-                    Place(kind="strain", line=line, worst=strain, gap=float(gap[worst]), area=area, words=words)
+                    Place(
+                        kind="strain",
+                        line=line,
+                        worst=strain,
+                        gap=float(gap[worst]),
+                        area=area,
+                        words=words,
+                        vertex=worst,
+                    )
                 )
     order = {"misfit": 0, "strain": 1, "bridged": 2}
     found.sort(key=lambda place: (order[place.kind], -abs(place.worst) * place.area))
@@ -114,7 +124,7 @@ def _distance_place(
         words = f"{_called(line)} falls in by {1e3 * distance:.1f} mm {size}"
     else:
         words = f"{_called(line)} has moved by {1e3 * distance:.1f} mm {size}"
-    return Place(kind=kind, line=line, worst=distance, gap=float(gap[worst]), area=area, words=words)
+    return Place(kind=kind, line=line, worst=distance, gap=float(gap[worst]), area=area, words=words, vertex=worst)
 
 
 def _parts(cloth: SewnCloth, chosen: BoolArray) -> list[IntArray]:

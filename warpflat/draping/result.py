@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -25,6 +26,8 @@ __all__ = ["Drape"]
 
 # Distances up to this are not looked into [m].
 _NEGLIGIBLE = 1e-3
+# A cut within this distance of a place may take it up [m].
+_NEAR_CUT = 0.15
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -42,6 +45,7 @@ class Drape:
         options: friction, tolerance and limits.
         sources: the files that its surface was read from; none of them is ever replaced.
         frames: #V by 3 each, where the cloth was on its way to rest [m].
+        cuts: by piece those that were advised for it: what to cut, and where on the designed surface (#P by 3 [m]).
     """
 
     cloth: SewnCloth
@@ -51,6 +55,7 @@ class Drape:
     options: DrapeOptions
     sources: tuple[Path, ...] = ()
     frames: tuple[NDArray[np.float32], ...] = ()
+    cuts: Mapping[str, Sequence[tuple[str, FloatArray]]] = field(default_factory=dict)
 
     @property
     def converged(self) -> bool:
@@ -133,17 +138,40 @@ class Drape:
 
     @cached_property
     def places(self) -> tuple[Place, ...]:
-        """The worst places, the worst first."""
-        return find_places(
+        """The worst places, the worst first; a misfit near an advised cut names it."""
+        found = find_places(
             self.cloth, self.areas, misfit=self.misfit, bridged=self.bridged, lift=self.gap - self.designed_gap, gap=self.gap,
             strains={name: self.strains[name] for name in ("warp", "weft")},
         )  # fmt: skip
+        return tuple(self._with_cut(place) for place in found)
+
+    def _with_cut(self, place: Place) -> Place:
+        """Return a place of misfit or strain with the nearest of its piece's advised cuts in its words."""
+        if place.kind == "bridged":
+            return place
+        at = self.cloth.designed[place.vertex]
+        near = [
+            (float(np.linalg.norm(path - at, axis=1).min()), words)
+            for words, path in self.cuts.get(place.line.partition(".")[0], ())
+        ]
+        distance, words = min(near, default=(np.inf, ""))
+        return replace(place, words=f"{place.words}; {words} may take it up") if distance <= _NEAR_CUT else place
+
+    @property
+    def fits(self) -> bool:
+        """True if the cloth is at rest and no place is strained beyond its limit, or misfits the designed surface.
+
+        Against a body alone, ease is no misfit.
+        """
+        misfits = {"strain"} if self.designed is self.body else {"strain", "misfit"}
+        return self.converged and not any(place.kind in misfits for place in self.places)
 
     def measures(self) -> dict[str, Any]:
         """Return the entry `drape` of `metrics.json`."""
         limit, areas = self.cloth.fabric.strain_limit, self.areas
         found: dict[str, Any] = {
             "converged": self.worn.converged,
+            "fits": self.fits,
             "residual": self.worn.residual,
             "steps": self.worn.steps,
             "seconds": self.worn.seconds,

@@ -141,7 +141,8 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
     """Return the console's lines on the fit: one per piece, and one for each place and remedy where a piece does not fit."""
     lines = []
     against = metrics.get("wear", {}).get("against")
-    word = "fits" if against is None else f"lies on the {against}"
+    # Of a draped garment its drape says whether it fits.
+    word = f"lies on the {against or 'surface'}" if against or "drape" in metrics else "fits"
     for name, piece in metrics["pieces"].items():
         wear = piece.get("wear")
         if wear is None:
@@ -173,12 +174,15 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
             f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
         if wearer := metrics["wear"].get("wearer"):
-            lines.append(wearer_words(wearer))
+            lines.append(wearer_words(wearer, draped="drape" in metrics))
     return lines
 
 
-def wearer_words(wearer: Mapping[str, Any]) -> str:
-    """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller."""
+def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
+    """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller.
+
+    Whether a garment fits that was draped is said by its drape.
+    """
     loose = [
         f"{name} {100 * level['ease_m']:+.1f} cm" for name, level in wearer["levels"].items() if level["strain"] == 0.0
     ]
@@ -188,4 +192,6 @@ def wearer_words(wearer: Mapping[str, Any]) -> str:
         if level["strain"] > 0.0
     ]
     parts = [f"{words} at {', '.join(row)}" for words, row in (("ease", loose), ("stretched", tight)) if row]
+    if draped:
+        return f"wearer: {'; '.join(parts)}"
     return f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({'; '.join(parts)})"

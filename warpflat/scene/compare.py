@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,12 +15,18 @@ from warpflat.flattening.progress import Progress
 from warpflat.flattening.result import Flattening
 from warpflat.scene.comparison import Comparison
 from warpflat.scene.cuts import CutSequence
+from warpflat.scene.drape import drape_scene
 from warpflat.scene.load import Scene, scene_fabric
 from warpflat.scene.run import flatten_scene, scene_cuts
 
+if TYPE_CHECKING:
+    from warpflat.draping.result import Drape
+    from warpflat.garment.garment import Garment
+
 __all__ = ["COMPARED_FILES", "compare_fabrics", "comparison_table", "laid_upon", "save_comparison"]
 
-COMPARED_FILES = ("compare.json", "compare.png", "compare.svg")
+#: Those of a comparison; the last one of drapes alone.
+COMPARED_FILES = ("compare.json", "compare.png", "compare.svg", "compare-drape.png")
 
 
 def compare_fabrics(
@@ -29,6 +35,7 @@ def compare_fabrics(
     *,
     on_progress: Callable[[str, Progress], bool | None] | None = None,
     device: str | None = None,
+    drape: bool = False,
 ) -> Comparison:
     """Run a scene in each of several fabrics, with the same cuts, seams and constraints.
 
@@ -37,6 +44,7 @@ def compare_fabrics(
         fabrics: two names or more, of the library or the scene's fabric files; others are compared with the first.
         on_progress: called with the fabric and its `Progress` after every step.
         device: Warp device, before the scene's own.
+        drape: sew each of them and put it on its body, by the settings of the scene's `[drape]` table if it has one.
 
     Raises:
         InputError: fewer than two fabrics, one given twice or unknown, or the scene is wrong.
@@ -62,25 +70,28 @@ def compare_fabrics(
         sequence = replace(scene_cuts(scene, device=device), auto=None)
     results: dict[str, Mapping[str, Flattening]] = {}
     sewing: dict[str, Mapping[str, Any]] = {}
+    drapes: dict[str, Drape] = {}
     for name, one in dressed.items():
 
         def report(progress: Progress, name: str = name) -> None:
             if on_progress is not None:
                 on_progress(name, progress)
 
-        results[name], sewing[name] = _run(one, sequence, report, device)
+        results[name], sewing[name], worn = _run(one, sequence, report, device)
+        if drape:
+            drapes[name] = drape_scene(one, worn, device=device)
     first = next(iter(results.values()))
     layouts = {
         name: {piece: laid_upon(first[piece].positions, result.positions) for piece, result in pieces.items()}
         for name, pieces in results.items()
     }
-    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing)
+    return Comparison(name=scene.name, results=results, layouts=layouts, sewing=sewing, drapes=drapes)
 
 
 def _run(
     scene: Scene, sequence: CutSequence | None, report: Callable[[Progress], bool | None], device: str | None
-) -> tuple[Mapping[str, Flattening], Mapping[str, Any]]:
-    """Run the scene without writing files; return its pieces and the entries of `metrics.json` on their sewing."""
+) -> tuple[Mapping[str, Flattening], Mapping[str, Any], Garment | Flattening]:
+    """Run the scene without writing files; return its pieces, the entries of `metrics.json` on their sewing, and what is worn."""
     from warpflat.cutting.remedies import advise
     from warpflat.cutting.separate_pieces import separate
     from warpflat.scene.run_garment import plan_garment
@@ -88,11 +99,11 @@ def _run(
     if sequence is None:
         garment = plan_garment(scene, device=device).flatten(callback=lambda _, progress: report(progress))
         how = garment.summary()
-        return {name: advise(piece) for name, piece in garment.pieces.items()}, {
-            key: how[key] for key in how if key != "pieces"
-        }
+        garment = replace(garment, pieces={name: advise(piece) for name, piece in garment.pieces.items()})
+        return garment.pieces, {key: how[key] for key in how if key != "pieces"}, garment
     result, sewn = flatten_scene(scene, sequence, callback=report, device=device)
-    return {piece.surface.name: advise(piece) for piece in separate(result)}, {} if sewn is None else sewn.metrics()
+    pieces = {piece.surface.name: advise(piece) for piece in separate(result)}
+    return pieces, {} if sewn is None else sewn.metrics(), result
 
 
 def laid_upon(target: FloatArray, layout: FloatArray) -> FloatArray:
@@ -111,6 +122,7 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
     """
     from warpflat.core.atomic_files import output_folder
     from warpflat.core.json_file import write_json
+    from warpflat.draping.compare_picture import write_compared_drapes
     from warpflat.scene.compare_picture import write_overlay_picture, write_overlay_svg
 
     sources = [
@@ -119,8 +131,10 @@ def save_comparison(comparison: Comparison, folder: str | Path) -> list[str]:
     with output_folder(folder, COMPARED_FILES, sources=sources) as to:
         write_overlay_svg(to / "compare.svg", comparison)
         write_overlay_picture(to / "compare.png", comparison)
+        if comparison.drapes:
+            write_compared_drapes(to / "compare-drape.png", comparison.drapes)
         write_json(to / "compare.json", comparison.as_dict())
-    return list(COMPARED_FILES)
+    return list(COMPARED_FILES if comparison.drapes else COMPARED_FILES[:3])
 
 
 def comparison_table(comparison: Comparison) -> str:
@@ -129,6 +143,8 @@ def comparison_table(comparison: Comparison) -> str:
     for piece in comparison.pieces:
         rows = [*_measure_rows(comparison, piece), *_distance_rows(comparison, piece)]
         blocks.append(_columns(piece, comparison.fabrics, rows))
+    if comparison.drapes:
+        blocks.append(_columns("worn", comparison.fabrics, _drape_rows(comparison)))
     note = f"distances: from the pattern in {comparison.fabrics[0]}, the others laid upon it by turning and shifting"
     return "\n\n".join(blocks) + f"\n\n{note}"
 
@@ -158,6 +174,31 @@ def _measure_rows(comparison: Comparison, piece: str) -> list[tuple[str, list[st
         row("beyond limit [%]", lambda m: f"{100 * m['wear']['outside']:.1f}"),
         row("fits", lambda m: "yes" if m["wear"]["fits"] else "no"),
         row("converged", lambda m: "yes" if m["converged"] else "NO"),
+    ]
+
+
+def _drape_rows(comparison: Comparison) -> list[tuple[str, list[str]]]:
+    """Return gap, strain and pressure of each drape."""
+    found = [comparison.drapes[fabric].measures() for fabric in comparison.fabrics]
+
+    def millimetres(key: str, part: str) -> list[str]:
+        return [f"{1e3 * m[key][part]:.1f}" for m in found]
+
+    def strains(thread: str) -> list[str]:
+        return [f"{100 * m[f'strain_{thread}']['p5']:+.1f} to {100 * m[f'strain_{thread}']['p95']:+.1f}" for m in found]
+
+    return [
+        ("largest gap [mm]", [f"{1e3 * max(m['gap_m'].values(), default=0.0):.1f}" for m in found]),
+        ("gap at", [max(m["gap_m"], key=m["gap_m"].__getitem__, default="-") for m in found]),
+        ("distance, mean [mm]", millimetres("distance_m", "mean")),
+        ("misfit, mean [mm]", millimetres("misfit_m", "mean")),
+        ("misfit, most [mm]", millimetres("misfit_m", "max")),
+        *((f"strain {thread} [%]", strains(thread)) for thread in ("warp", "weft", "bias")),
+        ("pressure, mean [Pa]", [f"{m['pressure_pa']['mean']:.0f}" for m in found]),
+        ("pressure, 95 % [Pa]", [f"{m['pressure_pa']['p95']:.0f}" for m in found]),
+        ("touching [%]", [f"{100 * m['pressure_pa']['touching']:.0f}" for m in found]),
+        ("fits", ["yes" if m["fits"] else "no" for m in found]),
+        ("at rest", ["yes" if m["converged"] else "NO" for m in found]),
     ]
 
 

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import pairwise
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -14,6 +14,9 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import polyline_length
 from warpflat.flattening.result import Flattening
 from warpflat.surface.connectivity import border_loops
+
+if TYPE_CHECKING:
+    from warpflat.draping.result import Drape
 
 __all__ = ["Comparison", "outline"]
 
@@ -28,12 +31,14 @@ class Comparison:
         layouts: by fabric, then by piece: #P by 2 [m], laid upon the first fabric's pattern as well as it goes, turned
             and shifted only.
         sewing: by fabric, how its seams and constraints came out, as in `metrics.json`; empty where nothing was sewn.
+        drapes: by fabric, sewn and put on the body; empty unless that was asked for.
     """
 
     name: str
     results: Mapping[str, Mapping[str, Flattening]]
     layouts: Mapping[str, Mapping[str, FloatArray]]
     sewing: Mapping[str, Mapping[str, Any]]
+    drapes: Mapping[str, Drape] = field(default_factory=dict)
 
     @property
     def fabrics(self) -> list[str]:
@@ -99,6 +104,7 @@ class Comparison:
                 for fabric, pieces in self.results.items()
             },
             "sewing": {fabric: dict(how) for fabric, how in self.sewing.items()},
+            **({"drapes": {name: drape.measures() for name, drape in self.drapes.items()}} if self.drapes else {}),
             "distances_m": {piece: self.distances(piece) for piece in self.pieces},
         }
 

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING, Any
 from warpflat.core.activity import report_activity
 from warpflat.scene.frames import FrameSchedule
 from warpflat.scene.load import Scene, errors_named
+from warpflat.scene.schema import DrapeTable
 
 if TYPE_CHECKING:
     from warpflat.draping.result import Drape
     from warpflat.flattening.result import Flattening
     from warpflat.garment.garment import Garment
 
-__all__ = ["write_drape"]
+__all__ = ["drape_scene", "write_drape"]
 
 
 def write_drape(
@@ -35,20 +36,15 @@ def write_drape(
     Raises:
         InputError: an unknown line, or the folder cannot be written.
     """
-    from warpflat.draping.drape_garment import drape
-    from warpflat.draping.options import DrapeOptions
     from warpflat.draping.write import write_drape_files
 
-    table = scene.settings.drape
-    if table is None:
+    if scene.settings.drape is None:
         return {}, []
-    report_activity("draping")
-    with errors_named(scene.where):
-        options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
-        draped = drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
+    draped = drape_scene(scene, garment, device=device)
     output = scene.settings.output
     files = write_drape_files(draped, folder, picture=output.picture, frames=FrameSchedule(output).wanted)
     metrics = {"drape": draped.measures()}
+    table = scene.settings.drape
     if table.correct or table.correct_fabric is not None:
         entry, more = _write_correction(scene, garment, draped, folder)
         metrics["drape"]["correction"] = entry
@@ -87,3 +83,24 @@ def _write_correction(
     else:
         written = surface_files([corrected], folder, name=name, options=drawing)
     return found.measures(garment), [*files, *written.files]
+
+
+def drape_scene(scene: Scene, garment: Garment | Flattening, *, device: str | None = None) -> Drape:
+    """Drape a scene's garment or piece by the settings of its `[drape]` table, or by the defaults.
+
+    Args:
+        scene: the scene.
+        garment: flattened.
+        device: Warp device.
+
+    Raises:
+        InputError: an unknown line, or half pieces.
+    """
+    from warpflat.draping.drape_garment import drape
+    from warpflat.draping.options import DrapeOptions
+
+    table = scene.settings.drape or DrapeTable()
+    report_activity("draping")
+    with errors_named(scene.where):
+        options = DrapeOptions(friction=table.friction, tolerance=table.tolerance, max_steps=table.max_steps)
+        return drape(garment, hold=table.hold, options=options, device=device or scene.settings.device)
