@@ -149,8 +149,14 @@ def _part(side: SeamSide, parts: _Parts) -> SeamSide:
 def _joined(pattern: Garment, parts: _Parts, gaps: Collection[str], edge: str, called: set[str]) -> list[Seam]:
     """Return the seams between facings, where their pieces have one."""
     seams = []
-    for seam in (seam for seam in pattern.seams if seam.name not in gaps):
+    for seam in pattern.seams:
         both = [row[0] for row in seam.sides]
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        centre = both[0].piece == both[1].piece
+        if seam.name in gaps and (
+            centre or not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
+        ):
+            continue
         if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
             first, second = (_part(side, parts) for side in both)
             words = find_unused_name(f"{seam.name} of {edge} facing", called)

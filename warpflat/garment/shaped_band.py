@@ -96,7 +96,9 @@ def with_shaped_waistband(
         seams.append(Seam(name=words, sides=((first,), (second,))))
     for seam in pattern.seams:
         both = [row[0] for row in seam.sides]
-        if seam.name in gaps or any(len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides):
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        opened = seam.name in gaps and not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
+        if opened or any(len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides):
             continue
         sides = [replace(side, piece=cut[side.piece, side.edge][0]) for side in both]
         words = find_unused_name(f"{seam.name} of the waistband", called)
