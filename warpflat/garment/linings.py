@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
-from warpflat.garment.facings import INNER
+from warpflat.garment.facings import INNER, centre_notch
 from warpflat.garment.shaped_band import without_strip
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
@@ -104,7 +104,10 @@ def add_lining(pattern: Garment, cloth: str) -> Garment:
                 SeamSide(piece=each.facing, edge=INNER),
                 SeamSide(piece=names[name], edge=_inner(each), reversed=True),
             )
-            seams.append(Seam(name=f"lining to {each.facing}".replace("_", " "), sides=((first,), (second,))))
+            notches = centre_notch(pattern.piece(name, pattern.sample))
+            seams.append(
+                Seam(name=f"lining to {each.facing}".replace("_", " "), sides=((first,), (second,)), notches=notches)
+            )
     return replace(pattern, pieces=pieces, seams=seams)
 
 
