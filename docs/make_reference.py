@@ -279,6 +279,11 @@ def _form_section() -> list[str]:
         _row("`ruled`", "Pairs of levels between which the cloth hangs straight.", '`ruled = [["hip", "knee"]]`'),
         _row("`blend`", "Another form and its weight.", '`blend = { with = "dress", weight = 0.5 }`'),
         _row("`ease`", "A preset, or ease by level [cm].", "`ease = { bust = 5.0 }`"),
+        _row(
+            "`neckline`",
+            "How far the edge lies from the base of the neck, along shoulder seams and centre lines [cm].",
+            "`neckline = { side_cm = 2.0, front_cm = 5.0, back_cm = 1.5 }`",
+        ),
         "", inspect.cleandoc(Adjustment.__doc__ or "").split("\n\n")[0], "",
         _row("key", "meaning", "range", "default"), "|---|---|---|---|",
     ]  # fmt: skip

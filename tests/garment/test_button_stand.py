@@ -13,6 +13,7 @@ from warpflat.garment.button_stand import button_depths
 from warpflat.garment.constraints import Straight
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.garment import Garment, flatten_form
+from warpflat.garment.linings import add_interfacing
 from warpflat.garment.openings import Buttons, Opening, part_at_centres
 from warpflat.garment.to_pattern import pattern_of_garment
 from warpflat.mannequin.forms import shipped_form
@@ -95,6 +96,16 @@ def test_facing_of_neck_and_stand_is_joined_at_the_shoulders(bodice: Garment, fa
         along = (end - start) / np.linalg.norm(end - start)
         folded = start + 2 * np.outer((points - start) @ along, along) - (points - start)
         assert np.allclose(folded[::-1], front.edge("neck").points, atol=1e-9)
+
+
+def test_interfacing_of_a_grown_on_facing_is_as_large_as_that(bodice: Garment):
+    pattern = add_interfacing(pattern_of(bodice, BUTTONED, finishing=(FACING,)), "fleece")
+    front, own = pattern.piece("front_left", ""), pattern.piece("front_left_facing_interfacing", "")
+    separate = replace(BUTTONED, buttons=replace(BUTTONED.buttons, facing="separate"))
+    facing = pattern_of(bodice, separate, finishing=(FACING,)).piece("front_left_neck_facing", "")
+    assert shapely.Polygon(own.outline).area == pytest.approx(shapely.Polygon(facing.outline).area, rel=1e-6)
+    assert shapely.Polygon(front.outline).buffer(1e-6).contains(shapely.Polygon(own.outline))
+    assert (own.fabric, own.quantity) == ("fleece", 2)
 
 
 def test_ring_open_from_edge_to_edge_passes(bodice: Garment):

@@ -148,7 +148,7 @@ class PieceEntry(Entry):
 
     fabric: Text
     quantity: Annotated[int, Field(ge=1, le=1_000_000)]
-    role: Literal["shell", "facing", "strip", "waistband", "lining", "pocket"] = "shell"
+    role: Literal["shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket"] = "shell"
     also: dict[Text, Annotated[int, Field(ge=1, le=1_000_000)]] = Field(default_factory=dict)
     enlarged: Annotated[list[Annotated[float, Field(gt=0, le=2)]], Field(min_length=2, max_length=2)] = Field(
         default=[1.0, 1.0]

@@ -15,10 +15,10 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.polyline import arc_lengths, points_at_lengths
-from warpflat.core.text import find_unused_name
+from warpflat.core.text import find_unused_name, without_side
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
-__all__ = ["INNER", "STAND", "STAND_END", "Stand", "with_facings", "with_stand_facings"]
+__all__ = ["INNER", "STAND", "STAND_END", "Stand", "centre_notch", "with_facings", "with_stand_facings"]
 
 #: What the outer edge and the lower end of a button stand are called, after its line, and the inner edge of a facing.
 STAND, STAND_END, INNER = "button stand", "stand end", "inner edge"
@@ -92,7 +92,7 @@ def with_facings(
         for each in (edge, *_ends(sample, _chain(sample, edge, stand))):
             parts[name, each] = (name, f"facing {each}", True) if grown_on else (title, each, False)
         side = SeamSide(piece=name, edge=edge)
-        seams.append(Seam(name=words, sides=((side,), (_part(side, parts),))))
+        seams.append(Seam(name=words, sides=((side,), (_part(side, parts),)), notches=centre_notch(sample)))
         if stand is not None and not grown_on:
             side = SeamSide(piece=name, edge=stand.edge)
             words = find_unused_name(f"{name} {stand.edge} facing".replace("_", " "), called)
@@ -123,6 +123,15 @@ def with_stand_facings(pattern: Garment, stands: Sequence[Stand]) -> Garment:
     return replace(pattern, pieces=pieces, seams=seams)
 
 
+def centre_notch(piece: Piece) -> tuple[float, ...] | None:
+    """Return the notch in the middle of an edge that crosses the centre line; None where the piece has one side only.
+
+    Such pieces may be printed half, each on its own: just a notch on the fold is then the same on all of them.
+    """
+    whole = without_side(piece.name) == piece.name.replace("_", " ") and not piece.on_fold
+    return (0.5,) if whole else None
+
+
 def _touch(pattern: Garment, stand: Stand, edge: str) -> bool:
     return stand.edge in _ends(pattern.piece(stand.piece, pattern.sample), (edge,))
 
@@ -149,8 +158,14 @@ def _part(side: SeamSide, parts: _Parts) -> SeamSide:
 def _joined(pattern: Garment, parts: _Parts, gaps: Collection[str], edge: str, called: set[str]) -> list[Seam]:
     """Return the seams between facings, where their pieces have one."""
     seams = []
-    for seam in (seam for seam in pattern.seams if seam.name not in gaps):
+    for seam in pattern.seams:
         both = [row[0] for row in seam.sides]
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        centre = both[0].piece == both[1].piece
+        if seam.name in gaps and (
+            centre or not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
+        ):
+            continue
         if all(len(row) == 1 for row in seam.sides) and all((side.piece, side.edge) in parts for side in both):
             first, second = (_part(side, parts) for side in both)
             words = find_unused_name(f"{seam.name} of {edge} facing", called)

@@ -9,7 +9,7 @@ import numpy as np
 
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.text import find_unused_name, without_side
-from warpflat.garment.facings import Stand, with_facings, with_stand_facings
+from warpflat.garment.facings import Stand, centre_notch, with_facings, with_stand_facings
 from warpflat.garment.free_edges import FreeChain, free_chain, free_edges
 from warpflat.garment.shaped_band import with_shaped_waistband
 from warpflat.pattern.pieces import DEFAULT_ALLOWANCE, Edge, Garment, Piece, Seam, SeamSide
@@ -96,13 +96,28 @@ def _with_strip(pattern: Garment, wish: Finishing, chain: FreeChain) -> Garment:
         *pattern.seams,
         Seam(
             name=find_unused_name(words, taken), sides=((SeamSide(piece=name, edge="lower"),), chain.sides),
-            ease=1.0 / wish.share - 1.0,
+            ease=1.0 / wish.share - 1.0, notches=None if sided else _centres(pattern, chain),
         ),
     ]  # fmt: skip
     if ring:
         ends = (SeamSide(piece=name, edge="right end"),), (SeamSide(piece=name, edge="left end", reversed=True),)
         seams.append(Seam(name=find_unused_name(f"{words} ends", taken), sides=ends))
     return replace(pattern, pieces=pieces, seams=seams)
+
+
+def _centres(pattern: Garment, chain: FreeChain) -> tuple[float, ...]:
+    """Return the shares of a chain at the middles of the edges that cross a centre line; its joints are notched anyway.
+
+    A piece that is printed half has the notch on its fold, and the strip has one for it.
+    """
+    lengths = [pattern.piece(side.piece, pattern.sample).edge(side.edge).length for side in chain.sides]
+    ends = np.cumsum(lengths)
+    whole = [centre_notch(pattern.piece(side.piece, pattern.sample)) is not None for side in chain.sides]
+    return tuple(
+        float((end - 0.5 * length) / ends[-1])
+        for end, length, crosses in zip(ends, lengths, whole, strict=True)
+        if crosses
+    )
 
 
 def _strip(wish: Finishing, name: str, length: float, like: Piece, *, quantity: int, ring: bool) -> Piece:

@@ -5,11 +5,13 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
-from warpflat.garment.facings import INNER
+from warpflat.garment.facings import INNER, centre_notch
 from warpflat.garment.shaped_band import without_strip
-from warpflat.pattern.pieces import Garment, Piece, Seam, SeamSide
+from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["add_interfacing", "add_lining"]
 
@@ -18,17 +20,36 @@ _SHORTER, _LEAST_HEM = 0.020, 0.010
 
 
 def add_interfacing(pattern: Garment, cloth: str) -> Garment:
-    """Return a pattern whose facings and waistbands are cut from an interfacing too, by the same patterns."""
-    pieces = {
-        size: tuple(
+    """Return a pattern whose facings and waistbands are cut from an interfacing too, by the same patterns.
+
+    A facing that is grown on gets a piece of interfacing of its own, without allowances.
+    """
+    pieces = {}
+    for size, row in pattern.pieces.items():
+        doubled = [
             replace(piece, also={**piece.also, cloth: piece.quantity})
             if piece.role in ("facing", "waistband")
             else piece
             for piece in row
-        )
-        for size, row in pattern.pieces.items()
-    }
+        ]
+        grown = [_of_grown_facing(piece, cloth) for piece in row if _has_grown_facing(piece)]
+        pieces[size] = (*doubled, *grown)
     return replace(pattern, pieces=pieces)
+
+
+def _has_grown_facing(piece: Piece) -> bool:
+    return any(edge.name == f"facing {INNER}" for edge in piece.edges)
+
+
+def _of_grown_facing(piece: Piece, cloth: str) -> Piece:
+    """Return the interfacing of a facing that is grown on a piece."""
+    own = [edge for edge in piece.edges if edge.name.startswith("facing ")]
+    fold = Edge(name="fold line", points=np.array([own[-1].points[-1], own[0].points[0]]))
+    edges = [replace(edge, kind="cut", allowance=0.0, vertices=None) for edge in (*own, fold)]
+    return Piece(
+        name=f"{piece.name}_facing_interfacing", size=piece.size, fabric=cloth, quantity=piece.quantity, edges=edges,
+        paired=piece.paired, role="interfacing",
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +104,10 @@ def add_lining(pattern: Garment, cloth: str) -> Garment:
                 SeamSide(piece=each.facing, edge=INNER),
                 SeamSide(piece=names[name], edge=_inner(each), reversed=True),
             )
-            seams.append(Seam(name=f"lining to {each.facing}".replace("_", " "), sides=((first,), (second,))))
+            notches = centre_notch(pattern.piece(name, pattern.sample))
+            seams.append(
+                Seam(name=f"lining to {each.facing}".replace("_", " "), sides=((first,), (second,)), notches=notches)
+            )
     return replace(pattern, pieces=pieces, seams=seams)
 
 
@@ -94,7 +118,7 @@ def _facings_of(pattern: Garment, name: str) -> list[_Faced]:
         InputError: one is grown on.
     """
     piece = pattern.piece(name, pattern.sample)
-    if any(edge.name == f"facing {INNER}" for edge in piece.edges):
+    if _has_grown_facing(piece):
         raise InputError(f'{name}: a facing that is grown on cannot be lined; give the buttons facing = "separate"')
     found: list[_Faced] = []
     names = [edge.name for edge in piece.edges]

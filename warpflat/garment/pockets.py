@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -80,7 +81,9 @@ def _with_patch(pattern: Garment, pocket: Pocket) -> Garment:
                 if not body.contains(shapely.Polygon(place)):
                     continue
                 count += 1
-                lines[find_unused_name("pocket", lines)] = np.vstack([place[1:], place[:1]])
+                # Side by side, so that its corners stay sharp.
+                for ends in pairwise([*place[1:], place[0]]):
+                    lines[find_unused_name("pocket", lines)] = np.array(ends)
                 for corner in place[:2]:
                     marks[find_unused_name("pocket corner", marks)] = corner
             if not count:

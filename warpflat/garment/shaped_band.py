@@ -10,7 +10,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
-from warpflat.garment.facings import INNER, facing_edges
+from warpflat.garment.facings import INNER, centre_notch, facing_edges
 from warpflat.pattern.pieces import Edge, Garment, Piece, Seam, SeamSide
 
 __all__ = ["with_shaped_waistband", "without_strip"]
@@ -93,10 +93,12 @@ def with_shaped_waistband(
             SeamSide(piece=name, edge=f"{edge} seam"),
             SeamSide(piece=names[name], edge=INNER, reversed=True),
         )
-        seams.append(Seam(name=words, sides=((first,), (second,))))
+        seams.append(Seam(name=words, sides=((first,), (second,)), notches=centre_notch(whole)))
     for seam in pattern.seams:
         both = [row[0] for row in seam.sides]
-        if seam.name in gaps or any(len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides):
+        # Of halves on the fold one seam is listed for both sides, and just one of them has the opening.
+        opened = seam.name in gaps and not any(pattern.piece(side.piece, pattern.sample).on_fold for side in both)
+        if opened or any(len(row) > 1 or (row[0].piece, row[0].edge) not in cut for row in seam.sides):
             continue
         sides = [replace(side, piece=cut[side.piece, side.edge][0]) for side in both]
         words = find_unused_name(f"{seam.name} of the waistband", called)

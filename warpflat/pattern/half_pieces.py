@@ -18,7 +18,7 @@ __all__ = ["halved", "is_symmetric"]
 
 
 #: A piece's cut line may stray from its mirror image by this much [m]; lines inside, which are only drawn, by more.
-SYMMETRIC, INNER = 4e-4, 2e-3
+SYMMETRIC, INNER = 5e-4, 2e-3
 #: Narrower pieces [m] stay whole: half of them saves no paper.
 NARROW = 0.10
 #: What lies closer to the axis than this [m] lies on it.
@@ -60,6 +60,12 @@ def is_symmetric(piece: DraftedPiece) -> bool:
     tips = np.array([dart.tip for dart in piece.darts]).reshape(-1, 2)
     images = tips * mirror + [2 * axis, 0]
     if any(np.linalg.norm(tips - tip, axis=1).min() > INNER for tip in images):
+        return False
+    # A strip is sewn to pieces that are not its mirror images: its notches must be so themselves.
+    notched = np.array([base for notch in piece.notches for base in notch.base]).reshape(-1, 2)
+    if piece.piece.role in ("strip", "waistband") and any(
+        np.linalg.norm(notched - base, axis=1).min() > INNER for base in notched * mirror + [2 * axis, 0]
+    ):
         return False
     marks = np.array([hole.at for hole in piece.drill_holes]).reshape(-1, 2)
     if any(np.linalg.norm(marks - mark, axis=1).min() > INNER for mark in marks * mirror + [2 * axis, 0]):

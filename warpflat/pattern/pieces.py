@@ -39,7 +39,7 @@ __all__ = [
 #: Allowance [m] of an edge that names none, by its kind.
 DEFAULT_ALLOWANCE: Mapping[str, float] = {"seam": 0.010, "hem": 0.030, "fold": 0.0, "cut": 0.0, "dart": 0.0}
 EDGE_KINDS = tuple(DEFAULT_ALLOWANCE)
-ROLES = ("shell", "facing", "strip", "waistband", "lining", "pocket")
+ROLES = ("shell", "facing", "strip", "waistband", "lining", "interfacing", "pocket")
 
 #: Ends of neighbouring edges that are closer than this [m] are one corner.
 SAME_POINT = 1e-6
@@ -164,7 +164,7 @@ class Piece:
         grain: 2 by 2 [m], from and to, upwards along the warp; None takes the y axis through the middle.
         holes: cutouts and fish-eye darts.
         marks: points [m] by name that are marked through the cloth: buttons, corners of pockets.
-        role: "shell", or what it is derived as: "facing", "strip", "waistband", "lining", "pocket".
+        role: "shell", or what it is derived as: "facing", "strip", "waistband", "lining", "interfacing", "pocket".
         also: cloths from which it is cut too, and how often, as interfacing.
         paired: False where all copies are cut the same way up, not left and right.
         title: what is printed instead of the name, in any language; the name with spaces if not given.

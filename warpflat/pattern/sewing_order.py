@@ -112,6 +112,11 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
         steps.append(
             translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="; ".join(darts))
         )
+    patches = [titles[piece.name] for piece in pieces if piece.piece.role == "pocket" and _is_patch(piece)]
+    if patches:
+        steps.append(
+            translate("Turn in the patch pockets and sew them to their marks: {pockets}.", pockets=", ".join(patches))
+        )
     seams = sewn_seams(garment, size)
     for stage in sorted({seam.stage for seam in seams}):
         own = [seam for seam in seams if seam.stage == stage]
@@ -145,6 +150,10 @@ def _stage(seam: Seam, pieces: Mapping[str, Piece]) -> int:
         if any(key in words for key in keys) and not (number == 3 and "shoulder" in words):
             return number
     return 0
+
+
+def _is_patch(piece: DraftedPiece) -> bool:
+    return any(edge.kind == "hem" for edge in piece.edges)
 
 
 def _button_steps(pieces: Sequence[DraftedPiece], titles: Mapping[str, str]) -> list[str]:
@@ -204,7 +213,7 @@ def _free_edges(
     # A strip that is cut twice is drawn for one side.
     sewn |= {(piece, other_side(edge)) for piece, edge in sewn}
     found: dict[str, list[str]] = {}
-    for piece in pieces:
+    for piece in (piece for piece in pieces if piece.piece.role != "pocket"):
         for edge in piece.piece.edges:
             if edge.kind in kinds and (piece.name, edge.name) not in sewn:
                 own = found.setdefault(translate_name(without_side(edge.name)), [])

@@ -70,6 +70,7 @@ NAMES = {
     "band": "Bündchen",
     "binding": "Einfassung",
     "lining": "Futter",
+    "interfacing": "Einlage",
     "pocket": "Tasche",
     "dart": "Abnäher",
     "ends": "Enden",
@@ -170,6 +171,9 @@ PHRASES = {
     ),
     "Finish the raw edges with a facing, a band or binding: {edges}.": (
         "Offene Kanten mit Beleg, Bündchen oder Einfassung versäubern: {edges}."
+    ),
+    "Turn in the patch pockets and sew them to their marks: {pockets}.": (
+        "Aufgesetzte Taschen umbügeln und auf ihre Markierungen nähen: {pockets}."
     ),
     "Turn up and sew the hems: {edges}.": "Säume umschlagen und nähen: {edges}.",
     "Work the buttonholes on the right half, and sew {count} buttons to the left one: {title}.": (
