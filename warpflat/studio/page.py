@@ -88,6 +88,7 @@ class Page:
         self._worker.close()
         with contextlib.redirect_stdout(io.StringIO()):
             self.server.stop()
+            time.sleep(0.1)  # its thread says so on standard output
 
     def _changed(self) -> None:
         if not self.session.activity:
