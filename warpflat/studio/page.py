@@ -86,9 +86,7 @@ class Page:
         self._closed = True
         self._dirty.set()
         self._worker.close()
-        with contextlib.redirect_stdout(io.StringIO()):
-            self.server.stop()
-            time.sleep(0.1)  # its thread says so on standard output
+        self.server.stop()
 
     def _changed(self) -> None:
         if not self.session.activity:
