@@ -281,7 +281,7 @@ def _legend(scale: Scale) -> str:
     ends = [scale.low, 0.5 * (scale.low + scale.high), scale.high]
     ticks = "".join(f"<span>{value:.3g}</span>" for value in ends)
     return (
-        "<div style='padding:0.1em 0.9em;font-size:0.85em'>"
+        f"<div style='padding:0.1em 0.9em;font-size:0.85em'>{MAPS[scale.kind]}"
         f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{stops})'></div>"
         f"<div style='display:flex;justify-content:space-between'>{ticks}</div></div>"
     )
