@@ -72,6 +72,8 @@ def main() -> int:
         client.pictures.clear()
         begun = time.perf_counter(), time.process_time()
         act()
+        while not client.pictures:
+            time.sleep(0.01)
         wait(page)
         times = [[1e3 * (now - then) for now, then in zip(client.pictures[at], begun, strict=True)] for at in (0, -1)]
         print(f"{words:24}" + "".join(f"{wall:>13.0f}, {used:>7.0f}" for wall, used in times))

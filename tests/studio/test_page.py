@@ -76,7 +76,7 @@ def test_pick_cut_cloth_undo_save(tmp_path: Path) -> None:
             x, y = on_screen(client.camera, place, width, height)
             browser.click(x, y)
             words = browser.wait(tried)
-            assert words.startswith("bust releases ")
+            assert words.startswith("tried, not made yet: bust releases ")
             assert " mm" in words
             assert page.session.scene.settings.cuts == []
             browser.press("Apply")

@@ -27,7 +27,7 @@ from warpflat.studio.maps import Scale, drape_gaps, drape_scale, piece_scale
 from warpflat.studio.panel import Actions, Panel
 from warpflat.studio.pick import Hit, nearest_line
 from warpflat.studio.save import free_name
-from warpflat.studio.session import Session
+from warpflat.studio.session import Session, Step
 from warpflat.studio.solve import Solution
 from warpflat.studio.stage import Shown, Stage
 from warpflat.studio.worker import Worker
@@ -52,6 +52,7 @@ class Page:
         self.server = _serve(host, port)
         self.url = f"http://{host}:{self.server.get_port()}"
         self._kind = "energy"
+        self._drape_of: Step | None = None  # whose drape has been asked for
         self.scale: Scale | None = None
         self._two_points, self._points = False, list[Hit]()
         self._picked: tuple[str, str] | None = None
@@ -86,8 +87,7 @@ class Page:
         self._closed = True
         self._dirty.set()
         self._worker.close()
-        with contextlib.redirect_stdout(io.StringIO()):
-            self.server.stop()
+        self.server.stop()
 
     def _changed(self) -> None:
         if not self.session.activity:
@@ -122,7 +122,8 @@ class Page:
             self._update_panel()
             return
         drape = self.session.step.drape if self.session.preview is None and not live else None
-        if self._kind == "drape" and drape is None and not self.session.activity:
+        given_up = self.session.step is not self._drape_of or self.session.error
+        if self._kind == "drape" and drape is None and given_up and self.session.preview is None and not live:
             self._kind = "energy"
             self._panel.set_map("energy")
         kind = self._kind if self._kind != "drape" or drape is not None else "energy"
@@ -265,6 +266,7 @@ class Page:
     def _choose_map(self, kind: str) -> None:
         self._kind = kind
         if kind == "drape":
+            self._drape_of = self.session.step
             self.session.ask_drape()
         self._told = True
         self._dirty.set()

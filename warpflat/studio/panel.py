@@ -16,7 +16,7 @@ from warpflat.mannequin.forms import form_names
 from warpflat.mannequin.measurements import size_names
 from warpflat.scene.load import Scene
 from warpflat.studio.maps import MAPS, Scale
-from warpflat.studio.session import Session
+from warpflat.studio.session import Preview, Session
 
 __all__ = ["Actions", "Panel"]
 
@@ -37,7 +37,6 @@ class Actions:
         choose_mode: called with True if two points are to be clicked.
         try_again: called with the part of the line, in shares.
         view: called with the client and the side from which it looks at the form [degrees].
-        fabric_folder: from where fabric files are read.
     """
 
     choose_map: Callable[[str], None]
@@ -56,11 +55,11 @@ class Panel:
         self._head = self._gui.add_html("")
         self._views()
         self._steps()
+        self._map()
+        self._cut()
+        self._cloth()
         if session.scene.settings.mannequin is not None:
             self._body()
-        self._cloth()
-        self._cut()
-        self._map()
         self._saving(name)
 
     def update(self, *, lines: Sequence[tuple[str, str]], picked: tuple[str, str] | None) -> None:
@@ -73,7 +72,6 @@ class Panel:
         session = self._session
         self._head.content = _head(session)
         self._made.visible = session.preview is not None
-        self._result.content = _preview(session)
         self._fabric.value = _one_of(session.fabric_name(), self._fabric.options)
         self._grain.value = float(session.scene.settings.grain_angle)
         if session.scene.settings.mannequin is not None:
@@ -83,6 +81,8 @@ class Panel:
         if self._line.options != options:
             self._line.options = options
         wanted = _NO_LINE if picked is None else f"{picked[0]}: {picked[1]}"
+        if self._line.value != wanted or picked is None:
+            self._part.value = (0, 100)
         self._line.value = wanted if wanted in options else _NO_LINE
 
     def show_scale(self, scale: Scale | None) -> None:
@@ -102,7 +102,8 @@ class Panel:
             self._actions.view(event.client, sides[event.target.value])
 
     def _steps(self) -> None:
-        acts = {"Undo": self._session.undo, "Redo": self._session.redo, "Stop": self._session.stop}
+        session = self._session
+        acts = {"Undo": session.undo, "Redo": session.redo, "Stop": session.stop, "Watch": self._watch}
         _buttons(self._gui.add_button_group("do", tuple(acts)), acts)
 
     def _body(self) -> None:
@@ -164,7 +165,6 @@ class Panel:
             self._part = self._gui.add_multi_slider(
                 "part [%]", min=0, max=100, step=1, initial_value=(0, 100), min_range=2
             )
-            self._result = self._gui.add_html("")
             self._made = self._gui.add_button_group("cut", ("Apply", "Leave it"))
         _chosen(self._mode, lambda value: self._actions.choose_mode(value == "two points"))
         _chosen(self._line, lambda value: self._actions.choose_line(self._lines.get(value)))
@@ -175,16 +175,15 @@ class Panel:
         with self._gui.add_folder("Map"):
             self._kind = self._gui.add_dropdown("colours", tuple(MAPS.values()))
             self._legend = self._gui.add_html("")
-            watch = self._gui.add_button("Watch it relax in plain steps", icon="player-play")
         keys = {words: key for key, words in MAPS.items()}
         _chosen(self._kind, lambda value: self._actions.choose_map(keys[value]))
 
-        @watch.on_click
-        def _(_: Any) -> None:
-            solution = self._session.solution
-            if solution is not None:
-                picked = self._lines.get(self._line.value)
-                self._session.watch(picked[0] if picked else next(iter(solution.pieces)))
+    def _watch(self) -> None:
+        """Show how the piece of the picked line, or the first one, relaxes in plain steps."""
+        solution = self._session.solution
+        if solution is not None:
+            picked = self._lines.get(self._line.value)
+            self._session.watch(picked[0] if picked else next(iter(solution.pieces)))
 
     def _saving(self, name: str) -> None:
         with self._gui.add_folder("Save"):
@@ -246,12 +245,14 @@ def _head(session: Session) -> str:
                 f"<tr><td>{escape(name)}</td><td style='text-align:right'>{joules(piece.stages[-1].strain_energy_j)}</td></tr>"
                 for name, piece in solution.pieces.items()
             )
-            rows = f"<table style='width:100%;font-size:0.85em'>{cells}</table>"
+            rows = f"<table style='width:100%;line-height:1.15'>{cells}</table>"
     lines = [" · ".join(words), rows]
     if session.activity:
         lines.append(f"<span style='color:#0a58ca'>{escape(session.activity)} …</span>")
     if session.preview is not None:
-        lines.append("<span style='color:#0a58ca'>a cut is tried, not made yet</span>")
+        lines.append(
+            f"<span id='studio-preview' style='color:#0a58ca'>tried, not made yet: {_preview(session.preview)}</span>"
+        )
     if session.error:
         lines.append(f"<span role='alert' style='color:#b00020'>{escape(session.error)}</span>")
     if session.note:
@@ -259,21 +260,16 @@ def _head(session: Session) -> str:
     if session.saved is not None and session.note:
         state = "at rest" if session.saved.at_rest else "NOT at rest"
         lines.append(f"run from scratch: strain energy <b>{joules(session.saved.strain_energy)}</b>, {state}")
-    text = "".join(f"<div style='margin-bottom:0.3em'>{line}</div>" for line in lines if line)
-    return f"<div id='studio-head' style='padding:0.4em 0.9em;overflow-wrap:anywhere'>{text}</div>"
+    text = "".join(f"<div style='margin-bottom:0.2em'>{line}</div>" for line in lines if line)
+    return f"<div id='studio-head' style='padding:0.3em 0.9em;font-size:0.9em;overflow-wrap:anywhere'>{text}</div>"
 
 
-def _preview(session: Session) -> str:
-    """Return what the cut that is tried would do."""
-    preview = session.preview
-    if preview is None:
-        return ""
+def _preview(preview: Preview) -> str:
+    """Return what a cut that is tried would do."""
     verb = "releases" if preview.released >= 0.0 else "costs"
     words = f"<b>{escape(str(preview.cut['name']))}</b> {verb} <b>{joules(abs(preview.released))}</b>"
     words += f" ({-100.0 * preview.share:+.1f} %)".replace("-", "−")
-    if preview.opening is not None:
-        words += f", opens <b>{1e3 * preview.opening:.1f} mm</b>"
-    return f"<div id='studio-preview' style='padding:0.3em 0.9em'>{words}</div>"
+    return words if preview.opening is None else f"{words}, opens <b>{1e3 * preview.opening:.1f} mm</b>"
 
 
 def _legend(scale: Scale) -> str:
@@ -285,7 +281,7 @@ def _legend(scale: Scale) -> str:
     ends = [scale.low, 0.5 * (scale.low + scale.high), scale.high]
     ticks = "".join(f"<span>{value:.3g}</span>" for value in ends)
     return (
-        f"<div style='padding:0.2em 0.9em'><div>{MAPS[scale.kind]}</div>"
+        f"<div style='padding:0.1em 0.9em;font-size:0.85em'>{MAPS[scale.kind]}"
         f"<div style='height:0.9em;border:1px solid #999;background:linear-gradient(90deg,{stops})'></div>"
         f"<div style='display:flex;justify-content:space-between'>{ticks}</div></div>"
     )

@@ -239,8 +239,11 @@ class Session:
         self._on_change()
 
     def undo(self) -> None:
-        """Go back by one change."""
-        self._go(-1)
+        """Go back by one change; a cut that is only tried is forgotten first."""
+        if self.preview is not None:
+            self.drop_preview()
+        else:
+            self._go(-1)
 
     def redo(self) -> None:
         """Make the change again that was undone last."""
@@ -301,7 +304,9 @@ class Session:
             garment = solution.garment or next(iter(solution.pieces.values()))
             step.drape = drape(garment, hold=() if table is None else table.hold, options=options, callback=go_on)
             if not step.drape.converged:
-                self.note = 'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'
+                self.note = (
+                    'the drape is not at rest; cloth that slips off is held by the scene, as [drape] hold = ["waist"]'
+                )
 
         self._run("draping", job)
 

@@ -24,8 +24,8 @@ __all__ = ["Shown", "Stage"]
 _INK, _THIN, _PICKED, _SKIN = (45, 45, 50), (110, 105, 105), (0, 90, 200), (205, 200, 194)
 # Between form and pattern, between pieces, and of lines above the cloth [m].
 _BETWEEN, _GAP, _ABOVE = 0.15, 0.07, 0.002
-# So much of the body is shown beyond the garment [m].
-_BEYOND = 0.12
+# So much of the body is shown beyond the garment, to the sides, up and down, and to the front and the back [m].
+_BEYOND = np.array([0.05, 0.12, 0.12])
 _FOV = 0.35  # radians: a long lens, so that the pattern is hardly foreshortened
 _ROOM = 1.12
 
@@ -154,7 +154,7 @@ class Stage:
             old.remove()
         if body is None:
             return
-        low, high = self._boxes[0] - [[_BEYOND], [-_BEYOND]]
+        low, high = self._boxes[0] + [-_BEYOND, _BEYOND]
         middle = body.vertices[body.faces].mean(axis=1)
         near, _ = triangulate(body.faces[((middle > low) & (middle < high)).all(axis=1)])
         # A little smaller than it is, so that cloth that lies on it is seen.
