@@ -84,3 +84,27 @@ def test_a_process_ends_with_its_block():
 def test_a_result_larger_than_a_pipe_arrives():
     with work_beside(), Beside(lambda: b"x" * 1_000_000) as work:
         assert len(work.result()) == 1_000_000
+
+
+def test_a_process_dies_with_its_parent(tmp_path: Path):
+    begun = tmp_path / "begun"
+
+    def wait() -> None:
+        begun.write_text(str(os.getpid()))
+        time.sleep(60)
+
+    child = os.fork()
+    if child == 0:
+        with work_beside(), Beside(wait):
+            time.sleep(60)
+        os._exit(0)
+    deadline = time.monotonic() + 30
+    while not (begun.exists() and begun.read_text()) and time.monotonic() < deadline:
+        time.sleep(0.01)
+    process = Path("/proc") / begun.read_text()
+    assert process.exists()
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+    while process.exists() and "Z" not in (process / "stat").read_text().split()[2] and time.monotonic() < deadline:
+        time.sleep(0.01)
+    assert time.monotonic() < deadline

@@ -23,6 +23,9 @@ __all__ = ["Beside", "work_beside"]
 
 Result = TypeVar("Result")
 
+# PR_SET_PDEATHSIG of Linux's prctl.
+_SIGNAL_OF_PARENTS_DEATH = 1
+
 _is_allowed: ContextVar[bool] = ContextVar("beside", default=False)
 
 
@@ -56,6 +59,7 @@ class Beside(Generic[Result]):
         if not _is_allowed.get() or not _can_fork():
             return self
         read, write = os.pipe()
+        parent = os.getpid()
         try:
             child = os.fork()
         except OSError:  # no memory, or no process, for it
@@ -64,7 +68,7 @@ class Beside(Generic[Result]):
             return self
         if child == 0:
             os.close(read)
-            _run_in_child(self._function, write)
+            _run_in_child(self._function, write, parent)
         os.close(write)
         self.process = self._child = child
         self._pipe = read
@@ -108,11 +112,21 @@ def _can_fork() -> bool:
     return sys.platform == "linux" and thread_count() > 1 and (warp is None or not warp.is_cuda_available())
 
 
-def _run_in_child(function: Callable[[], Any], pipe: int) -> None:
+def _die_with(parent: int) -> None:
+    """Let the system kill this process when its parent dies, so that it does not write into a folder that is being cleared."""
+    import ctypes
+
+    ctypes.CDLL(None).prctl(_SIGNAL_OF_PARENTS_DEATH, signal.SIGKILL)
+    if os.getppid() != parent:  # it has died meanwhile
+        os._exit(0)
+
+
+def _run_in_child(function: Callable[[], Any], pipe: int, parent: int) -> None:
     """Run the function, write its result or error into the pipe, and end the process without any cleaning up of the parent's."""
     try:
         for name in ("SIGINT", "SIGTERM", "SIGHUP"):
             signal.signal(getattr(signal, name), signal.SIG_DFL)
+        _die_with(parent)
         before = files_written()
         try:
             with activity_listener(lambda activity: None):
