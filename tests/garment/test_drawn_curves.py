@@ -20,7 +20,7 @@ def test_borders_are_faired_within_the_bound_and_seams_still_match(dress: Garmen
     assert dress.curves is not None
     assert 0.0 < dress.curves.price_j < dress.sewn.energy_before
     lines = {line.place: line for line in dress.curves.lines}
-    assert len(lines) == 16
+    assert len(lines) == 12, "all borders but the armholes"
     assert all(line.inflections_after <= line.inflections_before for line in lines.values())
     assert max(line.shift_mm for line in lines.values()) < 1.5 * dress.curves.bound_mm
     assert max(abs(seam.difference) for seam in dress.seams) < 2e-4

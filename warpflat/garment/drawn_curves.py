@@ -30,6 +30,8 @@ __all__ = ["CURVES_MM", "Curves", "DrawnCurve", "PlannedCurve", "measure_curves"
 CURVES_MM = 3.0
 #: Edges that books draw straight as a whole, if they are so within the bound; hems are, too.
 STRAIGHT_EDGES = ("shoulder", "side", "centre front", "centre back")
+#: Edges that stay as the cloth has them: armhole and cap have their shapes from the body, and a cap follows its short underarm seam.
+SHAPED_EDGES = ("armhole", "underarm")
 #: An edge is drawn in two where it turns by more than this [rad] at one vertex.
 CORNER = np.radians(30.0)
 #: A wave by which it is measured how far an edge lies from straight [m].
@@ -109,7 +111,7 @@ def plan_curves(
 ) -> list[PlannedCurve]:
     """Return the lines that the edges of a form's pieces are to be.
 
-    Folds, legs of darts and edges that a constraint is about stay.
+    Folds, legs of darts, armholes, caps and edges that a constraint is about stay.
 
     Args:
         layout: the body's grid.
@@ -129,11 +131,12 @@ def plan_curves(
     for name, piece in form.pieces.items():
         on_fold = set() if piece.fold is None else set(piece.edges[piece.fold].tolist())
         for edge, vertices in _open_edges(form, name, positions[name]):
-            if (name, edge) in ruled or len(vertices) < 4:
+            part = piece.parts.get(edge, edge)
+            if (name, edge) in ruled or len(vertices) < 4 or part.startswith(SHAPED_EDGES):
                 continue
             own, grid = positions[name][vertices], piece.grid_vertices[vertices]
             mirrored = vertices[0] in on_fold, vertices[-1] in on_fold
-            book, wanted = _book_line(layout, form, grid, piece.parts.get(edge, edge), free=(name, edge) not in sewn)
+            book, wanted = _book_line(layout, form, grid, part, free=(name, edge) not in sewn)
             away = fair_line(own, RULER, straight=wanted, mirrored=mirrored).shift if wanted.any() else 0.0
             straight = bool(wanted.any()) and away <= bound
             kept = wanted if straight else None
