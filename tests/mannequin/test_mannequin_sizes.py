@@ -19,7 +19,7 @@ GIRTHS = ("bust", "underbust", "waist", "abdomen", "hip", "thigh", "knee", "ankl
 
 @pytest.fixture(scope="module")
 def bodies() -> dict[str, Mannequin]:
-    return {name: Mannequin.from_size(name, resolution_mm=25) for name in SIZES}
+    return {name: Mannequin.from_size(name, resolution_mm=40) for name in SIZES}
 
 
 def _area(body: Mannequin) -> float:
