@@ -205,6 +205,8 @@ def _unfolded(piece: Cut) -> Cut:
 def find_piece(cuts: list[Cut], piece: DraftedPiece) -> Cut:
     """Return the cut piece that is this one, turned and moved to where the pattern has it [mm]."""
     wanted = shapely.Polygon(1000 * piece.cut_line)
+    seams = shapely.union_all([shapely.LineString(1000 * edge.line) for edge in piece.edges if edge.kind == "seam"])
+    notches = shapely.MultiPoint([1000 * np.asarray(notch.at) for notch in piece.notches])
     best, found = np.inf, None
     halves = [cut.half for cut in cuts if cut.half is not None] if piece.piece.on_fold else []
     for cut in halves or cuts:
@@ -213,9 +215,17 @@ def find_piece(cuts: list[Cut], piece: DraftedPiece) -> Cut:
             turned = affine_transform(cut.outline, [a, -b, b, a, 0, 0])
             shift = np.array(wanted.bounds[:2]) - turned.bounds[:2]
             away = affine_transform(turned, [1, 0, 0, 1, *shift]).symmetric_difference(wanted).area
+            if away < 0.01 * wanted.area:
+                # A strip is its own image when it is turned by half: its sewing lines and notches tell the two apart.
+                sewn, marks = (
+                    shapely.union_all([affine_transform(row, [a, -b, b, a, *shift]) for row in cut.lines.get(role, [])])
+                    for role in ("sew", "notch")
+                )
+                away += NEAR * seams.difference(sewn.buffer(NEAR)).length
+                away += sum(min(marks.distance(at), 10.0) for at in notches.geoms if not marks.is_empty)
             if away < best:
                 best, found = away, (cut, [a, -b, b, a, *shift])
-    if found is None or best > 0.01 * wanted.area:
+    if found is None or best > 0.02 * wanted.area:
         raise SystemExit(f"{piece.name} is not among the printed pieces")
     cut, matrix = found
     # Cloth that shrinks has shrunk before it is sewn.

@@ -78,7 +78,13 @@ def test_levels_are_where_the_body_has_them(sex: str) -> None:
 @needs_bodies
 @pytest.mark.parametrize(
     ("kind", "sex"),  # all by benchmarks/scan_tapes.py
-    [*((kind, sex) for kind in ("plain", "noisy") for sex in KNOWN), ("turned", "male_heavy"), ("scaled", "female")],
+    [
+        *(("plain", sex) for sex in KNOWN),
+        ("noisy", "child"),
+        ("noisy", "male"),
+        ("turned", "male_heavy"),
+        ("scaled", "female"),
+    ],
 )
 def test_levels_agree_with_tapes_laid_without_the_package(kind: str, sex: str) -> None:
     whole, faces = scan(sex)

@@ -140,12 +140,12 @@ class _LengthSystem:
         by = np.broadcast_to(np.repeat(span, GAUSS)[:, None, None], of_rate.shape)[self._free]
         self._band = int(max(np.abs(row - column).max(), np.abs(by - to).max()))
         self._size = len(inner) + len(span)
-        self._fixed = np.bincount(self._flat(row, column), value, minlength=(2 * self._band + 1) * self._size)
+        self._fixed = np.bincount(self._flat(row, column), value, minlength=(3 * self._band + 1) * self._size)
         self._to = np.concatenate([self._flat(by, to), self._flat(to, by)])
 
     def _flat(self, row: NDArray[np.int64], column: NDArray[np.int64]) -> NDArray[np.int64]:
-        """Return the indices of entries in the flattened band that `scipy.linalg.solve_banded` takes."""
-        return (self._band + row - column) * self._size + column
+        """Return the indices of entries in the flattened band that LAPACK's `gbsv` takes, whose upper rows are its own."""
+        return (2 * self._band + row - column) * self._size + column
 
     def at(self, control: FloatArray) -> _Fit:
         """Evaluate the fit of a spline with these control points, whose ends are those of the start."""
@@ -165,7 +165,8 @@ class _LengthSystem:
 
     def move(self, fit: _Fit) -> FloatArray:
         """Return the Gauss-Newton step from a fit (#control by 2 [m]); the ends stay."""
-        from scipy.linalg import solve_banded
+        # Thousands of small systems: `scipy.linalg.solve_banded` takes longer to check its arguments than to solve one.
+        from scipy.linalg.lapack import dgbsv
 
         rate = (self._slope[:, :, None] * fit.rate[:, None, :])[self._free] / -self._length_weight
         band = self._fixed + np.bincount(self._to, np.concatenate([rate, rate]), minlength=len(self._fixed))
@@ -176,8 +177,11 @@ class _LengthSystem:
         right = np.empty(self._size)
         right[self._of_control[1:-1]] = -gradient[1:-1]
         right[self._of_span] = fit.length_error / self._length_weight
-        band = band.reshape(2 * self._band + 1, self._size)
-        solved = solve_banded((self._band, self._band), band, right, overwrite_ab=True, check_finite=False)
+        _, _, solved, failed = dgbsv(
+            self._band, self._band, band.reshape(3 * self._band + 1, self._size), right, overwrite_ab=True
+        )
+        if failed:
+            raise np.linalg.LinAlgError("the spline's equations are singular")
         move = np.zeros_like(fit.control)
         move[1:-1] = solved[self._of_control[1:-1]]
         return move
