@@ -25,8 +25,11 @@ from warpflat.cli.run import start_warp_silently
 from warpflat.studio.cut_tables import cut_along
 from warpflat.studio.page import Page
 
-# A message with a mesh of 10,000 vertices is larger than this [bytes].
-_PICTURE = 200_000
+SCENES = Path(__file__).parents[1] / "scenes"
+# A message with a piece's mesh is larger than this [bytes].
+_PICTURE = 40_000
+
+Cut = tuple[str, str, tuple[float, float] | None]
 
 
 class Client:
@@ -52,18 +55,25 @@ class Client:
 
 def main() -> int:
     start_warp_silently()
+    folder = Path(tempfile.mkdtemp())
+    data = {"surface": {"shape": "bodice", "resolution": 100}, "fabric": "woven", "datum": "centre"}
+    cuts = [("bodice", "bust", (0.0, 0.3)), ("bodice", "centre", (0.0, 0.6))]
+    time_edits(warpflat.make_scene(data, name="bodice", folder=folder, where="bodice"), folder, cuts, grain=True)
+    time_edits(warpflat.load_scene(SCENES / "paper_block.toml"), folder, [("front_bodice", "bust", None)], grain=False)
+    return 0
+
+
+def time_edits(scene: warpflat.Scene, folder: Path, cuts: list[Cut], *, grain: bool) -> None:
+    """Edit a scene twice over and print how soon each edit was seen."""
     with socket.socket() as trial:
         trial.bind(("127.0.0.1", 0))
         port = trial.getsockname()[1]
-    data = {"surface": {"shape": "bodice", "resolution": 100}, "fabric": "woven", "datum": "centre"}
-    folder = Path(tempfile.mkdtemp())
-    scene = warpflat.make_scene(data, name="bodice", folder=folder, where="bodice")
     page = Page(scene, host="127.0.0.1", port=port, out=folder)
     client, session = Client(page.url), page.session
     wait(page)
     solution = session.solution
     assert solution is not None
-    print(f"{len(solution.pieces['bodice'].positions):,} vertices\n")
+    print(f"\n{scene.name}: {sum(len(piece.positions) for piece in solution.pieces.values()):,} vertices\n")
     print(
         f"{'edit':24}{'first picture [ms]':>22}{'at rest [ms]':>22}\n{'':24}{'wall, processor':>22}{'wall, processor':>22}"
     )
@@ -73,6 +83,8 @@ def main() -> int:
         begun = time.perf_counter(), time.process_time()
         act()
         while not client.pictures:
+            if session.error:
+                raise SystemExit(session.error)
             time.sleep(0.01)
         wait(page)
         times = [[1e3 * (now - then) for now, then in zip(client.pictures[at], begun, strict=True)] for at in (0, -1)]
@@ -81,16 +93,15 @@ def main() -> int:
     for _ in range(2):
         for fabric in ("denim", "interlock", "woven"):
             edit(f"cloth: {fabric}", lambda fabric=fabric: session.change("cloth", fabric=fabric))
-        edit("grain: 30 degrees", lambda: session.change("grain", grain_angle=30.0))
-        edit("grain: 0 degrees", lambda: session.change("grain", grain_angle=0.0))
-        for line, part in (("bust", (0.0, 0.3)), ("centre", (0.0, 0.6))):
+        for angle in (30.0, 0.0) if grain else ():
+            edit(f"grain: {angle:.0f} degrees", lambda angle=angle: session.change("grain", grain_angle=angle))
+        for piece, line, part in cuts:
             before = session.step.solution
             assert before is not None
-            edit(f"cut: {line}", lambda at=(before, line, part): session.try_cut(cut_along(at[0], "bodice", *at[1:])))
+            edit(f"cut: {line}", lambda at=(before, piece, line, part): session.try_cut(cut_along(*at)))
             edit("leave the cut", session.drop_preview)
         edit("undo", session.undo)
     page.close()
-    return 0
 
 
 def wait(page: Page) -> None:

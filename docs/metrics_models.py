@@ -35,6 +35,8 @@ class Remedy(Entry):
     outside_after: float | None
     """Share of the cloth beyond the strain limit with the cut."""
     piece: str | None = None
+    table: dict[str, Any] | None = None
+    """A scene's `[[cuts]]` entry that makes the cut, where one can."""
 
 
 class PieceWear(Entry):

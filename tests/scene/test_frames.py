@@ -90,6 +90,31 @@ def test_the_steps_of_the_method_are_filmed_as_they_are(tmp_path: Path) -> None:
     assert not any(tags.Get(at) for at in tags.GetTimeSamples())
 
 
+def test_the_film_of_a_garment_refers_to_its_mannequin(tmp_path: Path) -> None:
+    from pxr import Usd, UsdGeom
+
+    settings = {
+        "mannequin": {"size": "EU 38", "resolution_mm": 20},
+        "form": "bodice",
+        "output": {"frames": 3, "picture": False},
+        "pattern": {"formats": []},
+    }
+    scene = make_scene(settings, name="trial", folder=tmp_path, where="trial")
+    run_scene(scene, tmp_path / "first")
+    folder = (tmp_path / "first").rename(tmp_path / "moved")  # the reference is relative to the film
+
+    validate_usd(folder / "frames.usdc")
+    film, alone = (Usd.Stage.Open(str(folder / name)) for name in ("frames.usdc", "mannequin.usdc"))
+    assert film.GetRootLayer().GetExternalReferences() == ("./mannequin.usdc",)
+    shown, body = (UsdGeom.Mesh(stage.GetPrimAtPath("/World/mannequin/body")) for stage in (film, alone))
+    faces = np.array(body.GetFaceVertexIndicesAttr().Get())
+    assert np.array_equal(np.array(shown.GetFaceVertexIndicesAttr().Get()), faces)
+    moved = np.linalg.norm(np.array(shown.GetPointsAttr().Get()) - np.array(body.GetPointsAttr().Get()), axis=1)
+    assert np.allclose(moved[np.unique(faces)], 0.002, atol=1e-6)
+    line = film.GetPrimAtPath("/World/mannequin/lines").GetChildren()[0]
+    assert UsdGeom.Imageable(line).ComputePurpose() == UsdGeom.Tokens.guide
+
+
 def test_steps_are_spread_so_that_the_longest_is_short() -> None:
     assert spread([1.0, 3.0], 8) == [2, 6]
     assert spread([1.0, 0.0], 5) == [4, 1]

@@ -191,6 +191,24 @@ class FrameWriter:
             lines=lines,
         )
 
+    def refer_to_body(self, file: str, points: ArrayLike) -> None:
+        """Show the mannequin of another file of the same folder under the pieces, by reference; its lines are guides.
+
+        Args:
+            file: name of a file of :func:`warpflat.mannequin.usd.write_mannequin_usd`.
+            points: #V by 3, of its body as it is shown [m]: a little smaller, so that cloth that lies on it is seen.
+        """
+        from pxr import UsdGeom, Vt
+
+        path = "/World/mannequin"
+        self._used_names.add("mannequin")
+        self._stage.DefinePrim(path).GetReferences().AddReference(f"./{file}", path)
+        shown = UsdGeom.Mesh(self._stage.OverridePrim(f"{path}/body"))
+        stored = np.asarray(points, dtype=np.float32)
+        shown.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored))
+        shown.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)))
+        UsdGeom.Imageable(self._stage.OverridePrim(f"{path}/lines")).CreatePurposeAttr(UsdGeom.Tokens.guide)
+
     def write(
         self,
         name: str,

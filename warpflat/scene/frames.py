@@ -25,8 +25,14 @@ if TYPE_CHECKING:
     from warpflat.export.usd import FrameWriter
     from warpflat.flattening.progress import Progress
     from warpflat.flattening.result import Flattening
+    from warpflat.mannequin.mannequin import Mannequin
 
-__all__ = ["Film", "FrameRecorder", "FrameSchedule", "path_in_pattern"]
+__all__ = ["MANNEQUIN", "Film", "FrameRecorder", "FrameSchedule", "path_in_pattern"]
+
+# The file of the mannequin, to which that of the frames refers.
+MANNEQUIN = "mannequin.usdc"
+# The mannequin is shown this much smaller [m], so that cloth that lies on it is seen.
+_SHRUNK = 0.002
 
 # Frames of a film of 60: so many for a stage after the first one at least, and so many in which the line of a cut is shown.
 _LATER, _LINE = 15 / 60, 6 / 60
@@ -46,13 +52,17 @@ class Film:
     All pieces have the same frames: a stage takes as many as the piece that needs the most, and a piece without that stage stands still.
     """
 
-    def __init__(self, folder: Path, output: OutputTable, surfaces: Sequence[Surface]) -> None:
+    def __init__(
+        self, folder: Path, output: OutputTable, surfaces: Sequence[Surface], *, mannequin: Mannequin | None = None
+    ) -> None:
         """
         Args:
             folder: in which `frames.usdc` is written, if the output has frames at all.
             output: how many frames.
             surfaces: the pieces, uncut.
+            mannequin: on which they lie; it is written as `mannequin.usdc`, to which the frames refer.
         """
+        self._mannequin = mannequin
         self._stack = ExitStack()
         self._folder, self._output = folder, output
         self._most = max(_MOST_VERTICES // max(sum(len(surface.vertices) for surface in surfaces), 1), 3)
@@ -93,9 +103,20 @@ class Film:
 
             report_activity("writing the film")
             with FrameWriter(self._folder / "frames.usdc") as writer:
+                if self._mannequin is not None:
+                    self._show_mannequin(writer, self._mannequin)
                 for name, surface in self._surfaces.items():
                     writer.add_piece(name, surface)
                 self._write(writer)
+
+    def _show_mannequin(self, writer: FrameWriter, mannequin: Mannequin) -> None:
+        from warpflat.mannequin.normals import vertex_normals
+        from warpflat.mannequin.usd import write_mannequin_usd
+
+        write_mannequin_usd(mannequin, self._folder / MANNEQUIN)
+        layout = mannequin.layout
+        normals = vertex_normals(mannequin.vertices, layout.faces[layout.on_body])
+        writer.refer_to_body(MANNEQUIN, mannequin.vertices - _SHRUNK * normals)
 
     def _write(self, writer: FrameWriter) -> None:
         pieces = {name: recorder.stages for name, recorder in self.recorders.items()}

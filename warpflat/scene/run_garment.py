@@ -32,7 +32,7 @@ from warpflat.mannequin.shapes import shaped_form
 from warpflat.mannequin.table import mannequin_from_table
 from warpflat.scene.drape import write_drape
 from warpflat.scene.form_cuts import cut_form, cut_of_dart
-from warpflat.scene.frames import Film, FrameSchedule
+from warpflat.scene.frames import MANNEQUIN, Film, FrameSchedule
 from warpflat.scene.load import Scene, errors_named, expand_variables, scene_fabric, scene_relax_options, scene_wear
 from warpflat.scene.openings import scene_finishing, scene_openings, scene_pockets, sewn_centres, straight_stands
 from warpflat.scene.pattern_options import pattern_options
@@ -197,6 +197,8 @@ def run_garment(
 
     plan = plan_garment(scene, device=device)
     expect_files(out, [f"{name}.obj" for name in plan.form.pieces])
+    if FrameSchedule(scene.settings.output).wanted:
+        expect_files(out, [MANNEQUIN])
     if scene.settings.drape is not None:
         expect_files(out, [f"{name}.draped.obj" for name in plan.form.pieces])
     others = _other_sizes(scene)
@@ -243,7 +245,7 @@ def _film(plan: GarmentPlan, out: Path) -> Film:
     """Return the film of the garment's pieces, for a ``with`` block."""
     output, surfaces = plan.scene.settings.output, [piece.surface for piece in plan.form.pieces.values()]
     require_memory_for_run(sum(len(surface.vertices) for surface in surfaces), frames=FrameSchedule(output).wanted)
-    return Film(out, output, surfaces)
+    return Film(out, output, surfaces, mannequin=plan.mannequin)
 
 
 def _flatten_with_frames(
