@@ -59,7 +59,7 @@ class Page:
         self._frames: dict[str, PieceFrame] = {}
         self._drawn: tuple[object, ...] = ()
         self._body: Mannequin | None = None
-        self._seen = False  # whether a camera has been set upon the first picture
+        self._seen: tuple[str, ...] = ()  # the pieces that every camera has been set upon
         self._lines: tuple[Solution | None, dict[str, dict[str, IntArray]]] = (None, {})
         self._dirty, self._closed, self._told, self._drawing = threading.Event(), False, True, False
         self.stage = Stage(self.server)
@@ -172,14 +172,14 @@ class Page:
         return {name: Shown.of_map(frame, kind, lines[name], angle) for name, frame in frames.items()}
 
     def _after_rest(self, solution: Solution) -> None:
-        """Write what does not change while pieces are being relaxed: names, the body, the camera of the first picture."""
+        """Write what does not change while pieces are being relaxed: names, the body, the camera that shows all pieces."""
         self.stage.write_names({name: name.replace("_", " ") for name in solution.pieces})
-        body = None if solution.plan is None else solution.plan.mannequin
-        if body is not self._body:
+        body, others = None if solution.plan is None else solution.plan.mannequin, self._seen != tuple(solution.pieces)
+        if body is not self._body or others:
             self.stage.draw_body(None if body is None else body.surface())
             self._body = body
-        if not self._seen:
-            self._seen = True
+        if others:
+            self._seen = tuple(solution.pieces)
             for client in self.server.get_clients().values():
                 self.stage.show_all(client)
 

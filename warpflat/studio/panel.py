@@ -108,6 +108,7 @@ class Panel:
 
     def _body(self) -> None:
         with self._gui.add_folder("Body and form"):
+            self._shown_lengths: Mapping[str, float] = {}
             self._size = self._gui.add_dropdown("size", (_OWN, *size_names()), initial_value=_OWN)
             with self._gui.add_folder("Measures", expand_by_default=False):
                 self._measures = {
@@ -142,9 +143,12 @@ class Panel:
         self._form.value = _one_of(settings.form, self._form.options)
         self._shape.value = settings.shape
         self._ease.value = _one_of(settings.ease, self._ease.options)
-        for key, value in self._known_lengths().items():
-            if key in self._measures:
-                self._measures[key].value = round(100.0 * value, 1)
+        lengths = self._known_lengths()
+        # What somebody is typing stays until there is another body.
+        if lengths != self._shown_lengths:
+            self._shown_lengths = lengths
+            for key in self._measures.keys() & lengths.keys():
+                self._measures[key].value = round(100.0 * lengths[key], 1)
 
     def _cloth(self) -> None:
         scene = self._session.scene

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from scipy.spatial.transform import Rotation
+from trimesh import Trimesh
 
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.export.geometry import area_vectors, outline_edges, vertex_normals
@@ -155,11 +156,12 @@ class Stage:
         if body is None:
             return
         low, high = self._boxes[0] + [-_BEYOND, _BEYOND]
-        middle = body.vertices[body.faces].mean(axis=1)
-        near, _ = triangulate(body.faces[((middle > low) & (middle < high)).all(axis=1)])
         # A little smaller than it is, so that cloth that lies on it is seen.
+        near = Trimesh(_above(body.vertices, body.faces, -0.004), triangulate(body.faces)[0], process=False)
+        for origin, normals in ((low, np.eye(3)), (high, -np.eye(3))):
+            near = near.slice_plane(np.tile(origin, (3, 1)), normals)
         self._nodes["/form/body"] = self._scene.add_mesh_simple(
-            "/form/body", _above(body.vertices, body.faces, -0.004).astype(np.float32), near, color=_SKIN, side="double",
+            "/form/body", near.vertices.astype(np.float32), near.faces, color=_SKIN, side="double",
             cast_shadow=False, receive_shadow=False,
         )  # fmt: skip
 
