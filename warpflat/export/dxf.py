@@ -157,7 +157,7 @@ def _ascii(text: str) -> str:
     """Return a text in 7 bits, as the standards demand: accents are dropped, other letters become "?"."""
     # Control characters too: a line of the file is a value.
     plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
-    return "".join("?" if control_in(letter) else letter for letter in plain)
+    return "".join("?" if control_in(letter) else letter for letter in plain) if control_in(plain) else plain
 
 
 def _is_written(name: str) -> bool:
