@@ -63,7 +63,7 @@ def turned_end(curve: Curve, turn: float, reach: float, *, keep_length: bool) ->
     return result, float(np.abs(_move(slope, back, stretch.reach, np.linspace(0.0, 1.0, 101))[0]).max())
 
 
-def _move(slope: float, back: float, reach: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _move(slope: float, back: float | FloatArray, reach: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the move along the normal [m] at shares of the reach, and its derivative by length."""
     move = reach * slope * u * (1 - u) ** 2 * (1 - back * u)
     rate = slope * ((1 - u) * (1 - 3 * u) * (1 - back * u) - back * u * (1 - u) ** 2)
