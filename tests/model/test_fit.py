@@ -256,7 +256,7 @@ def test_a_sheet_shows_all_pieces_at_one_scale_of_length_and_of_colour(tmp_path:
     scales = [np.ptp(axis.get_xlim()) / (axis.get_position().width * inches) for axis in maps]
     np.testing.assert_allclose(scales, scales[0], rtol=1e-9)
     for first, second in zip(maps[: len(MAPS)], maps[len(MAPS) :], strict=True):
-        assert first.collections[0].get_clim() == second.collections[0].get_clim()
+        assert first.artists[0].mappable.get_clim() == second.artists[0].mappable.get_clim()
     told = " ".join(text.get_text() for text in figure.texts)
     assert "does not fit: cylinder" in told
     assert "fits: yes, 0.0 % beyond the limit" in told

@@ -25,7 +25,10 @@ __all__ = [
 
 def segment_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
     """#P - 1 (#P if closed), the length of each segment of a polyline."""
-    return np.asarray(np.linalg.norm(np.diff(_around(points, closed), axis=0), axis=1))
+    around = _around(points, closed)
+    step = around[1:] - around[:-1]
+    # Thousands of short lines: `np.linalg.norm` and `np.diff` take longer to check their arguments than to do this.
+    return np.asarray(np.sqrt((step * step).sum(axis=1)))
 
 
 def polyline_length(points: FloatArray, *, closed: bool = False) -> float:
@@ -35,7 +38,10 @@ def polyline_length(points: FloatArray, *, closed: bool = False) -> float:
 
 def arc_lengths(points: FloatArray, *, closed: bool = False) -> FloatArray:
     """#P, the length along a polyline from its first point to each of its points; the whole length at the end if closed."""
-    return np.concatenate([[0.0], np.cumsum(segment_lengths(points, closed=closed))])
+    segments = segment_lengths(points, closed=closed)
+    arc = np.zeros(len(segments) + 1)
+    segments.cumsum(out=arc[1:])
+    return arc
 
 
 def points_at_lengths(points: FloatArray, lengths: ArrayLike) -> FloatArray:

@@ -61,6 +61,8 @@ def control_in(text: str, allowed: str = "") -> str:
     These are the ones that no line of text holds: what XML forbids, what breaks a line, and what turns the direction of writing, so
     that a name is not what it looks like.
     """
+    if text.isprintable():  # as nearly all are
+        return ""
     return next((letter for letter in text if _is_control(letter) and letter not in allowed), "")
 
 

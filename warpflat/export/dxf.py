@@ -1,19 +1,16 @@
 """Patterns as DXF for apparel CAD: the AAMA dialect (ANSI/AAMA-292) and ASTM D6673, both on DXF R12.
 
-Written through ezdxf's exporter for this dialect: an empty header, no tables, no layout blocks; other saves are
-refused by some CAD systems. Layers are numbers: 1 boundary and system text, 2 turn points, 3 curve points, 4 slit
-notches, 6 mirror line, 7 grain, 8 internal lines, 11 cutouts, 13 drill holes, 14 sewing lines, 15 annotation; ASTM
-adds validation curves, 84 of the boundary and 87 of the sewing line.
+The file has an empty header, no tables and no layout blocks: some CAD systems refuse others. Layers are numbers: 1 boundary
+and system text, 2 turn points, 3 curve points, 4 slit notches, 6 mirror line, 7 grain, 8 internal lines, 11 cutouts, 13 drill
+holes, 14 sewing lines, 15 annotation; ASTM adds validation curves, 84 of the boundary and 87 of the sewing line.
 """
 
 from __future__ import annotations
 
-import logging
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from datetime import datetime, timezone
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,10 +27,6 @@ from warpflat.pattern.drafted import DraftedGarment, DraftedPiece
 from warpflat.pattern.layout import lay_out, nests
 from warpflat.pattern.lettering import text_width
 from warpflat.pattern.seam_words import seam_words
-
-if TYPE_CHECKING:
-    from ezdxf.document import Drawing
-    from ezdxf.layouts import BlockLayout, Modelspace
 
 __all__ = ["block_name", "write_dxf"]
 
@@ -73,8 +66,6 @@ def write_dxf(
     Raises:
         InputError: unknown dialect, units or size.
     """
-    from ezdxf.addons import gerber_D6673
-
     if dialect not in DIALECTS:
         raise InputError(f"unknown DXF dialect {dialect!r}; {nearest(dialect, DIALECTS)}")
     if units not in UNITS:
@@ -84,8 +75,7 @@ def write_dxf(
         garment.garment.piece(next(iter(garment.pieces.values()))[0].name, size)
     scale, created = UNITS[units], created or _now()
     rules = grade_rules(garment, chosen) if rul is not None and len(chosen) > 1 else None
-    document = _new_document()
-    space = document.modelspace()
+    blocks, space = list[str](), list[str]()
     groups = [tuple(p for p in nest if p.size in chosen) for nest in nests(garment)]
     taken: set[str] = set()
     seams = seam_words(garment.garment.seams)
@@ -95,15 +85,19 @@ def write_dxf(
         for piece in placed.pieces:
             title = written[names[piece.name]]
             name = block_name(piece, taken, title)
-            block = document.blocks.new(name, base_point=(0, 0))
+            block = list[str]()
             _write_piece(block, piece, title, scale, seams, validation=dialect == "astm")
             for point in rules.points.get(piece.name, ()) if rules is not None and piece.size == rules.sample else ():
                 _text(block, f"# {point.rule}", point.at, scale, point.layer, 0.003)
-            space.add_blockref(name, tuple(placed.offset * scale), dxfattribs={"layer": "1"})
+            begin = _tags((0, "BLOCK"), (8, "0"), (2, name), (70, 0), *_place((0.0, 0.0)), (3, name), (1, ""))
+            blocks += [begin, *block, _tags((0, "ENDBLK"), (8, "0"))]
+            space.append(_tags((0, "INSERT"), (8, "1"), (2, name), *_place(placed.offset * scale)))
     table = _ascii(garment.name)[:20]
     _write_style(space, garment, units, scale, created, table="" if rules is None else table)
-    with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii", errors="dxfreplace") as stream:
-        gerber_D6673.export_stream(document, stream)
+    with atomic_path(path) as temporary, open(temporary, "w", encoding="ascii") as stream:
+        for section, content in (("HEADER", []), ("BLOCKS", blocks), ("ENTITIES", space)):
+            stream.write(_tags((0, "SECTION"), (2, section)) + "".join(content) + _tags((0, "ENDSEC")))
+        stream.write(_tags((0, "EOF")))
     if rules is not None and rul is not None:
         write_rul(rules, rul, name=table, dialect=dialect, units=units, scale=scale, created=created)
 
@@ -125,19 +119,6 @@ def _now() -> datetime:
         ) from None
 
 
-def _new_document() -> Drawing:
-    """Create an empty R12 document, without ezdxf's warning that R12 has no units: the style text names them."""
-    import ezdxf
-
-    logger = logging.getLogger("ezdxf")
-    level = logger.level
-    logger.setLevel(logging.ERROR)
-    try:
-        return ezdxf.new("R12", units=0)
-    finally:
-        logger.setLevel(level)
-
-
 def block_name(piece: DraftedPiece, taken: set[str], title: str = "") -> str:
     """Return a block name such as FRONT_BODICE_38 that is not in `taken`, to which it is added.
 
@@ -157,7 +138,7 @@ def _ascii(text: str) -> str:
     """Return a text in 7 bits, as the standards demand: accents are dropped, other letters become "?"."""
     # Control characters too: a line of the file is a value.
     plain = plain_letters(text).encode("ascii", "replace").decode("ascii")
-    return "".join("?" if control_in(letter) else letter for letter in plain)
+    return "".join("?" if control_in(letter) else letter for letter in plain) if control_in(plain) else plain
 
 
 def _is_written(name: str) -> bool:
@@ -166,7 +147,7 @@ def _is_written(name: str) -> bool:
 
 
 def _write_piece(
-    block: BlockLayout,
+    block: list[str],
     piece: DraftedPiece,
     title: str,
     scale: float,
@@ -199,17 +180,17 @@ def _write_piece(
     _write_texts(block, piece, title, scale)
 
 
-def _write_notches(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
+def _write_notches(block: list[str], piece: DraftedPiece, scale: float) -> None:
     """Write slit notches as points with their depth for height."""
     for notch in piece.notches:
         angle = float(np.degrees(np.arctan2(notch.direction[1], notch.direction[0]))) % 360.0
         for base in notch.base:
             location = (base[0] * scale, base[1] * scale, notch.depth * scale)
-            block.add_point(location, dxfattribs={"layer": "4", "angle": angle})
+            block.append(_tags((0, "POINT"), (8, "4"), *_place(location), *([(50, angle)] if angle else [])))
 
 
 def _write_edges(
-    block: BlockLayout, piece: DraftedPiece, scale: float, seams: Mapping[tuple[str, str], Sequence[str]]
+    block: list[str], piece: DraftedPiece, scale: float, seams: Mapping[tuple[str, str], Sequence[str]]
 ) -> None:
     """Write the sewing line edge by edge, each with its name and, in rows below, what is sewn to it."""
     for edge in piece.edges:
@@ -224,7 +205,7 @@ def _write_edges(
             _text(block, text, middle - [0.0, 0.003 * ROW * row], scale, "15", 0.003)
 
 
-def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
+def _write_darts(block: list[str], piece: DraftedPiece, scale: float) -> None:
     """Write the folds of darts, fish-eye darts and their names."""
     for dart in piece.darts:
         if dart.fold is not None:
@@ -235,7 +216,7 @@ def _write_darts(block: BlockLayout, piece: DraftedPiece, scale: float) -> None:
         _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)
 
 
-def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: float) -> None:
+def _write_texts(block: list[str], piece: DraftedPiece, title: str, scale: float) -> None:
     """Write the system texts where the label has its room; notes may run on to the right."""
     texts = [f"PIECE NAME: {title}", f"SIZE: {piece.size}", f"QUANTITY: {piece.piece.quantity}"]
     texts += [f"CATEGORY: {'FOLD' if piece.piece.on_fold else 'PIECE'}", f"FABRIC: {' / '.join(cloths_of(piece))}"]
@@ -249,7 +230,7 @@ def _write_texts(block: BlockLayout, piece: DraftedPiece, title: str, scale: flo
 
 
 def _write_style(
-    space: Modelspace, garment: DraftedGarment, units: str, scale: float, created: datetime, *, table: str
+    space: list[str], garment: DraftedGarment, units: str, scale: float, created: datetime, *, table: str
 ) -> None:
     """Write the texts that describe the whole file."""
     texts = [
@@ -267,22 +248,37 @@ def _write_style(
         _text(space, text, np.array([0.0, -0.010 * (row + 1)]), scale, "1", 0.005)
 
 
-def _polyline(block: BlockLayout, points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:
-    block.add_polyline2d([tuple(p) for p in (points * scale).tolist()], close=closed, dxfattribs={"layer": layer})
+def _polyline(block: list[str], points: FloatArray, scale: float, layer: str, *, closed: bool = False) -> None:
+    block.append(_tags((0, "POLYLINE"), (8, layer), (66, 1), *_place((0.0, 0.0)), (70, int(closed))))
+    for x, y in (points * scale).tolist():
+        block.append(f"  0\nVERTEX\n  8\n{layer}\n 10\n{x}\n 20\n{y}\n 30\n0.0\n 70\n0\n")
+    block.append(_tags((0, "SEQEND"), (8, layer)))
 
 
-def _line(block: BlockLayout, ends: FloatArray, scale: float, layer: str) -> None:
-    start, end = (tuple(p) for p in (ends * scale).tolist())
-    block.add_line(start, end, dxfattribs={"layer": layer})
+def _line(block: list[str], ends: FloatArray, scale: float, layer: str) -> None:
+    start, end = ends * scale
+    block.append(_tags((0, "LINE"), (8, layer), *_place(start), *_place(end, 1)))
 
 
-def _point(block: BlockLayout, at: FloatArray, scale: float, layer: str) -> None:
-    block.add_point(tuple((at * scale).tolist()), dxfattribs={"layer": layer})
+def _point(block: list[str], at: FloatArray, scale: float, layer: str) -> None:
+    block.append(_tags((0, "POINT"), (8, layer), *_place(at * scale)))
 
 
-def _text(block: BlockLayout | Modelspace, text: str, at: FloatArray, scale: float, layer: str, height: float) -> None:
-    entity = block.add_text(_ascii(text), height=height * scale, dxfattribs={"layer": layer})
-    entity.set_placement(tuple((at * scale).tolist()))
+def _text(block: list[str], text: str, at: FloatArray, scale: float, layer: str, height: float) -> None:
+    place = at * scale
+    size_and_words = (40, float(height * scale)), (1, _ascii(text))
+    block.append(_tags((0, "TEXT"), (8, layer), *_place(place), *size_and_words, *_place(place, 1)))
+
+
+def _place(point: Iterable[float], number: int = 0) -> list[tuple[int, float]]:
+    """Return the tags of an entity's first place, or of the one with this number, from 2 or 3 coordinates."""
+    x, y, z = (*(float(value) for value in point), 0.0)[:3]
+    return [(10 + number, x), (20 + number, y), (30 + number, z)]
+
+
+def _tags(*tags: tuple[int, object]) -> str:
+    """Return tags as the file has them: a line with the code, and one with the value."""
+    return "".join(f"{code:3}\n{value}\n" for code, value in tags)
 
 
 def _is_corner(ring: FloatArray) -> BoolArray:

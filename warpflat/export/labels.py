@@ -168,9 +168,12 @@ def in_batches(spots: Iterable[Spot]) -> Iterator[list[Spot]]:
 
 def _are_clear(discs: FloatArray, others: FloatArray) -> BoolArray:
     """Return for each set of discs (#S by #N by 3) whether none overlaps one of the others (#M by 3)."""
-    away = discs[:, :, None, :2] - others[:, :2]
-    reach = discs[:, :, None, 2] + others[:, 2]
-    return np.asarray((np.einsum("snmk,snmk->snm", away, away) >= reach**2).all(axis=(1, 2)))
+    x, y, reach = (
+        discs[..., None, 0] - others[:, 0],
+        discs[..., None, 1] - others[:, 1],
+        discs[..., None, 2] + others[:, 2],
+    )
+    return np.asarray((x * x + y * y >= reach * reach).all(axis=(1, 2)))
 
 
 def _discs(spots: Sequence[Spot], width: float, height: float) -> FloatArray:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,10 +15,14 @@ from warpflat.export.letters import all_letters
 from warpflat.export.picture_png import save_png
 from warpflat.pattern.walked import WalkedSeam
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
 __all__ = ["write_walked_picture"]
 
-#: Seams in a row, and the size of each [in].
+#: Seams in a row, and the size of each; the height of the page's and of a seam's title, and the margin around a seam [in].
 COLUMNS, CELL = 3, (4.4, 1.9)
+HEAD, TITLE, MARGIN = 0.7, 0.4, 0.2
 COLOURS = ("#1f5fa8", "#c8452c")
 
 
@@ -39,30 +44,39 @@ def write_walked_picture(path: str | os.PathLike[str], seams: Sequence[WalkedSea
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
     rows = -(-len(seams) // COLUMNS)
-    figure = Figure(figsize=(COLUMNS * CELL[0], rows * CELL[1] + 0.8), dpi=110, facecolor="white")
+    width, height = COLUMNS * CELL[0], rows * CELL[1] + HEAD
+    figure = Figure(figsize=(width, height), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
-    axes = figure.subplots(rows, COLUMNS, squeeze=False).ravel()
-    for axis in axes:
-        axis.set_axis_off()
-    for axis, seam in zip(axes, seams, strict=False):
-        start, end = seam.sides[0][[0, -1]]
-        x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
-        along = np.array([[x, -y], [y, x]])
-        for line, notches, colour in zip(seam.sides, seam.notches, COLOURS, strict=True):
-            axis.plot(*(1000 * (line - start) @ along).T, color=colour, linewidth=1.1, alpha=0.85)
-            axis.plot(*(1000 * (notches - start) @ along).T, color=colour, marker="|", markersize=9, linestyle="")
-        axis.set_aspect("equal", adjustable="datalim")
-        notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
-        axis.set_title(
-            f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip(),
-            fontsize=9,
-            parse_math=False,
-        )
-    figure.suptitle(
-        f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]",
-        fontsize=12,
-        parse_math=False,
-    )
-    figure.tight_layout(rect=(0.0, 0.0, 1.0, 0.97))
+    # One axis over the page, in inches: an axis for each seam takes longer than all that is drawn in it.
+    axis = figure.add_axes((0.0, 0.0, 1.0, 1.0), xlim=(0.0, width), ylim=(0.0, height))
+    axis.set_axis_off()
+    for number, seam in enumerate(seams):
+        row, column = divmod(number, COLUMNS)
+        _draw_seam(axis, seam, (column + 0.5) * CELL[0], height - HEAD - row * CELL[1])
+    words = f"{title}: the two sides of each seam laid upon each other, right sides together, darts closed [mm]"
+    axis.text(0.5 * width, height - 0.26, words, fontsize=12, ha="center", va="center", parse_math=False)
     with atomic_path(path) as temporary:
         save_png(temporary, figure, {"Software": "warpflat"})
+
+
+def _draw_seam(axis: Axes, seam: WalkedSeam, middle: float, top: float) -> None:
+    """Draw a seam in a cell, whose middle and upper edge are given [in]."""
+    from matplotlib.lines import Line2D
+
+    start, end = seam.sides[0][[0, -1]]
+    x, y = (end - start) / max(float(np.linalg.norm(end - start)), 1e-9)
+    along = np.array([[x, -y], [y, x]])
+    both = np.concatenate(seam.sides) @ along
+    low, high = both.min(axis=0), both.max(axis=0)
+    room = np.array([CELL[0] - 2 * MARGIN, CELL[1] - TITLE - 2 * MARGIN])
+    scale = float((room / np.maximum(high - low, 1e-9)).min())
+    centre = np.array([middle, top - TITLE - 0.5 * (CELL[1] - TITLE)])
+    for line, notches, colour in zip(seam.sides, seam.notches, COLOURS, strict=True):
+        at, marks = (scale * (points @ along - 0.5 * (low + high)) + centre for points in (line, notches))
+        axis.add_artist(Line2D(*at.T, color=colour, linewidth=1.1, alpha=0.85))
+        axis.add_artist(Line2D(*marks.T, color=colour, marker="|", markersize=9, linestyle=""))
+    notch = "no notches" if seam.notch_mm is None else f"notches {seam.notch_mm:.1f}"
+    words = (
+        f"{seam.name} {seam.size}\n{seam.distance_mm:.1f} mm apart, length {seam.difference_mm:+.2f}, {notch}".strip()
+    )
+    axis.text(middle, top - 0.5 * TITLE, words, fontsize=9, ha="center", va="center", parse_math=False)

@@ -269,7 +269,11 @@ class SvgPage:
 
 def _for_xml(text: str) -> str:
     """Replace the control characters that no XML can hold, not even escaped, by U+FFFD."""
-    return "".join("\ufffd" if control_in(letter, "\t\n") else letter for letter in text)
+    return (
+        text
+        if not control_in(text, "\t\n")
+        else "".join("\ufffd" if control_in(each, "\t\n") else each for each in text)
+    )
 
 
 def _number(value: float) -> str:

@@ -45,6 +45,8 @@ __all__ = ["FrameWriter"]
 _LINE_COLOUR = (0.03, 0.05, 0.10)
 _CUT_COLOUR = (0.02, 0.20, 0.75)
 _COLOUR_STEPS = 1024
+# The working file is saved when so many frames, of so many vertices together, are in memory; those take some 50 MB.
+_FRAMES, _VERTICES = 16, 2_000_000
 # USD's type of a measure; a bool is an int, too.
 _TYPES = {bool: "Bool", int: "Int", float: "Double", str: "String"}
 
@@ -69,7 +71,7 @@ class FrameWriter:
         path: str | os.PathLike[str],
         *,
         frames_per_second: float = 24.0,
-        save_every: int = 16,
+        save_every: int | None = None,
         scale: float | None = None,
     ) -> None:
         """Prepare a writer; nothing is touched before the ``with`` block is entered.
@@ -77,19 +79,20 @@ class FrameWriter:
         Args:
             path: the file, ``*.usdc`` (or ``*.usd``, ``*.usda``).
             frames_per_second: of playback.
-            save_every: frames kept in memory at most.
+            save_every: frames kept in memory at most; if not given 16, or more of a small mesh.
             scale: upper end of the colour scale [J/m2]; if not given, 98 % of the area of the last frames of all pieces
                 lies below it (see :func:`warpflat.export.colours.energy_scale`).
         """
-        if save_every < 1 or not frames_per_second > 0.0:
+        if (save_every is not None and save_every < 1) or not frames_per_second > 0.0:
             raise ValueError("save_every must be at least 1, and frames_per_second above 0")
         self._final = Path(path)
         self._rate = float(frames_per_second)
-        self._save_every = int(save_every)
+        self._save_every = _FRAMES if save_every is None else int(save_every)
+        self._save_after = _VERTICES if save_every is None else 0
         self._scale = scale
         self._pieces: dict[str, FramePiece] = {}
         self._used_names = {"Looks", "cameras", "light"}
-        self._unsaved = 0
+        self._unsaved = self._unsaved_vertices = 0
         self._stage: Any = None
         self._hidden = ExitStack()
 
@@ -260,7 +263,7 @@ class FrameWriter:
         low, high = bounding_box(flat)
         piece.low, piece.high = np.minimum(piece.low, low), np.maximum(piece.high, high)
         self._stage.SetEndTimeCode(max(self._stage.GetEndTimeCode(), float(number)))
-        self._save_every_few_frames()
+        self._save_every_few_frames(len(flat))
         return number
 
     def _sample(
@@ -292,23 +295,26 @@ class FrameWriter:
         """Author a frame's measures."""
         from pxr import Sdf
 
-        prim = self._stage.GetPrimAtPath(piece.path)
         for key, value in measures.items():
-            kind = next(name for known, name in _TYPES.items() if isinstance(value, known))
-            attribute = prim.CreateAttribute(f"warpflat:{key}", getattr(Sdf.ValueTypeNames, kind), custom=True)
-            attribute.Set(value, time)
+            if key not in piece.measures:
+                kind = next(name for known, name in _TYPES.items() if isinstance(value, known))
+                piece.measures[key] = self._stage.GetPrimAtPath(piece.path).CreateAttribute(
+                    f"warpflat:{key}", getattr(Sdf.ValueTypeNames, kind), custom=True
+                )
+            piece.measures[key].Set(value, time)
 
-    def _save_every_few_frames(self) -> None:
-        """Count a frame, and save the working file if it is time."""
+    def _save_every_few_frames(self, vertices: int) -> None:
+        """Count a frame of so many vertices, and save the working file if it is time."""
         self._unsaved += 1
-        if self._unsaved >= self._save_every:
+        self._unsaved_vertices += vertices
+        if self._unsaved >= self._save_every and self._unsaved_vertices >= self._save_after:
             with usd_errors(self._final):
                 self._save()
 
     def _save(self) -> None:
         """Save the working file."""
         self._stage.Save()
-        self._unsaved = 0
+        self._unsaved = self._unsaved_vertices = 0
 
     def _place(self) -> None:
         """Place the patterns beside the surfaces, as on a table, by the room that each took over the whole time; add cameras."""
@@ -363,7 +369,7 @@ class FrameWriter:
         for number in range(FIRST_FRAME, FIRST_FRAME + max(piece.frames for piece in shown)):
             for painter in painters:
                 painter.colour(number, scale, table)
-            self._save_every_few_frames()
+            self._save_every_few_frames(sum(len(piece.last_positions) for piece in shown))
 
     def _author_defaults(self) -> None:
         """Author the last value of every sampled attribute as its default."""

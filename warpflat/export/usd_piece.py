@@ -36,6 +36,7 @@ class FramePiece:
     to_surface: IntArray
     lines: dict[str, Polylines]
     cuts: dict[str, Polylines] = field(default_factory=dict)
+    measures: dict[str, Any] = field(default_factory=dict)
     frames: int = 0
     last_density: NDArray[np.float32] | None = None
     last_positions: FloatArray = field(default_factory=lambda: np.empty((0, 2)))

@@ -130,6 +130,8 @@ class MeshSamples:
         self.mesh = mesh
         self._stored = 0
         self._padding = 0
+        self._points: Any = None
+        self._extent: Any = None
 
     def write(self, time: Any, points: NDArray[np.float32], faces: IntArray | None = None) -> None:
         """Write the points (#P by 3) [m]; `faces` (#F by 4) begin a new topology."""
@@ -140,9 +142,11 @@ class MeshSamples:
             used = faces >= 0
             self.mesh.CreateFaceVertexCountsAttr().Set(Vt.IntArray.FromNumpy(used.sum(axis=1, dtype=np.int32)), time)
             self.mesh.CreateFaceVertexIndicesAttr().Set(Vt.IntArray.FromNumpy(faces[used]), time)
+        if self._points is None:  # after the first faces, in the order of the schema
+            self._points, self._extent = self.mesh.CreatePointsAttr(), self.mesh.CreateExtentAttr()
         stored = self._padded(points)
-        self.mesh.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
-        self.mesh.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
+        self._points.Set(Vt.Vec3fArray.FromNumpy(stored), time)
+        self._extent.Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored)), time)
         self._stored = len(stored)
 
     def _padded(self, rows: NDArray[np.float32]) -> NDArray[np.float32]:
@@ -161,6 +165,8 @@ class SampledLines:
         self._colour = colour
         self._used_names: set[str] = set()
         self._members: dict[str, _Line] = {}
+        self._rows = np.empty(0, dtype=np.int32)
+        self._ends = np.zeros(1, dtype=np.int64)
 
     def write(self, time: Any, lines: Mapping[str, Polylines], points: NDArray[np.float32], *, changed: bool) -> None:
         """Write each line's points at `time`; `changed` says that the lines or the mesh under them are new."""
@@ -169,15 +175,28 @@ class SampledLines:
         if lines and self.prim is None:
             self.prim = define_group(self.stage, self.path)
             UsdGeom.Imageable(self.prim).CreatePurposeAttr(UsdGeom.Tokens.guide)
+        if changed:
+            self._change(time, lines)
+        if lines:
+            stored, margin = points[self._rows], np.float32(0.5 * self._width)
+            low, high = (limit.reduceat(stored, self._ends[:-1], axis=0) for limit in (np.minimum, np.maximum))
+            boxes = np.stack([low - margin, high + margin], axis=1)
+            for name, first, last, box in zip(lines, self._ends[:-1], self._ends[1:], boxes, strict=True):
+                self._members[name].write(time, stored[first:last], box)
+
+    def _change(self, time: Any, lines: Mapping[str, Polylines]) -> None:
+        """Show the lines that are there from `time` on, and hide the others."""
+        rows = []
         for name, parts in lines.items():
             if name not in self._members:
                 path = f"{self.path}/{valid_name(name, self._used_names)}"
                 self._members[name] = _Line(self.stage, path, name, self._width, self._colour)
-            self._members[name].write(time, parts, points, changed=changed, start=self._start)
-        if changed:
-            for name, member in self._members.items():
-                if name not in lines:
-                    member.hide(time, start=self._start)
+            rows.append(self._members[name].begin(time, parts, start=self._start))
+        for name, member in self._members.items():
+            if name not in lines:
+                member.hide(time, start=self._start)
+        self._rows = np.concatenate([*rows, np.empty(0, dtype=np.int32)])
+        self._ends = np.cumsum([0, *map(len, rows)])
 
 
 class _Line:
@@ -194,28 +213,33 @@ class _Line:
         self._curves.SetWidthsInterpolation(_CONSTANT)
         colours = Vt.Vec3fArray([Gf.Vec3f(*(float(channel) for channel in colour))])
         self._curves.CreateDisplayColorPrimvar(_CONSTANT).Set(colours)
-        self._margin = 0.5 * width
         self._stored = 0
-        self._padding = 0
         self._shown = False
+        self._points: Any = None
+        self._extent: Any = None
 
-    def write(self, time: Any, parts: Polylines, points: NDArray[np.float32], *, changed: bool, start: float) -> None:
-        """Write the line's points at a time, and show it."""
+    def begin(self, time: Any, parts: Polylines, *, start: float) -> IntArray:
+        """Show the line from a time on, with this many points in each part; return the vertices that it runs through."""
         from pxr import UsdGeom, Vt
 
         if not self._shown and not time.IsDefault() and time.GetValue() > start:
             self._set_visibility(UsdGeom.Tokens.inherited, time, start)
         length = sum(len(part) for part in parts)
-        if changed or not self._shown:
-            self._padding = 1 if length == self._stored else 0
-            counts = np.array([len(part) for part in parts], dtype=np.int32)
-            counts[-1] += self._padding
-            self._curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(counts), time)
-        rows = np.concatenate([*parts, parts[-1][-1:]] if self._padding else parts)
-        stored = np.ascontiguousarray(points[rows])
-        self._curves.CreatePointsAttr().Set(Vt.Vec3fArray.FromNumpy(stored), time)
-        self._curves.CreateExtentAttr().Set(Vt.Vec3fArray.FromNumpy(bounding_box(stored, self._margin)), time)
-        self._stored, self._shown = length + self._padding, True
+        padding = 1 if length == self._stored else 0
+        counts = np.array([len(part) for part in parts], dtype=np.int32)
+        counts[-1] += padding
+        self._curves.CreateCurveVertexCountsAttr().Set(Vt.IntArray.FromNumpy(counts), time)
+        self._stored, self._shown = length + padding, True
+        return np.concatenate([*parts, parts[-1][-1:]] if padding else parts)
+
+    def write(self, time: Any, points: NDArray[np.float32], box: NDArray[np.float32]) -> None:
+        """Write the line's points (#P by 3 [m]) at a time, and the box around it (2 by 3 [m])."""
+        from pxr import Vt
+
+        if self._points is None:
+            self._points, self._extent = self._curves.CreatePointsAttr(), self._curves.CreateExtentAttr()
+        self._points.Set(Vt.Vec3fArray.FromNumpy(points), time)
+        self._extent.Set(Vt.Vec3fArray.FromNumpy(box), time)
 
     def hide(self, time: Any, *, start: float) -> None:
         """Hide the line from a time on."""

@@ -22,7 +22,7 @@ from warpflat.surface.half_edges import border_edges
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
-    from matplotlib.collections import PolyCollection
+    from matplotlib.cm import ScalarMappable
     from matplotlib.figure import Figure
 
     from warpflat.flattening.result import Flattening
@@ -150,7 +150,7 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
     scales = _scales(fits, _ALIKE)
     limit = max(fit.limit for fit in fits)
     top = _TOP
-    drawn: dict[str, PolyCollection] = {}
+    drawn: dict[str, ScalarMappable] = {}
     shown_names = titles([result.surface.name for result in results], is_drawn)
     for result, height in zip(results, sheet.rows, strict=True):
         _write_row_label(figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15))
@@ -214,7 +214,7 @@ class _Sheet:
 
 def _draw_row(
     figure: Figure, sheet: _Sheet, result: Flattening, top: float, height: float, scales: dict[str, _Scale]
-) -> dict[str, PolyCollection]:
+) -> dict[str, ScalarMappable]:
     """Draw all maps of a piece side by side."""
     drawn = {}
     middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
@@ -230,7 +230,7 @@ def _draw_scales(
     figure: Figure,
     sheet: _Sheet,
     top: float,
-    drawn: dict[str, PolyCollection],
+    drawn: dict[str, ScalarMappable],
     scales: dict[str, _Scale],
     limit: float,
 ) -> None:
@@ -294,32 +294,34 @@ def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y
     figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
 
 
-def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> PolyCollection:
-    from matplotlib.collections import LineCollection, PolyCollection
+def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> ScalarMappable:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import Normalize
+
+    from warpflat.export.picture_faces import ColouredFaces
 
     fit, p = result.fit, result.positions
-    # A triangle with its last corner twice, so that all are one array: from a list every polygon is checked on its own.
-    polygons: Any = p[np.where(result.faces >= 0, result.faces, result.faces[:, 2:3])]
-    drawn = PolyCollection(
-        polygons,
-        array=MAPS[name][1] * getattr(fit, name),
-        cmap=scale.colours,
-        edgecolors="face",
-        linewidths=0.2,
-        clim=(scale.low, scale.high),
-        rasterized=True,
-    )
-    axis.add_collection(drawn)
-    lines = [p[np.asarray(line)] for line in result.network.surface.lines.values() if len(line) > 1]
-    axis.add_collection(LineCollection(lines, colors="#808080", linewidths=0.4))
-    axis.add_collection(LineCollection(list(p[border_edges(result.faces)]), colors="black", linewidths=0.9))
+    mappable = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
+    axis.add_artist(ColouredFaces(p, result.faces, MAPS[name][1] * getattr(fit, name), mappable))
+    axis.update_datalim(p)
+    for line in result.network.surface.lines.values():
+        _draw_segments(axis, p[np.stack([line[:-1], line[1:]], axis=1)], "#808080", 0.4)
+    _draw_segments(axis, p[border_edges(result.faces)], "black", 0.9)
     for misfit in fit.misfits if name in _LIMITED else ():
-        axis.add_collection(
-            LineCollection(list(p[border_edges(result.faces[misfit.faces])]), colors=_BEYOND, linewidths=0.7)
-        )
+        _draw_segments(axis, p[border_edges(result.faces[misfit.faces])], _BEYOND, 0.7)
     axis.set_aspect("equal")
     axis.set_axis_off()
-    return drawn
+    return mappable
+
+
+def _draw_segments(axis: Axes, segments: FloatArray, colour: str, width: float) -> None:
+    """Draw straight segments (#S by 2 by 2) as one path: a path each takes longer to set up than all of them to draw."""
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path as Outline
+
+    if len(segments):
+        path = Outline(segments.reshape(-1, 2), np.tile([Outline.MOVETO, Outline.LINETO], len(segments)))
+        axis.add_artist(PathPatch(path, fill=False, edgecolor=colour, linewidth=width, zorder=2))
 
 
 def _mark_limit(bar: Any, name: str, limit: float, scale: _Scale) -> None:

@@ -12,12 +12,12 @@ from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.garment.constraints import KeptGirth
 from warpflat.mannequin.layout import RING_LEVELS
 from warpflat.mannequin.profiles import convex_girth
+from warpflat.surface.half_edges import half_edges_of
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.layout import Layout
     from warpflat.mannequin.mannequin import Mannequin
-    from warpflat.mannequin.pieces import FormPiece
 
 __all__ = ["girth_constraints", "pattern_girths", "wearer_fit"]
 
@@ -110,7 +110,7 @@ def _level_edges(mannequin: Mannequin, form: FormResult, level: str) -> dict[str
     ring = np.column_stack([row, np.roll(row, -1)])
     side = form.vertices[ring[:, 1]] - form.vertices[ring[:, 0]]
     level_share = np.linalg.norm(side[:, [0, 2]], axis=1) / np.linalg.norm(side, axis=1)
-    ends = {name: _mesh_edges(piece) for name, piece in form.pieces.items()}
+    ends = {name: half_edges_of(piece.surface).edges for name, piece in form.pieces.items()}
     keys = {name: _edge_keys(layout, form.pieces[name].grid_vertices[own]) for name, own in ends.items()}
     shares = {name: np.zeros(len(own)) for name, own in ends.items()}
     for own_key, image_key, share in zip(
@@ -132,13 +132,6 @@ def _edge_keys(layout: Layout, edges: IntArray) -> NDArray[np.int64]:
     """Return one number for each edge of the grid (#E by 2), whichever way it runs."""
     low, high = np.sort(edges.astype(np.int64), axis=1).T
     return np.asarray(low * layout.vertex_count + high)
-
-
-def _mesh_edges(piece: FormPiece) -> IntArray:
-    """Return the edges of a piece's faces, #E by 2, each once."""
-    corners = piece.surface.faces
-    ends = np.sort(np.stack([corners, np.roll(corners, -1, axis=1)], -1).reshape(-1, 2), axis=1)
-    return np.unique(ends, axis=0)
 
 
 def _lengths(positions: FloatArray, edges: IntArray) -> FloatArray:

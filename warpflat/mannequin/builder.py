@@ -14,7 +14,7 @@ from warpflat.mannequin.leg_builder import set_legs
 from warpflat.mannequin.profiles import convex_girth, scale_to_girth
 from warpflat.mannequin.sheet import sheet_laplacian
 
-__all__ = ["build_vertices", "girth_ring", "quarter_fractions"]
+__all__ = ["build_trunk", "build_vertices", "girth_ring", "quarter_fractions"]
 
 # How strongly the sheet is drawn to the across-chest rows and centre lines, and to a scan, against one for its own
 # smoothness, on a grid of 10 mm. The operator shrinks with the square of the edge; a curve's and a sheet's count of
@@ -24,15 +24,27 @@ _ATTRACT = 0.25
 _ATTRACT_ROUNDS = 4
 
 
-def build_vertices(layout: Layout, blueprint: Blueprint) -> FloatArray:
+def build_trunk(layout: Layout, blueprint: Blueprint) -> FloatArray:
+    """Return the grid's vertices with the rings up to the bust and the legs in their places (layout.vertex_count by 3 [m]), others NaN."""
+    vertices = np.full((layout.vertex_count, 3), np.nan)
+    _set_rings(vertices, layout, blueprint)
+    set_legs(vertices, layout, blueprint.legs)
+    return vertices
+
+
+def build_vertices(layout: Layout, blueprint: Blueprint, trunk: FloatArray | None = None) -> FloatArray:
     """Return the grid's vertices on a body.
+
+    Args:
+        layout: the grid.
+        blueprint: the body.
+        trunk: of :func:`build_trunk`, if it is there; shoulders and arms do not change it.
 
     Returns:
         layout.vertex_count by 3, positions [m].
     """
-    vertices = np.full((layout.vertex_count, 3), np.nan)
-    _set_rings(vertices, layout, blueprint)
-    set_legs(vertices, layout, blueprint.legs)
+    vertices = build_trunk(layout, blueprint) if trunk is None else trunk.copy()
+    _dip_sides(vertices, layout, blueprint)
     _set_bounds(vertices, layout, blueprint)
     _set_sides(vertices, layout)
     _set_arms(vertices, layout, blueprint)
@@ -92,7 +104,6 @@ def _set_rings(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> No
             share = (row - first) / (last - first)
             height = (1.0 - share) * blueprint.heights[low] + share * blueprint.heights[high]
             vertices[layout.rings[row]] = girth_ring(layout, blueprint.profile(height), height)
-    _dip_sides(vertices, layout, blueprint)
 
 
 def _dip_sides(vertices: FloatArray, layout: Layout, blueprint: Blueprint) -> None:

@@ -14,7 +14,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.core.polyline import polyline_length
 from warpflat.mannequin.bricks import Brick, brick, select_bricks
-from warpflat.mannequin.builder import build_vertices
+from warpflat.mannequin.builder import build_trunk, build_vertices
 from warpflat.mannequin.layout import ARM_LEVELS, LEG_LINES, RING_LEVELS, Layout, make_layout
 from warpflat.mannequin.measurements import Measurements, measurements_from_size, measurements_from_values
 from warpflat.mannequin.nearest_size import SizeDifference, difference_to_size, nearest_size
@@ -133,8 +133,9 @@ class Mannequin:
         lengths = dict(measurements.lengths)
         before: dict[str, tuple[float, float]] = {}
         blueprint = blueprint_from_measurements(measurements)
+        trunk = build_trunk(layout, blueprint)
         for _ in range(_ROUNDS):
-            vertices = build_vertices(layout, replace_chest(blueprint, replace(measurements, lengths=lengths)))
+            vertices = build_vertices(layout, replace_chest(blueprint, replace(measurements, lengths=lengths)), trunk)
             worst = 0.0
             for name, line in wished.items():
                 found = polyline_length(vertices[layout.lines[line]])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.curves import Curve
 
 __all__ = ["REACH", "STRAY", "end_direction", "turned_end"]
@@ -63,7 +63,7 @@ def turned_end(curve: Curve, turn: float, reach: float, *, keep_length: bool) ->
     return result, float(np.abs(_move(slope, back, stretch.reach, np.linspace(0.0, 1.0, 101))[0]).max())
 
 
-def _move(slope: float, back: float, reach: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _move(slope: float, back: float | FloatArray, reach: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return the move along the normal [m] at shares of the reach, and its derivative by length."""
     move = reach * slope * u * (1 - u) ** 2 * (1 - back * u)
     rate = slope * ((1 - u) * (1 - 3 * u) * (1 - back * u) - back * u * (1 - u) ** 2)
@@ -119,9 +119,7 @@ class _Stretch:
     def moved(self, slope: float, back: float, u: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return moved places (#U by 2 [m]) at shares of the reach, and their derivatives by length."""
         length = u * self.reach
-        place, tangent = (_interpolated(length, self._arc, values) for values in (self._place, self._tangent))
-        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
-        normal = np.column_stack([-tangent[:, 1], tangent[:, 0]])
+        place, normal, tangent = self._frame(u)
         move, rate = _move(slope, back, self.reach, u)
         step = 1e-4
         ahead, behind = (
@@ -131,10 +129,19 @@ class _Stretch:
         bend = np.einsum("ij,ij->i", ahead - behind, normal) / width
         return place + move[:, None] * normal, (1 - bend * move)[:, None] * tangent + rate[:, None] * normal
 
+    def _frame(self, u: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return places (#U by 2 [m]) at shares of the reach, and the unit normals and tangents there."""
+        place, tangent = (_interpolated(u * self.reach, self._arc, values) for values in (self._place, self._tangent))
+        tangent /= np.linalg.norm(tangent, axis=1)[:, None]
+        return place, np.column_stack([-tangent[:, 1], tangent[:, 0]]), tangent
+
     def bend_back(self, slope: float) -> float:
         """Return the bend back that keeps the length best, the least of those that keep it within 0.02 mm."""
         u = np.linspace(0.0, 1.0, POINTS + 1)
-        change = np.array([polyline_length(self.moved(slope, back, u)[0]) - self.reach for back in BENDS_BACK])
+        place, normal, _ = self._frame(u)
+        move, _ = _move(slope, BENDS_BACK[:, None], self.reach, u)
+        step = np.diff(place + move[..., None] * normal, axis=1)
+        change = np.sqrt((step**2).sum(axis=2)).cumsum(axis=1)[:, -1] - self.reach
         kept = np.flatnonzero(np.abs(change) < 2e-5)
         return float(BENDS_BACK[kept[0] if len(kept) else np.abs(change).argmin()])
 

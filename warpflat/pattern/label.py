@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Generic, TypeVar
 
 import numpy as np
 
@@ -17,6 +17,8 @@ from warpflat.pattern.words import translate
 
 if TYPE_CHECKING:
     from shapely import Geometry, Polygon
+
+Item = TypeVar("Item")
 
 __all__ = [
     "LEADING",
@@ -203,11 +205,13 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
     import shapely
 
     parts = sorted((p for p in shapely.get_parts(area) if p.geom_type == "Polygon"), key=lambda p: -p.area)[:6]
-    places = list(_roomy_places([part for part in parts if part.area > 1e-7]))
+    places = _Remembered(_roomy_places([part for part in parts if part.area > 1e-7]))
     best, reached = None, 0.0
     for label, penalty in _wrapped_labels(tuple(lines)):
         shape = np.asarray(shapely.MultiPoint(_corners(label)).convex_hull.exterior.coords)
         for part, at, angle in places:
+            if reached >= 1.0:  # most often at the first place
+                break
             penalty_here = penalty * (TURNED if angle else 1.0)
             factor = _largest_factor(part, shape @ _rotation(angle).T, at, max(least, reached * penalty_here * 1.001))
             if factor > 0.0:
@@ -215,6 +219,19 @@ def fit_label(area: Geometry, lines: Sequence[tuple[str, float]], *, least: floa
         if reached >= 1.0:
             break
     return best
+
+
+class _Remembered(Generic[Item]):
+    """The items of an iterator, made when they are first asked for."""
+
+    def __init__(self, items: Iterator[Item]) -> None:
+        self._known, self._more = list[Item](), items
+
+    def __iter__(self) -> Iterator[Item]:
+        yield from self._known
+        for item in self._more:
+            self._known.append(item)
+            yield item
 
 
 def _wrapped_labels(lines: tuple[tuple[str, float], ...]) -> Iterator[tuple[Label, float]]:

@@ -8,7 +8,7 @@ nesting. Several orders are tried; the same input always gives the same result, 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -66,6 +66,16 @@ class _Grid:
     per_tile: tuple[int, int]
     shared: tuple[int, int]
     tiles: tuple[int, int]
+    _touched: dict[int, FloatArray] = field(default_factory=dict)
+
+    def touched(self, mask: Mask) -> FloatArray:
+        """Return which tiles a mask touches (1, else 0), by the cell of a tile where it starts and the tile: down and across."""
+        if id(mask) not in self._touched:
+            rows, columns = (
+                _blocks(mask.cells.shape[axis], self.per_tile[axis], self.shared[axis]) for axis in range(2)
+            )
+            self._touched[id(mask)] = _covered(mask.cells, rows, columns).astype(np.float64)
+        return self._touched[id(mask)]
 
 
 def nest_on_tiles(
@@ -189,7 +199,7 @@ def _lay(
         for mask in masks[k]:
             if (np.array(mask.cells.shape) > sheet.occupied.shape).any():
                 continue
-            price = _prices(mask.cells, used, grid, sheet.free(mask))
+            price = _prices(mask, used, grid, sheet.free(mask))
             row, column = divmod(int(np.argmin(price)), price.shape[1])
             if np.isfinite(price[row, column]) and (best is None or price[row, column] < best[0] - 1e-9):
                 best = float(price[row, column]), mask, row, column
@@ -202,20 +212,15 @@ def _lay(
     return float(used.sum()) + spread, [places[k] for k in range(len(masks))]
 
 
-def _prices(cells: BoolArray, used: BoolArray, grid: _Grid, free: BoolArray) -> FloatArray:
+def _prices(mask: Mask, used: BoolArray, grid: _Grid, free: BoolArray) -> FloatArray:
     """Return for every place of a mask how many new tiles it takes, and a little for rows, columns and distance."""
-    (per_row, per_column), (tile_rows, tile_columns) = grid.per_tile, grid.tiles
+    (per_row, per_column), tile_rows = grid.per_tile, grid.tiles[0]
     down, across = free.shape
-    over_rows = _blocks(cells.shape[0], per_row, grid.shared[0])
-    over_columns = _blocks(cells.shape[1], per_column, grid.shared[1])
-    touched = _covered(cells, over_rows, over_columns)
-    new = np.where(used, 0.0, 1.0)
-    price = np.zeros((tile_rows + 1, per_row, tile_columns + 1, per_column))
-    padded = np.pad(new, ((0, touched.shape[1] + 1), (0, touched.shape[3] + 1)))
-    for i in range(touched.shape[1]):
-        for j in range(touched.shape[3]):
-            window = padded[i : i + tile_rows + 1, j : j + tile_columns + 1]
-            price += touched[:, i, :, j][None, :, None, :] * window[:, None, :, None]
+    touched, cells = grid.touched(mask), mask.cells
+    over = touched.shape[1], touched.shape[3]
+    new = np.pad(np.where(used, 0.0, 1.0), ((0, over[0]), (0, over[1])))
+    windows = np.lib.stride_tricks.sliding_window_view(new, over)  # by the tile where a mask starts
+    price = np.tensordot(windows, touched, axes=([2, 3], [1, 3])).transpose(0, 2, 1, 3)
     flat = price.reshape((tile_rows + 1) * per_row, -1)[:down, :across]
     r, c = np.arange(down)[:, None], np.arange(across)[None, :]
     # Among places that take equally few tiles: a compact sheet, and the upper left.
