@@ -7,7 +7,7 @@ to step (`warpflat.solver.smoother`). `coefficients`, an array of one vec3d, hol
 
 import warp as wp
 
-from .cells import Cells
+from .cells import ACTING, CellForces, Cells
 from .indices import natural
 from .springs import Springs, spring_forces_on
 
@@ -31,6 +31,35 @@ class Bonds:
     freedom: wp.array(dtype=wp.vec2d)
 
 
+@wp.struct
+class BondForces:
+    """The bonds' forces and viscosities [N], and their stiffnesses [N/m], as `constraints.evaluate_seams` has them."""
+
+    force: wp.array(dtype=wp.vec2d)
+    viscosity: wp.array(dtype=wp.vec2d)
+    stiffness: wp.array(dtype=wp.float64)
+
+
+@wp.struct
+class VertexForces:
+    """What `gather_forces` finds at each vertex, #V.
+
+    force: F [N]. power: F.v / K [m2/s]. driving_force: F~ [N], not written without viscosity, where it is F.
+    first_guess: F~ h / (m + h^2 K) [m/s]. stiffness: K, the springs' and the cells' around the vertex [N/m].
+    anchor, reach: how far from where it may move until all faces are evaluated again [m].
+    guarded: 1 where a face around it acts.
+    """
+
+    force: wp.array(dtype=wp.vec2d)
+    power: wp.array(dtype=wp.float64)
+    driving_force: wp.array(dtype=wp.vec2d)
+    first_guess: wp.array(dtype=wp.vec2d)
+    stiffness: wp.array(dtype=wp.float64)
+    anchor: wp.array(dtype=wp.vec2d)
+    reach: wp.array(dtype=wp.float64)
+    guarded: wp.array(dtype=wp.int8)
+
+
 @wp.kernel
 def gather_forces(
     position: wp.array(dtype=wp.vec2d),
@@ -39,84 +68,67 @@ def gather_forces(
     spring_stiffness: wp.array(dtype=wp.float64),
     springs: Springs,
     cells: Cells,
-    face_acting: wp.array(dtype=wp.int8),
-    face_clearance: wp.array(dtype=wp.float64),
-    face_force: wp.array(dtype=wp.vec2d),
-    face_viscosity: wp.array(dtype=wp.vec2d),
-    face_stiffness: wp.array(dtype=wp.float64),
+    cell_forces: CellForces,
     bonds: Bonds,
-    bond_force: wp.array(dtype=wp.vec2d),
-    bond_viscosity: wp.array(dtype=wp.vec2d),
-    bond_stiffness: wp.array(dtype=wp.float64),
+    bond_forces: BondForces,
     load: wp.array(dtype=wp.vec2d),
     time_step: wp.float64,
     coefficients: wp.array(dtype=wp.vec3d),
-    check_all: int,
+    scope: int,
     first: int,
     # outputs
-    force: wp.array(dtype=wp.vec2d),
-    power: wp.array(dtype=wp.float64),
-    driving_force: wp.array(dtype=wp.vec2d),
-    first_guess: wp.array(dtype=wp.vec2d),
-    stiffness: wp.array(dtype=wp.float64),
-    anchor: wp.array(dtype=wp.vec2d),
-    reach: wp.array(dtype=wp.float64),
-    guarded: wp.array(dtype=wp.int8),
+    out: VertexForces,
 ):
     """Gather the force on each vertex, F~ = F + h sum k_ij (v_j - v_i) with viscosity, and eq. (9)'s neighbour term.
 
-    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. face_*: as `cells.evaluate_guard`.
-    bond_*: as `constraints.evaluate_seams`. load: #V, constant forces [N]. check_all: 1 where all faces have been
-    evaluated at these positions, 0 where only those that act were; then anchor, reach and guarded stay what they were.
-    force F [N], power F.v / K [m2/s], driving_force F~ [N], not written without viscosity, where it is F, first_guess
-    F~ h / (m + h^2 K) [m/s], stiffness K: the springs' and the cells' around the vertex [N/m], anchor and reach: how
-    far from where it may move until all faces are evaluated again [m], guarded: 1 where a face around it acts. All #V.
+    position [m], velocity [m/s], mass [kg], spring_stiffness sum_j k_ij [N/m]: #V. load: #V, constant forces [N].
+    scope: that in which the cells were evaluated at these positions; with ACTING anchor, reach and guarded stay what they were.
     """
     i = natural(wp.tid() + first)
     viscosity = coefficients[0][0]
     total, driving = spring_forces_on(i, position, velocity, springs, time_step, viscosity != wp.float64(0.0))
     total += load[i]
     k = spring_stiffness[i]
-    if check_all != 0:
+    if scope != ACTING:
         height = wp.float64(wp.inf)
         acting = wp.int8(0)
         e = natural(cells.offset[i])
         end = cells.offset[i + 1]
         while e < end:
             face = natural(cells.slot[e]) / 4
-            height = wp.min(height, face_clearance[face])
-            acting = wp.max(acting, face_acting[face])
+            height = wp.min(height, cell_forces.clearance[face])
+            acting = wp.max(acting, cell_forces.acting[face])
             e += 1
-        anchor[i] = position[i]
-        reach[i] = STEP_SHARE * height
-        guarded[i] = acting
-    if guarded[i] != wp.int8(0):
+        out.anchor[i] = position[i]
+        out.reach[i] = STEP_SHARE * height
+        out.guarded[i] = acting
+    if out.guarded[i] != wp.int8(0):
         e = natural(cells.offset[i])
         end = cells.offset[i + 1]
         while e < end:
             slot = natural(cells.slot[e])
-            if face_acting[slot / 4] != wp.int8(0):
-                total += face_force[slot]
-                k += face_stiffness[slot]
+            if cell_forces.acting[slot / 4] != wp.int8(0):
+                total += cell_forces.force[slot]
+                k += cell_forces.stiffness[slot]
                 if viscosity != wp.float64(0.0):
-                    driving += face_viscosity[slot]
+                    driving += cell_forces.viscosity[slot]
             e += 1
     b = natural(bonds.offset[i])
     end = bonds.offset[i + 1]
     while b < end:
         bond = natural(bonds.slot[b])
-        total += bond_force[bond]
-        driving += bond_viscosity[bond]
-        k += bond_stiffness[bond]
+        total += bond_forces.force[bond]
+        driving += bond_forces.viscosity[bond]
+        k += bond_forces.stiffness[bond]
         b += 1
     total = wp.cw_mul(total, bonds.freedom[i])
     driving = wp.cw_mul(driving, bonds.freedom[i]) * viscosity + total
-    force[i] = total
-    power[i] = wp.dot(total, velocity[i]) / k
+    out.force[i] = total
+    out.power[i] = wp.dot(total, velocity[i]) / k
     if viscosity != wp.float64(0.0):
-        driving_force[i] = driving
-    first_guess[i] = driving * (time_step / (mass[i] + time_step * time_step * k))
-    stiffness[i] = k
+        out.driving_force[i] = driving
+    out.first_guess[i] = driving * (time_step / (mass[i] + time_step * time_step * k))
+    out.stiffness[i] = k
 
 
 @wp.func
@@ -191,12 +203,7 @@ def advance(
     mass: wp.array(dtype=wp.float64),
     springs: Springs,
     bonds: Bonds,
-    force: wp.array(dtype=wp.vec2d),
-    driving_force: wp.array(dtype=wp.vec2d),
-    first_guess: wp.array(dtype=wp.vec2d),
-    stiffness: wp.array(dtype=wp.float64),
-    anchor: wp.array(dtype=wp.vec2d),
-    reach: wp.array(dtype=wp.float64),
+    at: VertexForces,
     time_step: wp.float64,
     coefficients: wp.array(dtype=wp.vec3d),
     first: int,
@@ -215,19 +222,19 @@ def advance(
     s = natural(springs.offset[i])
     end = springs.offset[i + 1]
     while s < end:
-        coupling += springs.stiffness[s] * first_guess[natural(springs.neighbor[s])]
+        coupling += springs.stiffness[s] * at.first_guess[natural(springs.neighbor[s])]
         s += 1
-    driving = force[i]
+    driving = at.force[i]
     if coefficients[0][0] != wp.float64(0.0):
-        driving = driving_force[i]
+        driving = at.driving_force[i]
     h2 = time_step * time_step
-    dv = (driving * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * stiffness[i])
+    dv = (driving * time_step + h2 * wp.cw_mul(coupling, bonds.freedom[i])) / (mass[i] + h2 * at.stiffness[i])
     v = velocity[i] * coefficients[0][1] + dv * coefficients[0][2]
     here = position[i]
-    away = here - anchor[i] + v * time_step
+    away = here - at.anchor[i] + v * time_step
     distance = wp.length(away)
-    if distance > reach[i]:
-        v = (anchor[i] - here + away * (reach[i] / distance)) / time_step
+    if distance > at.reach[i]:
+        v = (at.anchor[i] - here + away * (at.reach[i] / distance)) / time_step
     velocity[i] = v
     position[i] = here + v * time_step
 

@@ -17,11 +17,15 @@ palms of cloth.
 import warp as wp
 
 from .cells import (
+    ACTING,
+    CellForces,
     Cells,
     across,
+    add_to_corners,
     cell_corner,
     cell_places,
     cell_weight,
+    clear_corners,
     combined,
     count_cells,
     edge_matrix,
@@ -209,14 +213,10 @@ def evaluate_membrane(
     cloth: Cloth,
     time_step: wp.float64,
     coefficients: wp.array(dtype=wp.vec3d),
-    check_all: int,
+    scope: int,
     first: int,
     # outputs
-    acting: wp.array(dtype=wp.int8),
-    clearance: wp.array(dtype=wp.float64),
-    force: wp.array(dtype=wp.vec2d),
-    viscosity: wp.array(dtype=wp.vec2d),
-    stiffness: wp.array(dtype=wp.float64),
+    out: CellForces,
 ):
     """Compute the forces of the membrane, minus the gradient of (flat area) psi, and its stiffness beyond the matrix.
 
@@ -229,13 +229,11 @@ def evaluate_membrane(
     With the k_ij, which are as stiff in every direction as the threads are, soft cloth would lose its momentum and
     creep.
 
-    position: #V [m]. velocity: #V [m/s]. coefficients, check_all: as in `cells.evaluate_guard`. acting: #F, 0 where all
-    cells are mirrored; there the last three are not written, and a mirrored cell adds nothing to them.
-    clearance: #F, the least height of the face's cells in the plane [m], 0 once one is mirrored. force, viscosity: 4
-    #F, at the faces' corners [N]. stiffness: 4 #F [N/m].
+    position: #V [m]. velocity: #V [m/s]. coefficients, scope: as in `guard.evaluate_guard`. out: a face acts unless all of its
+    cells are mirrored; a mirrored cell adds nothing.
     """
     f = natural(wp.tid() + first)
-    if check_all == 0 and acting[f] == wp.int8(0):
+    if scope == ACTING and out.acting[f] == wp.int8(0):
         return
     face = cells.face[f]
     begin = natural(cells.first[f])
@@ -252,11 +250,7 @@ def evaluate_membrane(
         least = wp.min(least, det / wp.max(wp.sqrt(longest_square(D)), TINY))
         if det > wp.float64(0.0):
             if acts == 0:
-                for corner_slot in range(4):
-                    force[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
-                    stiffness[slot + corner_slot] = wp.float64(0.0)
-                    if viscous:
-                        viscosity[slot + corner_slot] = wp.vec2d(wp.float64(0.0), wp.float64(0.0))
+                clear_corners(out, slot, viscous)
             acts = 1
             inv = wp.inverse(D)
             F = laid_edges(cells.laid[natural(begin + k)]) * inv
@@ -277,14 +271,8 @@ def evaluate_membrane(
             )
             # d(area psi)/dD = area (psi I - F^T P) D^-T; forces are minus its columns.
             inv_t = wp.transpose(inv)
-            G = (inv_t * psi - wp.transpose(F) * P * inv_t) * area
-            f1 = wp.vec2d(-G[0, 0], -G[1, 0])
-            f2 = wp.vec2d(-G[0, 1], -G[1, 1])
+            pull = (wp.transpose(F) * P * inv_t - inv_t * psi) * area
             at = cell_places(face, k)
-            force[slot + at[0]] -= f1 + f2
-            force[slot + at[1]] += f1
-            force[slot + at[2]] += f2
-
             q = thread_bounds(F, worn_warp, worn_weft, e, gamma, cloth)
             w1 = wp.vec2d(inv[0, 0], inv[0, 1])
             w2 = wp.vec2d(inv[1, 0], inv[1, 1])
@@ -295,9 +283,12 @@ def evaluate_membrane(
             k0 = area * pair_bound(w0, w0, warp, weft, q, psi)
             k1 = area * pair_bound(w1, w1, warp, weft, q, psi)
             k2 = area * pair_bound(w2, w2, warp, weft, q, psi)
-            stiffness[slot + at[0]] += two * wp.max(k0 - cloth.held[held], none)
-            stiffness[slot + at[1]] += two * wp.max(k1 - cloth.held[held + 1], none)
-            stiffness[slot + at[2]] += two * wp.max(k2 - cloth.held[held + 2], none)
+            beyond = wp.vec3d(
+                two * wp.max(k0 - cloth.held[held], none),
+                two * wp.max(k1 - cloth.held[held + 1], none),
+                two * wp.max(k2 - cloth.held[held + 2], none),
+            )
+            add_to_corners(out, slot, at, pull, beyond)
             if viscous:
                 # v changes F by -F A, with A the gradient of v in the plane.
                 a1 = velocity[corner[1]] - velocity[corner[0]]
@@ -315,12 +306,12 @@ def evaluate_membrane(
                 V = (R * inv_t) * (area * time_step)
                 d1 = wp.vec2d(V[0, 0], V[1, 0])
                 d2 = wp.vec2d(V[0, 1], V[1, 1])
-                viscosity[slot + at[0]] -= d1 + d2
-                viscosity[slot + at[1]] += d1
-                viscosity[slot + at[2]] += d2
+                out.viscosity[slot + at[0]] -= d1 + d2
+                out.viscosity[slot + at[1]] += d1
+                out.viscosity[slot + at[2]] += d2
         k += 1
-    acting[f] = wp.int8(acts)
-    clearance[f] = least
+    out.acting[f] = wp.int8(acts)
+    out.clearance[f] = least
 
 
 @wp.kernel

@@ -9,7 +9,7 @@ import time
 import numpy as np
 import pytest
 import warp as wp
-from warpflat.kernels.cells import compute_guard_energy
+from warpflat.kernels.guard import compute_guard_energy
 
 from warpflat.core.errors import InputError
 from warpflat.core.launch import Launch, Sequence, record, split_range

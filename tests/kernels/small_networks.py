@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import warp as wp
 from devices import DEVICE
 from numpy.typing import NDArray
-from warpflat.kernels.cells import compute_guard_energy, evaluate_guard
-from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
+from warpflat.kernels.cells import ALL, CellForces
+from warpflat.kernels.guard import compute_guard_energy, evaluate_guard
+from warpflat.kernels.implicit import BondForces, VertexForces, advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 
 from warpflat.fabric.fabric import Fabric
@@ -58,6 +60,14 @@ def zeros(count: int, dtype: type = wp.float64) -> wp.array:
     return wp.zeros(count, dtype=dtype, device=DEVICE)
 
 
+def filled(struct: Any, arrays: dict[str, wp.array]) -> Any:
+    """A struct of arrays, each given by its name."""
+    made = struct()
+    for name in struct.vars:
+        setattr(made, name, arrays[name])
+    return made
+
+
 @dataclass
 class Launched:
     """The kernels of one step, launched one by one in as many pieces as asked for; every output kept.
@@ -70,7 +80,7 @@ class Launched:
     velocities: NDArray[np.float64] | None = None
     time_step: float = 0.01
     pieces: int = 1
-    check_all: int = 1
+    scope: int = ALL
     coefficients: tuple[float, float, float] = IMPLICIT_STEP
     arrays: dict[str, wp.array] = field(default_factory=dict)
 
@@ -109,14 +119,16 @@ class Launched:
         given |= {
             "bonds": getattr(self.network, "bonds", None),
             "time_step": self.time_step,
-            "check_all": self.check_all,
+            "scope": self.scope,
         }
         # no seam binds this network
-        given |= {"bond_force": zeros(0, wp.vec2d), "bond_viscosity": zeros(0, wp.vec2d), "bond_stiffness": zeros(0)}
+        bonds = {"force": zeros(0, wp.vec2d), "viscosity": zeros(0, wp.vec2d), "stiffness": zeros(0)}
+        of_faces = {name[5:]: array for name, array in self.arrays.items() if name.startswith("face_")}
+        cell_forces, vertex_forces = filled(CellForces, of_faces), filled(VertexForces, self.arrays)
+        given |= {"cell_forces": cell_forces, "bond_forces": filled(BondForces, bonds), "at": vertex_forces}
         given |= {"load": zeros(self.network.vertex_count, wp.vec2d)}
         given |= self.arrays
-        if per_face:
-            given |= {name[5:]: array for name, array in self.arrays.items() if name.startswith("face_")}
+        given |= {"out": vertex_forces} if not per_face else {"out": cell_forces, "energy": self.arrays["face_energy"]}
         names = [argument.label for argument in kernel.adj.args]
         for first, last in pairwise(np.linspace(0, count, self.pieces + 1).astype(int).tolist()):
             wp.launch(

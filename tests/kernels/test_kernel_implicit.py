@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from small_networks import Launched, corner_vertices, shaken, small_network
+from warpflat.kernels.cells import ACTING, ALL
 
 SHARE = 0.4
 
@@ -106,7 +107,7 @@ def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_it
     assert not idle.all()
     reach, anchor, clearance = at["reach"], at["anchor"], at["face_clearance"]
     assert np.array_equal(anchor, at["position"])
-    at.check_all = 0
+    at.scope = ACTING
     for _ in range(5):
         at.advance()
         away = np.linalg.norm(at["position"] - anchor, axis=1)
@@ -117,7 +118,7 @@ def test_between_two_looks_only_acting_cells_are_evaluated_and_nothing_leaves_it
         assert np.array_equal(at["anchor"], anchor)
         assert np.array_equal(at["reach"], reach)
     assert away.max() > 0.5 * reach.max()
-    at.check_all = 1
+    at.scope = ALL
     assert (at.evaluate_guard()["face_clearance"] > 0).all()
 
 
@@ -125,7 +126,7 @@ def test_two_looks_at_one_layout_give_the_same_forces():
     network = small_network()
     at = Launched(network, shaken(network, scale=0.8)).evaluate_guard().gather_forces()
     whole = {name: at[name] for name in ("force", "driving_force", "stiffness", "first_guess")}
-    at.check_all = 0
+    at.scope = ACTING
     at.evaluate_guard().gather_forces()
     for name, values in whole.items():
         assert np.array_equal(at[name], values), name

@@ -275,8 +275,10 @@ class Relaxation:
         return np.stack([cells, np.zeros_like(cells), kinetic], axis=1)
 
     def forces(self) -> FloatArray:
-        """Return the forces of the cloth and its seams in the present layout at rest, #V by 2 [N]."""
-        self.evaluate_at_rest()
+        """Return the forces of the cloth and its seams in the present layout at rest, #V by 2 [N]; no step may follow."""
+        self.velocity.zero_()
+        self._buffers.set_coefficients(IMPLICIT_STEP_AT_REST)
+        self._buffers.evaluate_forces_alone.launch()
         return self.cloth_force()
 
     def cloth_force(self) -> FloatArray:

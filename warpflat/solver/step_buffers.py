@@ -18,8 +18,9 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.launch import Launch, record
 from warpflat.core.launch import Sequence as LaunchSequence
 from warpflat.core.sums import range_offsets
+from warpflat.kernels.cells import ACTING, ALL, FORCES_ALONE, CellForces
 from warpflat.kernels.constraints import evaluate_seams
-from warpflat.kernels.implicit import advance, compute_kinetic_energy, gather_forces, stop
+from warpflat.kernels.implicit import BondForces, VertexForces, advance, compute_kinetic_energy, gather_forces, stop
 from warpflat.kernels.line_solve import move_along_lines, solve_lines
 from warpflat.kernels.springs import compute_spring_energy, compute_spring_tension
 from warpflat.model.network import SpringNetwork
@@ -103,21 +104,36 @@ class StepBuffers:
         if not self.network.device.is_cpu:
             self.coefficients.assign(values)
 
-    def _cells(self, check_all: int) -> Launch:
-        """Record the forces on the cells, of all faces (1) or of those in which the guard acts (0)."""
+    @cached_property
+    def _cell_forces(self) -> CellForces:
+        made = CellForces()
+        made.acting, made.clearance = self.face_acting, self.face_clearance
+        made.force, made.viscosity, made.stiffness = self.face_force, self.face_viscosity, self.face_stiffness
+        return made
+
+    @cached_property
+    def _bond_forces(self) -> BondForces:
+        made = BondForces()
+        made.force, made.viscosity, made.stiffness = self.seam_force, self.seam_viscosity, self.seam_stiffness
+        return made
+
+    @cached_property
+    def _vertex_forces(self) -> VertexForces:
+        made = VertexForces()
+        made.force, made.power, made.driving_force = self.force, self.power, self.driving_force
+        made.first_guess, made.stiffness = self.first_guess, self.stiffness
+        made.anchor, made.reach, made.guarded = self.anchor, self.reach, self.guarded
+        return made
+
+    def _cells(self, scope: int) -> Launch:
+        """Record the forces of the cells in a scope (`kernels.cells`)."""
         net = self.network
         kernel, _, parameters = net.cell_model
         return record(
             kernel,
             dim=net.face_count,
-            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.coefficients, check_all],
-            outputs=[
-                self.face_acting,
-                self.face_clearance,
-                self.face_force,
-                self.face_viscosity,
-                self.face_stiffness,
-            ],
+            inputs=[self.position, self.velocity, net.cells, parameters, self.time_step, self.coefficients, scope],
+            outputs=[self._cell_forces],
             device=net.device,
             turns=_TURNS,
         )
@@ -137,8 +153,8 @@ class StepBuffers:
             )
         ]
 
-    def _gather(self, check_all: int) -> Launch:
-        """Record the forces on the vertices, after all faces (1) or only those in which the guard acts (0)."""
+    def _gather(self, scope: int) -> Launch:
+        """Record the forces on the vertices, after the cells were evaluated in a scope."""
         net = self.network
         return record(
             gather_forces,
@@ -150,30 +166,15 @@ class StepBuffers:
                 net.spring_stiffness,
                 net.springs,
                 net.cells,
-                self.face_acting,
-                self.face_clearance,
-                self.face_force,
-                self.face_viscosity,
-                self.face_stiffness,
+                self._cell_forces,
                 net.bonds,
-                self.seam_force,
-                self.seam_viscosity,
-                self.seam_stiffness,
+                self._bond_forces,
                 self.load,
                 self.time_step,
                 self.coefficients,
-                check_all,
+                scope,
             ],
-            outputs=[
-                self.force,
-                self.power,
-                self.driving_force,
-                self.first_guess,
-                self.stiffness,
-                self.anchor,
-                self.reach,
-                self.guarded,
-            ],
+            outputs=[self._vertex_forces],
             device=net.device,
             turns=_TURNS,
         )
@@ -181,16 +182,21 @@ class StepBuffers:
     @cached_property
     def evaluate(self) -> LaunchSequence:
         """The forces, after a check of all faces."""
-        return LaunchSequence([self._cells(1), *self._seams, self._gather(1)])
+        return LaunchSequence([self._cells(ALL), *self._seams, self._gather(ALL)])
+
+    @cached_property
+    def evaluate_forces_alone(self) -> LaunchSequence:
+        """The forces, after a check of all faces, without what steps need besides."""
+        return LaunchSequence([self._cells(FORCES_ALONE), *self._seams, self._gather(FORCES_ALONE)])
 
     @cached_property
     def _gather_guarded(self) -> Launch:
-        return self._gather(0)
+        return self._gather(ACTING)
 
     @cached_property
     def evaluate_guarded(self) -> LaunchSequence:
         """The forces, with the guard only where it acted at the last check."""
-        return LaunchSequence([self._cells(0), *self._seams, self._gather_guarded])
+        return LaunchSequence([self._cells(ACTING), *self._seams, self._gather_guarded])
 
     @cached_property
     def evaluate_unguarded(self) -> LaunchSequence:
@@ -208,12 +214,7 @@ class StepBuffers:
                 net.mass,
                 net.springs,
                 net.bonds,
-                self.force,
-                self.driving_force,
-                self.first_guess,
-                self.stiffness,
-                self.anchor,
-                self.reach,
+                self._vertex_forces,
                 self.time_step,
                 self.coefficients,
             ],

@@ -28,8 +28,8 @@ __all__ = [
     "overlap_area",
 ]
 
-# Edges of a border are looked for in runs of this many, whose bounding boxes are compared first.
-_RUN = 8
+# The direction in which a line sweeps across border edges: aslant, since sides of pieces are upright or level.
+_SWEEP = np.array([0.83, 0.56])
 # Two edges lie on both sides of one cut if at least this share of the border between them belongs to its sides.
 _CUT_SHARE = 0.5
 # A smaller overlap, as a share of the area, may be a rounding error.
@@ -92,15 +92,20 @@ def near_edges(edges: BorderEdges, positions: FloatArray, reach: float) -> tuple
     """Return pairs i < j of border edges of one component whose bounding boxes come within `reach` [m] of each other."""
     a, b = positions[edges.tail], positions[edges.head]
     low, high = np.minimum(a, b) - 0.5 * reach, np.maximum(a, b) + 0.5 * reach
-    begin = np.arange(0, len(a), _RUN)
-    run_low, run_high = np.minimum.reduceat(low, begin), np.maximum.reduceat(high, begin)
-    p, q = np.nonzero(np.triu(_boxes_meet(run_low[:, None], run_high[:, None], run_low, run_high)))
-    within = np.arange(_RUN)
-    i, j = np.broadcast_arrays((begin[p, None] + within)[:, :, None], (begin[q, None] + within)[:, None, :])
-    pairs = (i < j) & (j < len(a))
-    i, j = i[pairs], j[pairs]
-    meet = _boxes_meet(low[i], high[i], low[j], high[j]) & (edges.component[i] == edges.component[j])
-    return i[meet], j[meet]
+    # A line sweeps across the boxes.
+    begin = low @ _SWEEP
+    order = np.argsort(begin, kind="stable")
+    passed = np.searchsorted(begin[order], (high @ _SWEEP)[order], side="right")
+    at = np.arange(len(order))
+    count = passed - at - 1
+    i = np.repeat(at, count)
+    j = i + 1 + np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)
+    i, j = order[i], order[j]
+    meet = _boxes_meet(low[i], high[i], low[j], high[j])
+    i, j = i[meet], j[meet]
+    alike = edges.component[i] == edges.component[j]
+    i, j = i[alike], j[alike]
+    return np.minimum(i, j), np.maximum(i, j)
 
 
 def _boxes_meet(low_a: FloatArray, high_a: FloatArray, low_b: FloatArray, high_b: FloatArray) -> BoolArray:
@@ -214,11 +219,31 @@ def overlap_area(surface: Surface, positions: FloatArray, cut_sides: IntArray) -
     import shapely
 
     component, total, overlap = components_of(surface), 0.0, 0.0
+    edges, folded = border_edges_of(surface), not _no_face_is_mirrored(surface, positions)
     for number in range(int(component.max()) + 1):
         faces = surface.faces[component == number]
         cells = shapely.polygons(positions[np.where(faces < 0, faces[:, :1], faces)])
-        cells = cells[shapely.is_valid(cells)]
         area = float(shapely.area(cells).sum())
         total += area
-        overlap += area - float(shapely.union_all(cells).area)
+        if folded:
+            cells = cells[shapely.is_valid(cells)]
+            overlap += float(shapely.area(cells).sum()) - float(shapely.union_all(cells).area)
+        else:
+            own = edges.component == number
+            overlap += _area_beyond_first(positions[edges.tail[own]], positions[edges.head[own]])
     return overlap if overlap > _ROUNDING * total else 0.0
+
+
+def _area_beyond_first(tail: FloatArray, head: FloatArray) -> float:
+    """Return the area around which a border (edges #B by 2 [m]) winds more than once, as often as it does so again [m2]."""
+    import shapely
+
+    parts = shapely.get_parts(
+        shapely.polygonize([shapely.union_all(shapely.linestrings(np.stack([tail, head], axis=1)))])
+    )
+    x, y = shapely.get_coordinates(shapely.point_on_surface(parts)).T[:, :, None]
+    way = head - tail
+    left = way[:, 0] * (y - tail[:, 1]) > way[:, 1] * (x - tail[:, 0])
+    upwards, downwards = (tail[:, 1] <= y) & (y < head[:, 1]), (head[:, 1] <= y) & (y < tail[:, 1])
+    winding = (upwards & left).sum(axis=1) - (downwards & ~left).sum(axis=1)
+    return float(shapely.area(parts) @ np.maximum(winding - 1, 0))

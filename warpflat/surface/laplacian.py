@@ -7,12 +7,13 @@ displacement's squared gradient. What resists in a layout is the deformation of 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
-from scipy.sparse import coo_array, csc_array, diags_array
+from scipy.sparse import coo_array, csc_array, csr_array, diags_array
 from scipy.sparse.linalg import SuperLU, splu
 
-from warpflat.core.arrays import FloatArray, IntArray
+from warpflat.core.arrays import FloatArray
 from warpflat.surface.cells import make_cells
 from warpflat.surface.mesh import Surface, once_per_surface
 
@@ -34,16 +35,13 @@ class Laplacian:
     """The Laplacian of a surface and its factor.
 
     Attributes:
-        corner: #C by 3, the cells' vertices.
-        rest: #C by 3 by 2, the cells laid flat [m].
-        weight: #C by 3, weight of the edge opposite each corner: half its cotangent, times the share with which a cell counts.
+        gradient: #C by #V, complex: times a layout x + i y it gives the sum over each cell's edges of weight times conj(as on the
+            body) times (in the layout). An edge weighs half the cotangent opposite to it, times the share with which its cell counts.
         matrix: #V by #V.
         factor: of the matrix, with a little added that holds the piece as a whole.
     """
 
-    corner: IntArray
-    rest: FloatArray
-    weight: FloatArray
+    gradient: csr_array
     matrix: csc_array
     factor: SuperLU
 
@@ -56,27 +54,15 @@ class Laplacian:
 
         One local and one global step of the as-rigid-as-possible layout (Liu et al. 2008).
         """
-        p, rest, weight = positions[self.corner], self.rest, self.weight
-        # The best rotation of each cell, as cosine and sine.
-        cosine, sine = np.zeros((2, len(weight)))
-        edges = []
-        for k in range(3):
-            i, j = (k + 1) % 3, (k + 2) % 3
-            own, now = rest[:, j] - rest[:, i], p[:, j] - p[:, i]
-            cosine += weight[:, k] * (own[:, 0] * now[:, 0] + own[:, 1] * now[:, 1])
-            sine += weight[:, k] * (own[:, 0] * now[:, 1] - own[:, 1] * now[:, 0])
-            edges.append((i, j, own))
-        size = np.maximum(np.hypot(cosine, sine), np.finfo(float).tiny)
-        cosine, sine = cosine / size, sine / size
-        pull = np.zeros((len(self.rest), 3, 2))
-        for k, (i, j, own) in enumerate(edges):
-            turned = np.stack([cosine * own[:, 0] - sine * own[:, 1], sine * own[:, 0] + cosine * own[:, 1]], axis=1)
-            turned *= weight[:, k, None]
-            pull[:, j] += turned
-            pull[:, i] -= turned
-        count, vertex = len(positions), self.corner.ravel()
-        right = np.stack([np.bincount(vertex, pull[:, :, axis].ravel(), minlength=count) for axis in range(2)], axis=1)
-        return positions + self.solve(right - self.matrix @ positions)
+        place = np.ascontiguousarray(positions, dtype=np.float64).view(np.complex128)[:, 0]
+        rotation = self.gradient @ place
+        rotation /= np.maximum(np.abs(rotation), np.finfo(float).tiny)
+        right = self._divergence @ rotation - self.matrix @ place
+        return positions + self.solve(right.view(np.float64).reshape(-1, 2))
+
+    @cached_property
+    def _divergence(self) -> csr_array:
+        return csr_array(self.gradient.conj().T)
 
 
 def factor_pays(surface: Surface) -> bool:
@@ -90,15 +76,17 @@ def laplacian_of(surface: Surface) -> Laplacian:
     cells = make_cells(surface)
     length, x, y = cells.laid.T
     y = np.maximum(y, _LEAST_HEIGHT * np.maximum(length, np.abs(x)))
-    nothing = np.zeros_like(length)
-    rest = np.stack([nothing, nothing, length, nothing, x, y], axis=1).reshape(-1, 3, 2)
+    rest = np.stack([np.zeros_like(length), length, x + 1j * y], axis=1)
     cotangent = np.stack([x / y, (length - x) / y, (x * (x - length) + y * y) / (length * y)], axis=1)
-    corner, weight = cells.corner, 0.5 * cells.weight[:, None] * cotangent
-    a, b = corner[:, [1, 2, 0]].ravel(), corner[:, [2, 0, 1]].ravel()
+    weight, begin, end = 0.5 * cells.weight[:, None] * cotangent, [1, 2, 0], [2, 0, 1]
+    a, b = cells.corner[:, begin].ravel(), cells.corner[:, end].ravel()
     count, both = len(surface.vertices), np.tile(weight.ravel(), 2)
     of_edge = coo_array((both, (np.append(a, b), np.append(b, a))), shape=(count, count)).tocsr()
     matrix = csc_array(diags_array(np.asarray(of_edge.sum(axis=1)).ravel()) - of_edge)
     held = csc_array(matrix + diags_array(np.full(count, _REGULARISATION * matrix.diagonal().mean())))
+    edge = (weight * (rest[:, end] - rest[:, begin]).conj()).ravel()
+    cell = np.repeat(np.arange(len(weight)), 3)
+    gradient = csr_array((np.append(edge, -edge), (np.append(cell, cell), np.append(b, a))), shape=(len(weight), count))
     # On meshes with slivers and long rows, columns in this order fill a quarter of what minimum degree on A + A^T fills.
     factor = splu(held, permc_spec="COLAMD", diag_pivot_thresh=0.0, options={"SymmetricMode": True})
-    return Laplacian(corner=corner, rest=rest, weight=weight, matrix=matrix, factor=factor)
+    return Laplacian(gradient=gradient, matrix=matrix, factor=factor)
