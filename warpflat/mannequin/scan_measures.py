@@ -30,6 +30,8 @@ _BELLY = 0.98
 _FINGERS_PART = 0.92
 # Shares of the crotch's height between which an ankle and a calf lie.
 _ANKLE, _CALF = (0.10, 0.30), (0.32, 0.60)
+# On a noisy scan a cubic finds the calf over so much of the crotch's height up and down.
+_WIDE = 0.12
 # Girths [m] per metre of stature that bodies have, from infants to the heaviest.
 _POSSIBLE = {
     "head": (0.25, 0.55), "biceps": (0.08, 0.40), "elbow": (0.07, 0.32), "wrist": (0.05, 0.20), "hand": (0.07, 0.22),
@@ -81,11 +83,26 @@ def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict
         return share * legs.crotch
 
     calf = extreme("calf", -girth, (_CALF[0] * legs.crotch, _CALF[1] * legs.crotch), 0.44)
+    if legs.noise and "calf" not in guesses:
+        calf = _fullest(y, legs.girths[side], calf, _WIDE * legs.crotch)
     ankle = extreme("ankle", girth, (_ANKLE[0] * legs.crotch, _ANKLE[1] * legs.crotch), 0.16)
     low, high = calf, 0.86 * legs.crotch
     line = np.interp(y, [low, high], np.interp([low, high], y, back))
     knee = extreme("knee", line - back, (low + 0.25 * (high - low), high - 0.25 * (high - low)), 0.63)
     return {"knee": knee, "calf": calf, "ankle": ankle}, guesses
+
+
+def _fullest(y: FloatArray, girth: FloatArray, near: float, reach: float) -> float:
+    """Return the height where the cubic that fits the girths within `reach` [m] is fullest, started from `near`.
+
+    Noise moves the fullest of girths that differ by little; a cubic over more of the leg averages it.
+    """
+    for _ in range(4):
+        rows = np.abs(y - near) < reach
+        cubic = np.polynomial.Polynomial.fit(y[rows], girth[rows], 3)
+        fine = np.linspace(y[rows][0], y[rows][-1], 200)
+        near = 0.5 * (near + float(fine[int(np.argmax(cubic(fine)))]))
+    return near
 
 
 def body_measures(

@@ -96,7 +96,9 @@ class Slice:
 class Slicer:
     """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
 
-    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
+    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0) -> None:
+        #: How far noise moved the vertices before it was smoothed [m].
+        self.noise = noise
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
         ends = np.sort(ends, axis=1).astype(np.int64)
         keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
@@ -154,7 +156,7 @@ def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
 
 def turn_scan_upright(
     vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
-) -> tuple[FloatArray, NDArray[np.int64], list[str]]:
+) -> tuple[Slicer, list[str]]:
     """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
     Args:
@@ -163,7 +165,7 @@ def turn_scan_upright(
         options: what the user knows about the scan.
 
     Returns:
-        Vertices (#W by 3 [m], welded), triangles (#T by 3), and notes of what was found, one sentence each.
+        The scan's slicer (vertices welded [m]), and notes of what was found, one sentence each.
 
     Raises:
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
@@ -219,7 +221,7 @@ def turn_scan_upright(
             f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
-    return new, triangles, notes
+    return Slicer(new, triangles, noise * _UNITS[unit]), notes
 
 
 def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
