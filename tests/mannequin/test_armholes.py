@@ -15,7 +15,7 @@ from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.outside import BodySurface, push_outside
 from warpflat.mannequin.scan_levels import trunk_sections
-from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
+from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
 from warpflat.surface.io.read import read_scan
 
 needs_bodies = pytest.mark.skipif(

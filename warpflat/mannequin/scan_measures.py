@@ -39,6 +39,9 @@ _POSSIBLE = {
 }  # fmt: skip
 
 
+_HOLED = "it runs over a hole in the scan"
+
+
 @dataclass(frozen=True, kw_only=True)
 class ScanMeasure:
     """One tape around a scan.
@@ -131,9 +134,11 @@ def body_measures(
     found["neck"] = ScanMeasure(height=0.5 * (levels["front_neck"] + levels["side_neck"]), girth=neck)
     for level in _TRUNK:
         height = _bust(trunk, levels) if level == "bust" and "bust" in guessed else levels[level]
+        holed = trunk.holed[int(np.argmin(np.abs(trunk.y - height)))]
         found[level] = ScanMeasure(
-            height=height, girth=float(np.interp(height, trunk.y, trunk.girth)), guess=guessed.get(level)
-        )
+            height=height, girth=float(np.interp(height, trunk.y, trunk.girth)),
+            guess=guessed.get(level, _HOLED if holed else None),
+        )  # fmt: skip
     together = _hip_legs_together(slicer, trunk, legs, levels["hip"])
     if together is not None:
         found["hip, legs together"] = ScanMeasure(height=levels["hip"], girth=together)
@@ -186,20 +191,24 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     heights = np.arange(0.985, 0.90, -0.0025) * stature
     girths: list[float] = []
     widths: list[float] = []
+    holed: list[bool] = []
     for y in heights:
-        parts = [p.points[:, [0, 2]] for p in slicer.cut(_UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
+        parts = [p for p in slicer.cut(_UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
         if not parts:
             return None
-        part = max(parts, key=lambda p: float(np.prod(np.ptp(p, axis=0))))
+        largest = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))
+        part = largest.points[:, [0, 2]]
         widths.append(float(np.ptp(part[:, 0])))
         # Ears stand out of the head: below them its width leaps.
         if len(widths) > 12 and widths[-1] > 1.06 * max(widths[-5:-1]):
             break
         girths.append(convex_girth(part))
+        holed.append(largest.is_holed)
     values = smooth(np.array(girths), 1.0)
     row = int(np.argmax(values))
     if row < len(values) - 1 and row > 0:
-        return ScanMeasure(height=summit(heights, values, row), girth=girths[row])
+        guess = _HOLED if holed[row] else None
+        return ScanMeasure(height=summit(heights, values, row), girth=girths[row], guess=guess)
     return ScanMeasure(
         height=float(heights[row]), girth=girths[row], guess="the head grows fuller down to the ears or the hair"
     )
@@ -266,13 +275,15 @@ def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
     axis = (beyond[int(np.argmax(reach))] - wrist) / length
     counts: list[int] = []
     tapes: list[tuple[float, float]] = []
+    holed = False
     for share in np.arange(0.30, 0.64, 0.01):
         at = wrist + share * length * axis
-        parts = [p.points for p in slicer.cut(axis, float(at @ axis))
+        parts = [p for p in slicer.cut(axis, float(at @ axis))
                  if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * length and len(p.points) > 5]  # fmt: skip
         if parts:
             counts.append(len(parts))
-            tapes.append(max((tape_around(p, axis) for p in parts), key=lambda t: t[1]))
+            holed |= any(p.is_holed for p in parts)
+            tapes.append(max((tape_around(p.points, axis) for p in parts), key=lambda t: t[1]))
     if not tapes:
         return None
     girths = np.array([girth for _, girth in tapes])
@@ -281,7 +292,8 @@ def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
     # Where the fingers part, the girth of the largest part falls.
     falls = first + np.flatnonzero(girths[first + 1 :] < _FINGERS_PART * girths[first:-1])
     height, girth = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
-    return ScanMeasure(height=height, girth=girth, guess="no thumb stands off the palm" if thumb is None else None)
+    guess = _HOLED if holed else "no thumb stands off the palm" if thumb is None else None
+    return ScanMeasure(height=height, girth=girth, guess=guess)
 
 
 def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
@@ -320,18 +332,21 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
     across = np.array([axis[2], 0.0, -axis[0]])
     start = float((low @ axis[[0, 2]]).min())
     best: tuple[float, FloatArray] | None = None
+    holed = False
     for share in np.arange(0.60, 0.82, 0.01):
-        parts = [p.points for p in slicer.cut(axis, start + share * length)
+        parts = [p for p in slicer.cut(axis, start + share * length)
                  if p.points[:, 1].max() < 0.09 * stature and sign * p.points[:, 0].mean() > 0.0]  # fmt: skip
         if parts:
-            points = np.concatenate(parts)
+            holed |= any(p.is_holed for p in parts)
+            points = np.concatenate([p.points for p in parts])
             breadth = float(np.ptp(points @ across))
             if best is None or breadth > best[0]:
                 best = breadth, points
     if best is None:
         return None
     # The foot stands on the floor, also where a scan has no sole.
-    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1])
+    guess = _HOLED if holed else None
+    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1], guess=guess)
 
 
 def _long_way(corners: FloatArray) -> FloatArray:

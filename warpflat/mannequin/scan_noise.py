@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-
 from scipy.sparse import csr_array
+
 from warpflat.core.arrays import FloatArray
 
 __all__ = ["smooth_noise"]

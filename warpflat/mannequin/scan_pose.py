@@ -86,19 +86,30 @@ class Slice:
         points: #P by 3, where the plane meets mesh edges [m], in no order.
         length: summed length of the section's segments [m].
         closed: false where a hole in the mesh leaves a gap.
+        patched: length of the segments on patches that close holes [m].
     """
 
     points: FloatArray
     length: float
     closed: bool = True
+    patched: float = 0.0
+
+    @property
+    def is_holed(self) -> bool:
+        """Return whether a hole leaves a gap, or more than a tenth of the section runs over patches."""
+        return not self.closed or self.patched > 0.1 * self.length
 
 
 class Slicer:
     """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
 
-    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0) -> None:
+    def __init__(
+        self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0, scanned: int | None = None
+    ) -> None:
         #: How far noise moved the vertices before it was smoothed [m].
         self.noise = noise
+        #: Triangles from this one on close holes.
+        self.scanned = len(triangles) if scanned is None else scanned
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
         ends = np.sort(ends, axis=1).astype(np.int64)
         keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
@@ -129,10 +140,13 @@ class Slicer:
         t = (d[a] / (d[a] - d[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
         label = _part_labels(len(used), local)
-        length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
+        segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)
+        length = np.bincount(label[local[:, 0]], segments)
+        patched = np.bincount(label[local[:, 0]], segments * (faces >= self.scanned))
         loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
         parts = [
-            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i]) for i in np.argsort(-length)
+            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i], patched=float(patched[i]))
+            for i in np.argsort(-length)
         ]
         return [p for p in parts if len(p.points) > 3]
 
@@ -154,9 +168,7 @@ def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
 
 
-def turn_scan_upright(
-    vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
-) -> tuple[Slicer, list[str]]:
+def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> tuple[Slicer, list[str]]:
     """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
     Args:
@@ -171,7 +183,8 @@ def turn_scan_upright(
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
-    points, triangles, holes = close_holes(*_welded(vertices, faces))
+    welded, scanned = _welded(vertices, faces)
+    points, triangles, holes = close_holes(welded, scanned)
     points, noise = smooth_noise(points, triangles)
     notes: list[str] = []
     candidates = [options.up] if options.up else list(_AXES)
@@ -221,7 +234,7 @@ def turn_scan_upright(
             f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
-    return Slicer(new, triangles, noise * _UNITS[unit]), notes
+    return Slicer(new, triangles, noise * _UNITS[unit], len(scanned)), notes
 
 
 def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
