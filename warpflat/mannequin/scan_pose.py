@@ -13,6 +13,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.scan_holes import close_holes
 from warpflat.mannequin.scan_noise import smooth_noise
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "turn_scan_upright"]
@@ -33,7 +34,8 @@ _LANDMARKS = (
     "front_neck",
     "side_neck",
 )
-
+# Pieces of so small a share of the faces are left out, if they are no more than so many together.
+_LOOSE, _LOOSE_TOGETHER = 0.01, 0.05
 
 #: A part of a section: area and centroid of its convex hull in the section's plane, in the scan's unit.
 _Part: TypeAlias = tuple[float, FloatArray]
@@ -183,10 +185,10 @@ def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: S
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
-    welded, scanned = _welded(vertices, faces)
+    welded, scanned, loose = _without_loose_pieces(*_welded(vertices, faces))
     points, triangles, holes = close_holes(welded, scanned)
     points, noise = smooth_noise(points, triangles)
-    notes: list[str] = []
+    notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     candidates = [options.up] if options.up else list(_AXES)
     slicer = Slicer(points, triangles)
     rated = [(_legs(slicer, _AXES[a]), a) for a in candidates]
@@ -269,6 +271,22 @@ def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
     triangles = triangles[solid]
     used, local = np.unique(triangles, return_inverse=True)
     return vertices[first[used]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
+
+
+def _without_loose_pieces(
+    points: FloatArray, triangles: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.int64], int]:
+    """Return a mesh without its small pieces, as floor plates and slivers, and how many these were.
+
+    A scan that is torn into small pieces keeps them.
+    """
+    label = join_labels(len(points), triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
+    _, piece, count = np.unique(label, return_inverse=True, return_counts=True)
+    small = count < _LOOSE * len(triangles)
+    if not small.any() or count[small].sum() > _LOOSE_TOGETHER * len(triangles):
+        return points, triangles, 0
+    used, kept = np.unique(triangles[~small[piece.ravel()]], return_inverse=True)
+    return points[used], kept.reshape(-1, 3), int(small.sum())
 
 
 def _unit_of(height: float) -> str:
