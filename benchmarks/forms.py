@@ -122,6 +122,7 @@ def draw(garments: list[tuple[str, Garment]], path: Path) -> None:
 
     matplotlib.use("Agg")
     import matplotlib.pyplot as plt
+    from matplotlib.collections import PolyCollection
 
     rows = []
     for body, garment in garments:
@@ -136,9 +137,7 @@ def draw(garments: list[tuple[str, Garment]], path: Path) -> None:
         for name, axis in zip(chosen, line, strict=False):
             flat = garment.pieces[name]
             corner = flat.positions[garment.form.pieces[name].surface.faces]
-            axis.plot(
-                *np.moveaxis(np.concatenate([corner, corner[:, :1]], axis=1), 2, 0).transpose(0, 2, 1), "0.7", lw=0.4
-            )
+            axis.add_collection(PolyCollection(list(corner), facecolors="none", edgecolors="0.7", linewidths=0.4))
             for ids in garment.form.pieces[name].edges.values():
                 axis.plot(*flat.positions[ids].T, "k", lw=1.2)
             axis.set_title(f"{body} {garment.name} {name}", fontsize=9)

@@ -72,8 +72,8 @@ class Body:
         return self._laid[-1][1]
 
 
-def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int]:
-    """Print a copy's tapes and the package's differences; return how many tapes there were and how many are off."""
+def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int, int]:
+    """Print a copy's tapes and the package's differences; return how many there were, were off, and are off as said."""
     points, faces = of.copy(copy)
     # Noise and holes do not change a body: the tapes lie on the clean and whole one.
     independent = of.tapes(of.points if copy in ("noise", "holes") else points)
@@ -82,9 +82,9 @@ def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int]:
         body = Mannequin.from_scan(as_given(points, copy), faces, resolution_mm=20.0)
     except InputError as error:
         print(f"{of.name}, {copy}: refused: {error}", flush=True)
-        return len(independent), len(independent)
+        return len(independent), len(independent), len(independent)
     print(f"{of.name}, {copy}: {time.process_time() - began:.1f} s")
-    off = 0
+    off = said = 0
     for tape, (height, girth) in independent.items():
         ours = body.measures.get(tape)
         if ours is None:
@@ -94,6 +94,7 @@ def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int]:
         misses = 1000.0 * (ours.height - height), 1000.0 * (ours.girth - girth)
         is_off = abs(misses[0]) > HEIGHT or abs(misses[1]) > GIRTH
         off += is_off
+        said += is_off and ours.guess is not None
         if is_off or not worst_only:
             words = ("  off" if is_off else "") + ("  a guess" if ours.guess else "")
             print(f"  {tape:14} {1000 * height:6.0f} {1000 * girth:6.0f}  {misses[0]:+7.1f} {misses[1]:+7.1f}{words}")
@@ -102,7 +103,7 @@ def report(of: Body, copy: str, worst_only: bool) -> tuple[int, int]:
         scanned = 1000 * body.measures["hip"].girth
         print(f"  hip, legs together: {1000 * together.girth:.0f} mm, as scanned {scanned:.0f} mm")
     sys.stdout.flush()
-    return len(independent), off
+    return len(independent), off, said
 
 
 def main() -> None:
@@ -113,12 +114,17 @@ def main() -> None:
     parser.add_argument("--worst", action="store_true", help="tapes that are off only")
     options = parser.parse_args()
     print("tape, height and girth by tape, and how far the package's height and girth differ [mm]")
-    counts = []
+    counts = {copy: np.zeros(3, dtype=int) for copy in options.copies}
     for name in options.bodies:
         body = Body(name)
-        counts += [report(body, copy, options.worst) for copy in options.copies]
-    total, off = np.sum(counts, axis=0)
-    print(f"{total} tapes, {off} off by more than {HEIGHT:g} mm in height or {GIRTH:g} mm in girth")
+        for copy in options.copies:
+            counts[copy] += report(body, copy, options.worst)
+    print(
+        f"{'copy':12} {'tapes':>5} {'off':>4} {'said':>4}  (off: by more than {HEIGHT:g} mm in height or {GIRTH:g} mm in girth;"
+    )
+    print(f"{'':28}  said: of these the package says that they are guesses)")
+    for copy, count in [*counts.items(), ("all", sum(counts.values()))]:
+        print(f"{copy:12} {count[0]:5d} {count[1]:4d} {count[2]:4d}")
 
 
 if __name__ == "__main__":

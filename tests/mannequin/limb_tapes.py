@@ -105,7 +105,12 @@ def arm_tapes(mesh: trimesh.Trimesh, armpit: float, tip: int) -> dict[str, tuple
         # Across the line instead of along equal ways over the surface, which lie askew where an arm is bent.
         towards = np.gradient(gaussian_filter1d(line, 3.0, axis=0, mode="nearest"), axis=0)
         for i, (at, normal) in enumerate(zip(line.copy(), towards, strict=True)):
-            parts = [p for p in _parts(mesh, at, normal) if np.ptp(p, axis=0).max() < 0.13 * stature]
+            # Beside a lowered arm the plane cuts the trunk, whose middle lies farther off.
+            parts = [
+                p for p in _parts(mesh, at, normal)
+                if np.ptp(p, axis=0).max() < 0.13 * stature
+                and np.linalg.norm(0.5 * (p.min(axis=0) + p.max(axis=0)) - at) < 0.03 * stature
+            ]  # fmt: skip
             if parts:
                 part = _near(parts, at)
                 line[i] = 0.5 * (part.min(axis=0) + part.max(axis=0))

@@ -15,7 +15,7 @@ from warpflat.mannequin.forms import form_from_mapping
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.outside import BodySurface, push_outside
 from warpflat.mannequin.scan_levels import trunk_sections
-from warpflat.mannequin.scan_pose import ScanOptions, Slicer, turn_scan_upright
+from warpflat.mannequin.scan_pose import ScanOptions, turn_scan_upright
 from warpflat.surface.io.read import read_scan
 
 needs_bodies = pytest.mark.skipif(
@@ -67,8 +67,8 @@ def test_armholes_have_no_horns_and_sleeves_can_be_sewn(name: str) -> None:
 @needs_bodies
 @pytest.mark.parametrize("name", ["female", "male_heavy"])
 def test_scanned_armholes_end_below_the_armpit(name: str) -> None:
-    points, triangles, _ = turn_scan_upright(*_scan(name), ScanOptions())
-    armpits = trunk_sections(Slicer(points, triangles)).armpits
+    slicer, _ = turn_scan_upright(*_scan(name), ScanOptions())
+    armpits = trunk_sections(slicer).armpits
     body = Mannequin.from_scan(*_scan(name), resolution_mm=20)
     for side in ("left", "right"):
         hole, line = body.line(f"armhole {side}"), body.line(f"side {side}")

@@ -227,9 +227,7 @@ def realise(layout: Layout, vertices: FloatArray, form: Form, *, half: bool = Fa
     """
     bricks = {name: select_bricks(layout, recipe.bricks) for name, recipe in form.pieces.items()}
     faces = layout.faces_of([brick for own in bricks.values() for brick in own])
-    vertices = _surface(layout, vertices, form, np.unique(layout.faces[faces]))
-    if form.neckline is not None:
-        vertices = widen_neck(layout, vertices, form.neckline)
+    vertices = _surface(layout, vertices, form, np.unique(layout.faces[faces]), form.neckline)
     recipes = {name: (r.bricks, r.datum, r.open) for name, r in form.pieces.items()}
     placed: tuple[PlacedDart, ...] = ()
     if form.darts:
@@ -253,7 +251,9 @@ def _keeps_ease(form: Form, level: str) -> bool:
     return not any(low < at < high for low, high in pairs)
 
 
-def _surface(layout: Layout, body: FloatArray, form: Form, used: IntArray) -> FloatArray:
+def _surface(
+    layout: Layout, body: FloatArray, form: Form, used: IntArray, neckline: Neckline | None = None
+) -> FloatArray:
     """Return the body's vertices moved to the form; the vertices `used` lie outside the body, unless the form is tighter than it."""
     vertices = adjusted_vertices(layout, body, form.profiles, form.ruled, form.ease)
     tight = is_tight(form.profiles, form.ease)
@@ -261,6 +261,9 @@ def _surface(layout: Layout, body: FloatArray, form: Form, used: IntArray) -> Fl
         other, weight = form.blend
         vertices = blend_forms(vertices, _surface(layout, body, other, used), weight)
         tight = tight or is_tight(other.profiles, other.ease)
+    if neckline is not None:
+        # It moves vertices within the form's faces, which are chords of the body's hollows.
+        vertices = widen_neck(layout, vertices, neckline)
     return vertices if tight else push_outside(vertices, layout, body, used)
 
 

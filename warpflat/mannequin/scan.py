@@ -63,8 +63,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
     Raises:
         InputError: if the mesh is not a body that stands on two legs with its arms off the trunk, or has a measure that no body has.
     """
-    points, triangles, notes = turn_scan_upright(vertices, faces, options)
-    slicer = Slicer(points, triangles)
+    slicer, notes = turn_scan_upright(vertices, faces, options)
     trunk = trunk_sections(slicer)
     levels, more = find_levels(trunk, options.landmarks)
     check_girths(trunk, levels)
@@ -89,7 +88,7 @@ def blueprint_from_scan(vertices: FloatArray, faces: NDArray[np.int64], options:
         notes=(*notes, *more, *apart, *guess_note(measures)),
         sections=sections,
         measures=measures,
-        scan=(legs.move(points) if apart else points, triangles),
+        scan=(legs.move(slicer.vertices) if apart else slicer.vertices, slicer.triangles),
     )
 
 

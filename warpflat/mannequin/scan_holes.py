@@ -9,10 +9,9 @@ from warpflat.core.arrays import BoolArray, FloatArray
 
 __all__ = ["close_holes"]
 
-# A longer border, as a share of the scan's greatest extent, is left open: nobody knows what was there.
-_LONGEST = 0.30
-# Skin around a hole faces one way; around the open end of a limb it faces all ways. Length of the mean unit normal.
-_ONE_WAY = 0.15
+# Skin around a hole faces one way; around the open end of a limb it faces all ways. Borders up to so long, as a share of the
+# scan's greatest extent, are holes if the mean unit normal beside them is so long. The second is a face that is torn all over.
+_HOLES = ((0.30, 0.15), (0.80, 0.25))
 # Least cotangent weight of an edge, which keeps the fairing stable where triangles are obtuse.
 _LEAST_WEIGHT = 0.05
 
@@ -43,7 +42,9 @@ def close_holes(
         rim = points[loop]
         length = float(np.linalg.norm(rim - np.roll(rim, 1, axis=0), axis=1).sum())
         facing = normal[faces].mean(axis=0)
-        if not 3 <= len(loop) <= 1000 or length > _LONGEST * span or np.linalg.norm(facing) < _ONE_WAY:
+        one_way = float(np.linalg.norm(facing))
+        is_hole = any(length <= longest * span and one_way >= least for longest, least in _HOLES)
+        if not 3 <= len(loop) <= 1000 or not is_hole:
             continue
         patch = _patch(rim, facing / np.linalg.norm(facing))
         if patch is None:

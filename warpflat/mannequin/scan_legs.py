@@ -40,6 +40,7 @@ class LegSections:
         inwards: by side #S, how far each section is moved towards the midplane [m].
         crotch: height of the lowest point of the body in the midplane [m].
         slope: how far the legs' middles run apart per metre down the leg.
+        noise: how far noise moved the scan's vertices before it was smoothed [m]; 0 without noise.
     """
 
     y: FloatArray
@@ -48,6 +49,7 @@ class LegSections:
     inwards: Mapping[str, FloatArray]
     crotch: float
     slope: float
+    noise: float = 0.0
 
     def moved(self, side: str, row: int) -> FloatArray:
         """Return a section's hull, moved inwards, #P by 2 (x, z) [m]."""
@@ -94,7 +96,7 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
     return LegSections(
         y=heights, hulls={s: tuple(h) for s, h in found.items()}, inwards=inwards,
         girths={s: np.array(g) for s, g in girths.items()},
-        crotch=float(near.min()) if len(near) else trunk.crotch, slope=slope,
+        crotch=float(near.min()) if len(near) else trunk.crotch, slope=slope, noise=slicer.noise,
     )  # fmt: skip
 
 

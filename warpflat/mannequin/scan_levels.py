@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from warpflat.core.arrays import FloatArray
+from warpflat.core.arrays import BoolArray, FloatArray
 from warpflat.core.errors import InputError
 from warpflat.mannequin.scan_pose import Slice, Slicer
 
@@ -39,6 +39,7 @@ class TrunkSections:
         apex: #S, distance of the foremost points from the midplane [m].
         hulls: for each section its hull, counter-clockwise seen from below, #P by 2 (x, z) [m].
         parts: for each section the points of the trunk, or those of both legs apart, each #P by 2 (x, z) [m].
+        holed: #S, whether the section rests on closed or open holes.
         crotch: height below which the legs are apart [m].
         armpits: height at which the left and the right arm join the trunk [m], and the trunk's (x, z) there.
     """
@@ -57,6 +58,7 @@ class TrunkSections:
     apex: FloatArray
     hulls: tuple[FloatArray, ...]
     parts: tuple[tuple[FloatArray, ...], ...]
+    holed: BoolArray
     crotch: float
     armpits: Mapping[str, tuple[float, float, float]]
 
@@ -74,6 +76,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     rows: list[list[float]] = []
     hulls: list[FloatArray] = []
     parts: list[tuple[FloatArray, ...]] = []
+    holed: list[bool] = []
     crotch = 0.0
     for y in heights:
         chosen = leg_sections(slicer, float(y), stature)
@@ -82,6 +85,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
         if len(chosen) == 2:
             crotch = float(y)
         parts.append(tuple(p.points[:, [0, 2]] for p in chosen))
+        holed.append(any(p.is_holed for p in chosen))
         flat = np.concatenate(parts[-1])
         hull = ConvexHull(flat)
         centre = np.abs(flat[:, 0]) < 0.02 * stature
@@ -101,7 +105,7 @@ def trunk_sections(slicer: Slicer) -> TrunkSections:
     return TrunkSections(
         stature=stature, y=heights, girth=table[0], length=table[1], area=table[2], left=table[3], right=table[4],
         front=table[5], back=table[6], front_centre=table[7], back_centre=table[8], apex=table[9], hulls=tuple(hulls),
-        parts=tuple(parts), crotch=crotch, armpits=armpits,
+        parts=tuple(parts), holed=np.array(holed), crotch=crotch, armpits=armpits,
     )  # fmt: skip
 
 
@@ -124,7 +128,8 @@ def _whole(parts: list[Slice]) -> list[Slice]:
         torn = [p for p in parts if not p.closed and (0.0 if _straddles(p) else np.sign(_middle_x(p))) == side]
         if torn:
             points = np.concatenate([p.points for p in torn])
-            joined.append(Slice(points=points, length=sum(p.length for p in torn), closed=False))
+            patched = sum(p.patched for p in torn)
+            joined.append(Slice(points=points, length=sum(p.length for p in torn), closed=False, patched=patched))
     return joined
 
 

@@ -30,11 +30,16 @@ _BELLY = 0.98
 _FINGERS_PART = 0.92
 # Shares of the crotch's height between which an ankle and a calf lie.
 _ANKLE, _CALF = (0.10, 0.30), (0.32, 0.60)
+# On a noisy scan a cubic finds the calf over so much of the crotch's height up and down.
+_WIDE = 0.12
 # Girths [m] per metre of stature that bodies have, from infants to the heaviest.
 _POSSIBLE = {
     "head": (0.25, 0.55), "biceps": (0.08, 0.40), "elbow": (0.07, 0.32), "wrist": (0.05, 0.20), "hand": (0.07, 0.22),
     "thigh": (0.17, 0.60), "knee": (0.13, 0.45), "calf": (0.12, 0.42), "ankle": (0.07, 0.28), "foot": (0.09, 0.24),
 }  # fmt: skip
+
+
+_HOLED = "it runs over a hole in the scan"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -81,11 +86,26 @@ def _places_of_leg(legs: LegSections, side: str) -> tuple[dict[str, float], dict
         return share * legs.crotch
 
     calf = extreme("calf", -girth, (_CALF[0] * legs.crotch, _CALF[1] * legs.crotch), 0.44)
+    if legs.noise and "calf" not in guesses:
+        calf = _fullest(y, legs.girths[side], calf, _WIDE * legs.crotch)
     ankle = extreme("ankle", girth, (_ANKLE[0] * legs.crotch, _ANKLE[1] * legs.crotch), 0.16)
     low, high = calf, 0.86 * legs.crotch
     line = np.interp(y, [low, high], np.interp([low, high], y, back))
     knee = extreme("knee", line - back, (low + 0.25 * (high - low), high - 0.25 * (high - low)), 0.63)
     return {"knee": knee, "calf": calf, "ankle": ankle}, guesses
+
+
+def _fullest(y: FloatArray, girth: FloatArray, near: float, reach: float) -> float:
+    """Return the height where the cubic that fits the girths within `reach` [m] is fullest, started from `near`.
+
+    Noise moves the fullest of girths that differ by little; a cubic over more of the leg averages it.
+    """
+    for _ in range(4):
+        rows = np.abs(y - near) < reach
+        cubic = np.polynomial.Polynomial.fit(y[rows], girth[rows], 3)
+        fine = np.linspace(y[rows][0], y[rows][-1], 200)
+        near = 0.5 * (near + float(fine[int(np.argmax(cubic(fine)))]))
+    return near
 
 
 def body_measures(
@@ -114,9 +134,11 @@ def body_measures(
     found["neck"] = ScanMeasure(height=0.5 * (levels["front_neck"] + levels["side_neck"]), girth=neck)
     for level in _TRUNK:
         height = _bust(trunk, levels) if level == "bust" and "bust" in guessed else levels[level]
+        holed = trunk.holed[int(np.argmin(np.abs(trunk.y - height)))]
         found[level] = ScanMeasure(
-            height=height, girth=float(np.interp(height, trunk.y, trunk.girth)), guess=guessed.get(level)
-        )
+            height=height, girth=float(np.interp(height, trunk.y, trunk.girth)),
+            guess=guessed.get(level, _HOLED if holed else None),
+        )  # fmt: skip
     together = _hip_legs_together(slicer, trunk, legs, levels["hip"])
     if together is not None:
         found["hip, legs together"] = ScanMeasure(height=levels["hip"], girth=together)
@@ -169,20 +191,24 @@ def _head(slicer: Slicer, stature: float) -> ScanMeasure | None:
     heights = np.arange(0.985, 0.90, -0.0025) * stature
     girths: list[float] = []
     widths: list[float] = []
+    holed: list[bool] = []
     for y in heights:
-        parts = [p.points[:, [0, 2]] for p in slicer.cut(_UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
+        parts = [p for p in slicer.cut(_UP, float(y)) if abs(p.points[:, 0].mean()) < 0.06 * stature]
         if not parts:
             return None
-        part = max(parts, key=lambda p: float(np.prod(np.ptp(p, axis=0))))
+        largest = max(parts, key=lambda p: float(np.ptp(p.points[:, 0]) * np.ptp(p.points[:, 2])))
+        part = largest.points[:, [0, 2]]
         widths.append(float(np.ptp(part[:, 0])))
         # Ears stand out of the head: below them its width leaps.
         if len(widths) > 12 and widths[-1] > 1.06 * max(widths[-5:-1]):
             break
         girths.append(convex_girth(part))
+        holed.append(largest.is_holed)
     values = smooth(np.array(girths), 1.0)
     row = int(np.argmax(values))
     if row < len(values) - 1 and row > 0:
-        return ScanMeasure(height=summit(heights, values, row), girth=girths[row])
+        guess = _HOLED if holed[row] else None
+        return ScanMeasure(height=summit(heights, values, row), girth=girths[row], guess=guess)
     return ScanMeasure(
         height=float(heights[row]), girth=girths[row], guess="the head grows fuller down to the ears or the hair"
     )
@@ -249,13 +275,15 @@ def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
     axis = (beyond[int(np.argmax(reach))] - wrist) / length
     counts: list[int] = []
     tapes: list[tuple[float, float]] = []
+    holed = False
     for share in np.arange(0.30, 0.64, 0.01):
         at = wrist + share * length * axis
-        parts = [p.points for p in slicer.cut(axis, float(at @ axis))
+        parts = [p for p in slicer.cut(axis, float(at @ axis))
                  if np.linalg.norm(p.points.mean(axis=0) - at) < 0.6 * length and len(p.points) > 5]  # fmt: skip
         if parts:
             counts.append(len(parts))
-            tapes.append(max((tape_around(p, axis) for p in parts), key=lambda t: t[1]))
+            holed |= any(p.is_holed for p in parts)
+            tapes.append(max((tape_around(p.points, axis) for p in parts), key=lambda t: t[1]))
     if not tapes:
         return None
     girths = np.array([girth for _, girth in tapes])
@@ -264,7 +292,8 @@ def _hand(slicer: Slicer, arm: ScanArm) -> ScanMeasure | None:
     # Where the fingers part, the girth of the largest part falls.
     falls = first + np.flatnonzero(girths[first + 1 :] < _FINGERS_PART * girths[first:-1])
     height, girth = tapes[(first + int(falls[0] if len(falls) else len(tapes) - 1)) // 2]
-    return ScanMeasure(height=height, girth=girth, guess="no thumb stands off the palm" if thumb is None else None)
+    guess = _HOLED if holed else "no thumb stands off the palm" if thumb is None else None
+    return ScanMeasure(height=height, girth=girth, guess=guess)
 
 
 def _crotch(slicer: Slicer, trunk: TrunkSections) -> float:
@@ -303,18 +332,21 @@ def _foot(slicer: Slicer, stature: float, side: str) -> ScanMeasure | None:
     across = np.array([axis[2], 0.0, -axis[0]])
     start = float((low @ axis[[0, 2]]).min())
     best: tuple[float, FloatArray] | None = None
+    holed = False
     for share in np.arange(0.60, 0.82, 0.01):
-        parts = [p.points for p in slicer.cut(axis, start + share * length)
+        parts = [p for p in slicer.cut(axis, start + share * length)
                  if p.points[:, 1].max() < 0.09 * stature and sign * p.points[:, 0].mean() > 0.0]  # fmt: skip
         if parts:
-            points = np.concatenate(parts)
+            holed |= any(p.is_holed for p in parts)
+            points = np.concatenate([p.points for p in parts])
             breadth = float(np.ptp(points @ across))
             if best is None or breadth > best[0]:
                 best = breadth, points
     if best is None:
         return None
     # The foot stands on the floor, also where a scan has no sole.
-    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1])
+    guess = _HOLED if holed else None
+    return ScanMeasure(height=0.5 * float(best[1][:, 1].max()), girth=tape_around(best[1], axis)[1], guess=guess)
 
 
 def _long_way(corners: FloatArray) -> FloatArray:

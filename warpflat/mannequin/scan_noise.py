@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
 
 from warpflat.core.arrays import FloatArray
 
@@ -49,8 +50,14 @@ def smooth_noise(points: FloatArray, triangles: NDArray[np.int64]) -> tuple[Floa
     wavers = np.abs(off - mean @ off)
     if np.median(wavers / distance) < _WAVERS:
         return points, 0.0
-    out = points
+    even = _even(points, mean)
+    # Twicing: what was smoothed away is smoothed and added back, which returns most of what was shape.
+    return even + _even(points - even, mean), float(np.median(wavers))
+
+
+def _even(values: FloatArray, mean: csr_array) -> FloatArray:
+    """Return values smoothed by Taubin's steps, `mean` the matrix of the neighbours' mean."""
     for _ in range(_STEPS):
         for share in (_SHRINK, _GROW):
-            out = out + share * (mean @ out - out)
-    return np.asarray(out), float(np.median(wavers))
+            values = values + share * (mean @ values - values)
+    return values

@@ -13,6 +13,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.errors import InputError, nearest
 from warpflat.mannequin.scan_holes import close_holes
 from warpflat.mannequin.scan_noise import smooth_noise
+from warpflat.surface.connectivity import join_labels
 from warpflat.surface.repair.stray_vertex import stray_vertex, stray_words
 
 __all__ = ["ScanOptions", "Slice", "Slicer", "turn_scan_upright"]
@@ -33,7 +34,8 @@ _LANDMARKS = (
     "front_neck",
     "side_neck",
 )
-
+# Pieces of so small a share of the faces are left out, if they are no more than so many together.
+_LOOSE, _LOOSE_TOGETHER = 0.01, 0.05
 
 #: A part of a section: area and centroid of its convex hull in the section's plane, in the scan's unit.
 _Part: TypeAlias = tuple[float, FloatArray]
@@ -86,17 +88,30 @@ class Slice:
         points: #P by 3, where the plane meets mesh edges [m], in no order.
         length: summed length of the section's segments [m].
         closed: false where a hole in the mesh leaves a gap.
+        patched: length of the segments on patches that close holes [m].
     """
 
     points: FloatArray
     length: float
     closed: bool = True
+    patched: float = 0.0
+
+    @property
+    def is_holed(self) -> bool:
+        """Return whether a hole leaves a gap, or more than a tenth of the section runs over patches."""
+        return not self.closed or self.patched > 0.1 * self.length
 
 
 class Slicer:
     """Plane sections of a triangle mesh, connected parts apart; holes in the mesh only leave gaps."""
 
-    def __init__(self, vertices: FloatArray, triangles: NDArray[np.int64]) -> None:
+    def __init__(
+        self, vertices: FloatArray, triangles: NDArray[np.int64], noise: float = 0.0, scanned: int | None = None
+    ) -> None:
+        #: How far noise moved the vertices before it was smoothed [m].
+        self.noise = noise
+        #: Triangles from this one on close holes.
+        self.scanned = len(triangles) if scanned is None else scanned
         ends = np.stack([triangles, np.roll(triangles, -1, axis=1)], -1).reshape(-1, 2)
         ends = np.sort(ends, axis=1).astype(np.int64)
         keys, inverse = np.unique(ends[:, 0] * len(vertices) + ends[:, 1], return_inverse=True)
@@ -127,10 +142,13 @@ class Slicer:
         t = (d[a] / (d[a] - d[b]))[:, None]
         points = (1 - t) * self.vertices[a] + t * self.vertices[b]
         label = _part_labels(len(used), local)
-        length = np.bincount(label[local[:, 0]], np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1))
+        segments = np.linalg.norm(points[local[:, 0]] - points[local[:, 1]], axis=1)
+        length = np.bincount(label[local[:, 0]], segments)
+        patched = np.bincount(label[local[:, 0]], segments * (faces >= self.scanned))
         loose = np.bincount(label, np.bincount(local.ravel(), minlength=len(used)) == 1)
         parts = [
-            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i]) for i in np.argsort(-length)
+            Slice(points=points[label == i], length=float(length[i]), closed=not loose[i], patched=float(patched[i]))
+            for i in np.argsort(-length)
         ]
         return [p for p in parts if len(p.points) > 3]
 
@@ -152,9 +170,7 @@ def _part_labels(size: int, pairs: NDArray[np.int64]) -> NDArray[np.int64]:
     return np.asarray(np.unique(root, return_inverse=True)[1].reshape(-1))
 
 
-def turn_scan_upright(
-    vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions
-) -> tuple[FloatArray, NDArray[np.int64], list[str]]:
+def turn_scan_upright(vertices: FloatArray, faces: NDArray[np.int64], options: ScanOptions) -> tuple[Slicer, list[str]]:
     """Bring a scan to metres, Y up, facing +Z, feet on y = 0, the midplane at x = 0.
 
     Args:
@@ -163,15 +179,16 @@ def turn_scan_upright(
         options: what the user knows about the scan.
 
     Returns:
-        Vertices (#W by 3 [m], welded), triangles (#T by 3), and notes of what was found, one sentence each.
+        The scan's slicer (vertices welded [m]), and notes of what was found, one sentence each.
 
     Raises:
         InputError: if the mesh is no body that stands on two legs, or its facing cannot be found.
     """
     options.check()
-    points, triangles, holes = close_holes(*_welded(vertices, faces))
+    welded, scanned, loose = _without_loose_pieces(*_welded(vertices, faces))
+    points, triangles, holes = close_holes(welded, scanned)
     points, noise = smooth_noise(points, triangles)
-    notes: list[str] = []
+    notes = [f"loose pieces of less than 1 % of the scan's faces were left out: {loose}"] if loose else []
     candidates = [options.up] if options.up else list(_AXES)
     slicer = Slicer(points, triangles)
     rated = [(_legs(slicer, _AXES[a]), a) for a in candidates]
@@ -219,7 +236,7 @@ def turn_scan_upright(
             f"holes closed by smooth patches: {len(holes)}, the longest {length * _UNITS[unit]:.2f} m around "
             f"at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         )
-    return new, triangles, notes
+    return Slicer(new, triangles, noise * _UNITS[unit], len(scanned)), notes
 
 
 def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray, NDArray[np.int64]]:
@@ -254,6 +271,22 @@ def _welded(vertices: FloatArray, faces: NDArray[np.int64]) -> tuple[FloatArray,
     triangles = triangles[solid]
     used, local = np.unique(triangles, return_inverse=True)
     return vertices[first[used]].astype(float), np.ravel(local).reshape(-1, 3).astype(np.int64)
+
+
+def _without_loose_pieces(
+    points: FloatArray, triangles: NDArray[np.int64]
+) -> tuple[FloatArray, NDArray[np.int64], int]:
+    """Return a mesh without its small pieces, as floor plates and slivers, and how many these were.
+
+    A scan that is torn into small pieces keeps them.
+    """
+    label = join_labels(len(points), triangles[:, :2].ravel(), triangles[:, 1:].ravel())[triangles[:, 0]]
+    _, piece, count = np.unique(label, return_inverse=True, return_counts=True)
+    small = count < _LOOSE * len(triangles)
+    if not small.any() or count[small].sum() > _LOOSE_TOGETHER * len(triangles):
+        return points, triangles, 0
+    used, kept = np.unique(triangles[~small[piece.ravel()]], return_inverse=True)
+    return points[used], kept.reshape(-1, 3), int(small.sum())
 
 
 def _unit_of(height: float) -> str:
