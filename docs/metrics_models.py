@@ -181,6 +181,15 @@ class Piece(Entry):
     darts: list[FormDart] | None = None
 
 
+class WearerSide(Entry):
+    """A quarter of the trunk, or half of a limb, at one level."""
+
+    ease_m: float
+    """By how much its cloth is larger than the body between its seams."""
+    pressure_pa: float
+    """The highest on it: tension over the radius of a tape around the body."""
+
+
 class WearerLevel(Entry):
     """How the cloth is around the body at one level."""
 
@@ -188,14 +197,35 @@ class WearerLevel(Entry):
     """By how much the cloth is larger than the body."""
     strain: float
     """By how much it is stretched around the body; 0 where it is larger."""
+    sides: dict[str, WearerSide]
+
+
+class StretchedPlace(Entry):
+    """Where the cloth is stretched most around the body."""
+
+    place: str
+    strain: float
+
+
+class BodyPressure(Entry):
+    """Pressure on the wearer where the cloth touches, by its area."""
+
+    p50: float
+    p95: float
+    max: float
+    place: str
 
 
 class WearerFit(Entry):
     """How a garment fits the body itself, whatever form its pattern was made on."""
 
     fits: bool
-    """No level is stretched beyond the limit of the cloth."""
+    """No row around the body is stretched beyond the limit of the cloth."""
     levels: dict[str, WearerLevel]
+    touching: float
+    """Share of the cloth that goes around the body and is stretched there."""
+    most_stretched: StretchedPlace | None = None
+    pressure_pa: BodyPressure | None = None
 
 
 class GarmentWear(Entry):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -27,11 +27,21 @@ if TYPE_CHECKING:
 
     from warpflat.flattening.result import Flattening
 
-__all__ = ["write_wear_picture", "write_wear_sheet"]
+__all__ = ["OnBody", "write_wear_picture", "write_wear_sheet"]
+
+#: Of a piece on the wearer's body, by key of `_BODY_MAPS`: #F, not a number where it does not go around it.
+OnBody = Mapping[str, FloatArray]
 
 
 # The least range of a scale: below it a map would show rounding.
 _LEAST_SCALE = {"%": 0.5, "N/m": 1.0, "Pa": 1.0}
+# Strain around the wearer is below 0 where there is ease.
+_BODY_MAPS = {
+    "body_strain": ("on the wearer: strain, ease", 100.0, "%"),
+    "body_pressure": ("on the wearer: pressure", 1.0, "Pa"),
+}
+_ALL_MAPS = {**MAPS, **_BODY_MAPS}
+_NOT_AROUND = "#e4e4e4"
 # Maps that are compared at a glance share a scale.
 _ALIKE = (("strain_warp", "strain_weft"), ("strain_bias",), ("tension_warp", "tension_weft"), ("pressure",))
 # The fabric's strain limit applies to its threads.
@@ -72,16 +82,29 @@ def _scale_of(values: FloatArray, area: FloatArray, unit: str, *, from_nothing: 
     return _Scale(colours="RdBu_r", low=-reach, high=reach)
 
 
-def _scales(fits: Sequence[WornFit], groups: Sequence[Sequence[str]]) -> dict[str, _Scale]:
+def _values(fit: WornFit, body: OnBody, name: str) -> FloatArray:
+    """Return a map of a piece in the unit shown, #F."""
+    return np.asarray(_ALL_MAPS[name][1] * (body[name] if name in _BODY_MAPS else getattr(fit, name)))
+
+
+def _scales(
+    fits: Sequence[WornFit], groups: Sequence[Sequence[str]], bodies: Sequence[OnBody] = ()
+) -> dict[str, _Scale]:
     found = {}
-    area = np.concatenate([fit.area for fit in fits])
+    all_area = np.concatenate([fit.area for fit in fits])
     for group in groups:
-        _, factor, unit = MAPS[group[0]]
-        values = np.concatenate([factor * getattr(fit, name) for name in group for fit in fits])
+        _, factor, unit = _ALL_MAPS[group[0]]
+        shown = [
+            _values(fit, body, name)
+            for name in group
+            for fit, body in zip(fits, bodies or [{}] * len(fits), strict=True)
+        ]
+        values, area = np.concatenate(shown), np.tile(all_area, len(group))
+        values, area = values[np.isfinite(values)], area[np.isfinite(values)]
         limit = 1.2 * factor * max(fit.limit for fit in fits) if group[0] in _LIMITED else 0.0
         if limit > 3.0 * float(np.abs(values).max(initial=0.0)):
             limit = 0.0
-        scale = _scale_of(values, np.tile(area, len(group)), unit, from_nothing=group[0] == "pressure", limit=limit)
+        scale = _scale_of(values, area, unit, from_nothing=group[0].endswith("pressure"), limit=limit)
         found.update(dict.fromkeys(group, scale))
     return found
 
@@ -110,7 +133,7 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
     fit = result.fit
     scales = _scales([fit], [[name] for name in MAPS])
     for axis, (name, (label, factor, unit)) in zip(figure.subplots(2, 3).ravel(), MAPS.items(), strict=True):
-        drawn = _draw_map(axis, result, name, scales[name])
+        drawn = _draw_map(axis, result, name, scales[name], {})
         axis.autoscale_view()
         axis.set_title(f"{label}, median {_shown(_median(fit, name) * factor)} {unit}", fontsize=10)
         bar = figure.colorbar(drawn, ax=axis, shrink=0.75, extend=scales[name].extend, pad=0.02)
@@ -127,13 +150,16 @@ def write_wear_picture(path: str | os.PathLike[str], result: Flattening) -> None
 
 
 @all_letters()
-def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str) -> None:
+def write_wear_sheet(
+    path: str | os.PathLike[str], results: Sequence[Flattening], *, title: str, on_body: Sequence[OnBody] = ()
+) -> None:
     """Draw all pieces of a garment as worn: a row per piece, a column per map, one scale of length and of colour.
 
     Args:
         path: the file, ``*.png``.
         results: the pieces, one or more.
         title: the garment's name.
+        on_body: of every piece, if it is worn on another surface than it was flattened from.
 
     Raises:
         InputError: the file cannot be written.
@@ -143,27 +169,37 @@ def write_wear_sheet(path: str | os.PathLike[str], results: Sequence[Flattening]
 
     require_writable(path)
     report_activity(f"drawing {Path(path).name}")
-    sheet = _Sheet.of(results)
+    maps = (*(_BODY_MAPS if on_body else ()), *MAPS)
+    sheet = _Sheet.of(results, len(maps))
     figure = Figure(figsize=sheet.size, dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
     fits = [result.fit for result in results]
-    scales = _scales(fits, _ALIKE)
+    bodies = on_body or [{}] * len(results)
+    scales = _scales(fits, [*([name] for name in maps if name in _BODY_MAPS), *_ALIKE], bodies)
     limit = max(fit.limit for fit in fits)
     top = _TOP
     drawn: dict[str, ScalarMappable] = {}
     shown_names = titles([result.surface.name for result in results], is_drawn)
-    for result, height in zip(results, sheet.rows, strict=True):
-        _write_row_label(figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15))
-        drawn = _draw_row(figure, sheet, result, top, height, scales)
+    for result, body, height in zip(results, bodies, sheet.rows, strict=True):
+        _write_row_label(
+            figure, result, shown_names[result.surface.name], *sheet.point(0.15, top + 0.15), on_form=bool(on_body)
+        )
+        drawn = _draw_row(figure, sheet, result, top, height, scales, body)
         top += height
     _draw_scales(figure, sheet, top, drawn, scales, limit)
     unfit = [result.surface.name for result in results if not result.fit.fits]
-    verdict = "fits" if not unfit else f"does not fit: {', '.join(unfit)}"
+    word = "lies on the form" if on_body else "fits"
+    verdict = (
+        word
+        if not unfit
+        else f"{word.replace('lies', 'does not lie').replace('fits', 'does not fit')}: {', '.join(unfit)}"
+    )
     fabrics = ", ".join(dict.fromkeys(result.fabric.name for result in results))
     figure.text(*sheet.point(0.15, 0.32), f"{title} in {fabrics}, as worn: {verdict}", fontsize=13)
     figure.text(
         *sheet.point(0.15, 0.52),
-        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack",
+        f"outlined in green: beyond the cloth's limit of {100 * limit:.3g} %; red is stretched, blue is slack"
+        + ("; grey goes not around the wearer; all other maps are against the form" if on_body else ""),
         fontsize=9,
         color="#404040",
     )
@@ -179,15 +215,17 @@ class _Sheet:
         inches: per metre of cloth.
         column: width of a column.
         rows: heights of the rows.
+        columns: how many.
     """
 
     inches: float
     column: float
     rows: tuple[float, ...]
+    columns: int
 
     @classmethod
-    def of(cls, results: Sequence[Flattening]) -> _Sheet:
-        """Lay out a sheet for these pieces."""
+    def of(cls, results: Sequence[Flattening], columns: int) -> _Sheet:
+        """Lay out a sheet for these pieces with so many maps."""
         spans = np.array([np.ptp(result.positions, axis=0) for result in results])
         width, height = (max(float(spans[:, axis].max()), 1e-9) for axis in (0, 1))
         inches = min(_COLUMN / width, _TALLEST / height)
@@ -196,12 +234,12 @@ class _Sheet:
             for span, result in zip(spans[:, 1], results, strict=True)
         ]
         column = min(_COLUMN, max(float(spans[:, 0].max()) * inches, 1.5)) + 0.25
-        return cls(inches=inches, column=column, rows=tuple(rows))
+        return cls(inches=inches, column=column, rows=tuple(rows), columns=columns)
 
     @property
     def size(self) -> tuple[float, float]:
         """Width and height of the sheet."""
-        return _LABEL + len(MAPS) * self.column + 0.2, _TOP + sum(self.rows) + _BOTTOM
+        return _LABEL + self.columns * self.column + 0.2, _TOP + sum(self.rows) + _BOTTOM
 
     def point(self, x: float, y: float) -> tuple[float, float]:
         """Return a point of the figure, given from its upper left corner, as shares of its size."""
@@ -213,14 +251,20 @@ class _Sheet:
 
 
 def _draw_row(
-    figure: Figure, sheet: _Sheet, result: Flattening, top: float, height: float, scales: dict[str, _Scale]
+    figure: Figure,
+    sheet: _Sheet,
+    result: Flattening,
+    top: float,
+    height: float,
+    scales: dict[str, _Scale],
+    body: OnBody,
 ) -> dict[str, ScalarMappable]:
     """Draw all maps of a piece side by side."""
     drawn = {}
     middle = 0.5 * (result.positions.min(axis=0) + result.positions.max(axis=0))
-    for number, name in enumerate(MAPS):
+    for number, name in enumerate((*body, *MAPS)):
         axis = figure.add_axes(sheet.box(_LABEL + number * sheet.column, top, sheet.column, height))
-        drawn[name] = _draw_map(axis, result, name, scales[name])
+        drawn[name] = _draw_map(axis, result, name, scales[name], body)
         axis.set_xlim(middle[0] - 0.5 * sheet.column / sheet.inches, middle[0] + 0.5 * sheet.column / sheet.inches)
         axis.set_ylim(middle[1] - 0.5 * height / sheet.inches, middle[1] + 0.5 * height / sheet.inches)
     return drawn
@@ -235,7 +279,8 @@ def _draw_scales(
     limit: float,
 ) -> None:
     """Draw the title of every column, and below the rows its colour scale."""
-    for number, (name, (label, _, unit)) in enumerate(MAPS.items()):
+    for number, name in enumerate(drawn):
+        label, _, unit = _ALL_MAPS[name]
         x = _LABEL + number * sheet.column
         figure.text(*sheet.point(x + 0.5 * sheet.column, 0.75), label, ha="center", fontsize=10)
         axis = figure.add_axes(sheet.box(x + 0.2, top + 0.25, sheet.column - 0.4, 0.13))
@@ -244,7 +289,7 @@ def _draw_scales(
         bar.ax.locator_params(nbins=5)
         bar.set_label(unit, fontsize=9)
         _mark_limit(bar, name, limit, scales[name])
-        if name == "pressure":
+        if unit == "Pa":
             above = bar.ax.secondary_xaxis("top", functions=(_to_mmhg, _from_mmhg))
             above.tick_params(labelsize=7)
             above.set_xlabel("mmHg", fontsize=8)
@@ -272,11 +317,14 @@ def _shown(value: float) -> str:
     return f"{value:,.0f}" if abs(value) >= 100 else f"{value:.3g}"
 
 
-def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y: float) -> None:
+def _write_row_label(
+    figure: Figure, result: Flattening, title: str, x: float, y: float, *, on_form: bool = False
+) -> None:
     from textwrap import fill
 
     fit = result.fit
-    lines = [f"fits: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
+    word = "lies on the form" if on_form else "fits"
+    lines = [f"{word}: {'yes' if fit.fits else 'no'}, {100 * fit.outside:.1f} % beyond the limit"]
     measures = fit.as_dict()
     lines += [f"{RANGES}:", *strain_words(measures)]
     if pressure := pressure_words(measures):
@@ -294,15 +342,17 @@ def _write_row_label(figure: Figure, result: Flattening, title: str, x: float, y
     figure.text(x, y, text, fontsize=9, va="top", linespacing=1.35, color="black" if fit.fits else "#b00000")
 
 
-def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale) -> ScalarMappable:
+def _draw_map(axis: Axes, result: Flattening, name: str, scale: _Scale, body: OnBody) -> ScalarMappable:
+    from matplotlib import colormaps
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import Normalize
 
     from warpflat.export.picture_faces import ColouredFaces
 
     fit, p = result.fit, result.positions
-    mappable = ScalarMappable(Normalize(scale.low, scale.high), scale.colours)
-    axis.add_artist(ColouredFaces(p, result.faces, MAPS[name][1] * getattr(fit, name), mappable))
+    colours = colormaps[scale.colours].with_extremes(bad=_NOT_AROUND)
+    mappable = ScalarMappable(Normalize(scale.low, scale.high), colours)
+    axis.add_artist(ColouredFaces(p, result.faces, _values(fit, body, name), mappable))
     axis.update_datalim(p)
     for line in result.network.surface.lines.values():
         _draw_segments(axis, p[np.stack([line[:-1], line[1:]], axis=1)], "#808080", 0.4)

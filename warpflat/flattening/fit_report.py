@@ -21,6 +21,7 @@ __all__ = [
     "remedy_words",
     "strain_words",
     "wear_measures",
+    "wearer_places",
     "wearer_words",
 ]
 
@@ -174,24 +175,45 @@ def fit_lines(metrics: Mapping[str, Any]) -> list[str]:
             f"garment: {word}: {verdict} ({100 * metrics['wear']['outside']:.1f} % of its cloth beyond the limit)"
         )
         if wearer := metrics["wear"].get("wearer"):
-            lines.append(wearer_words(wearer, draped="drape" in metrics))
+            lines += [wearer_words(wearer, draped="drape" in metrics), *filter(None, [wearer_places(wearer)])]
     return lines
 
 
 def wearer_words(wearer: Mapping[str, Any], *, draped: bool = False) -> str:
-    """Return how a garment fits the body: the ease where the cloth is larger, the strain where it is smaller.
+    """Return how a garment fits the body: strain and pressure where the cloth is smaller, and the ease where it is larger.
 
     Whether a garment fits that was draped is said by its drape.
     """
-    loose = [
-        f"{name} {100 * level['ease_m']:+.1f} cm" for name, level in wearer["levels"].items() if level["strain"] == 0.0
-    ]
-    tight = [
-        f"{name} {100 * level['ease_m']:+.1f} cm ({100 * level['strain']:.1f} %)"
-        for name, level in wearer["levels"].items()
-        if level["strain"] > 0.0
-    ]
-    parts = [f"{words} at {', '.join(row)}" for words, row in (("ease", loose), ("stretched", tight)) if row]
-    if draped:
-        return f"wearer: {'; '.join(parts)}"
-    return f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({'; '.join(parts)})"
+    tight, loose = [], []
+    for name, level in _once_a_pair(wearer["levels"]).items():
+        ease = f"{name} {100 * level['ease_m']:+.1f} cm"
+        if level["strain"] == 0.0:
+            loose.append(ease)
+            continue
+        pressure = max(side["pressure_pa"] for side in level["sides"].values())
+        tight.append(f"{ease} ({100 * level['strain']:.1f} %, {pressure:,.0f} Pa)")
+    words = "; ".join(f"{word} at {', '.join(row)}" for word, row in (("stretched", tight), ("ease", loose)) if row)
+    return f"wearer: {words}" if draped else f"wearer: fits: {'yes' if wearer['fits'] else 'no'} ({words})"
+
+
+def _once_a_pair(levels: Mapping[str, Mapping[str, Any]]) -> dict[str, Mapping[str, Any]]:
+    """Return levels by name, those of left and right limbs as one where they are equal within 0.5 mm and 0.05 %."""
+    found = {}
+    for name, level in levels.items():
+        both, _, side = name.rpartition(" ")
+        other = levels.get(f"{both} {'left' if side == 'right' else 'right'}")
+        same = other is not None and all(abs(level[key] - other[key]) < 5e-4 for key in ("ease_m", "strain"))
+        found[both if same else name] = level
+    return found
+
+
+def wearer_places(wearer: Mapping[str, Any]) -> str:
+    """Return where on the body the cloth is stretched most and presses hardest; "" where it is larger everywhere."""
+    if "pressure_pa" not in wearer:
+        return ""
+    worst, pressure = wearer["most_stretched"], wearer["pressure_pa"]
+    return (
+        f"wearer: touches with {100 * wearer['touching']:.0f} % of the cloth around; most stretched {worst['place']} "
+        f"({100 * worst['strain']:.1f} %); pressure {pressure['p50']:,.0f} Pa in the middle, 95 % below "
+        f"{pressure['p95']:,.0f}, most {pressure['max']:,.0f}, {pressure['place']}"
+    )

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
@@ -23,12 +24,13 @@ from warpflat.garment.drawn_curves import CURVES_MM, Curves, measure_curves, pla
 from warpflat.garment.ease import SeamRatios, SeamWish, is_knit, seam_ratios
 from warpflat.garment.finishing import Finishing
 from warpflat.garment.fullness import FullEdge, give_fullness
-from warpflat.garment.girths import girth_constraints, pattern_girths, wearer_fit
+from warpflat.garment.girths import girth_constraints, pattern_girths
 from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
 from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.garment.wearer import WearerFit, assess_wearer
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin
 from warpflat.mannequin.pieces import FormPiece
@@ -122,6 +124,13 @@ class Garment:
             opened=opened_rings(self.mannequin, self.form, positions, self.openings),
         )  # fmt: skip
 
+    @cached_property
+    def wearer(self) -> WearerFit | None:
+        """How the garment fits the body itself; None if its pieces go around nothing."""
+        first = next(iter(self.pieces.values()))
+        positions = {name: piece.positions for name, piece in self.pieces.items()}
+        return assess_wearer(self.mannequin, self.form, positions, first.fabric, grain_angle=first.grain_angle)
+
     def _measured(self, number: int, cost: float | None) -> SeamLengths:
         seam = self.form.seams[number]
         first, second = (self.pieces[piece] for piece in seam.pieces)
@@ -155,8 +164,7 @@ class Garment:
         pieces = {name: self._measure(name) for name in self.pieces}
         positions = {name: piece.positions for name, piece in self.pieces.items()}
         girths = pattern_girths(self.mannequin, self.form, positions)
-        limit = min(piece.fabric.strain_limit for piece in self.pieces.values())
-        wearer = {"against": "form", "wearer": wearer_fit(girths, limit)} if girths else {}
+        wearer = {} if self.wearer is None else {"against": "form", "wearer": self.wearer.as_dict()}
         more = {
             "wear": {**garment_wear(pieces), **wearer},
             "mannequin": self.mannequin.metrics(),

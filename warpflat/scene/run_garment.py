@@ -269,11 +269,13 @@ def _write_pieces(plan: GarmentPlan, garment: Garment, out: Path) -> list[str]:
     """Write an OBJ per piece and the pictures of the flattened garment; return their names."""
     settings = plan.scene.settings
     files = garment.write_files(out, picture=settings.output.picture)
-    if settings.wear is not None and settings.output.picture:
+    wearer = garment.wearer
+    if settings.output.picture and (settings.wear is not None or (wearer is not None and wearer.is_stretched)):
         from warpflat.flattening.fit_picture import write_wear_sheet
 
         files.append("wear.png")
-        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name)
+        on_body = [] if wearer is None else [wearer.pieces[name].as_dict() for name in garment.pieces]
+        write_wear_sheet(out / files[-1], list(garment.pieces.values()), title=garment.name, on_body=on_body)
     return files
 
 
