@@ -9,7 +9,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.garment.constraints import DartMouth
-from warpflat.garment.sewing import SeamPair
+from warpflat.garment.sewn import SeamPair
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
