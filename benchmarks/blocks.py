@@ -2,23 +2,28 @@
 
     python benchmarks/blocks.py [--sizes "EU 36" "EU 38" ...]
 
-The scene is `scenes/basic_block.toml`, as it ships. The drafted block was made by another program, FreeSewing's public
-designs `bella` (bodice) and `penelope` (skirt), for EU 38 (bust 880, waist 720, hip 960 mm) with low ease and with ease as
-the designs have it. All values are of half a piece [mm; areas in cm2], a range where these two differ.
+The scene is `scenes/basic_block.toml`, as it ships. The drafted blocks are in `drafted_blocks.json`. FreeSewing's public designs
+`bella` (bodice), `penelope` (skirt) and `brian` (men) 4.10.2 (MIT licence) drafted them for the lengths, girths, shoulders, depth of
+the armhole and ease of the package's own forms (`draft_blocks.mjs`; `--inputs` prints what it is given). Two drafts span a
+range. `bella` makes its back a quarter of the underbust's girth, which puts the side seam some 30 mm farther back than a form's;
+the second draft has the side seam at a quarter of the bust, as the form has it. All values are of half a piece [mm; areas in
+cm2]. `beyond` is how far ours lies outside that range.
 
     python benchmarks/blocks.py --men
 
-compares the bodice of three men's sizes, without darts and with 5 cm of ease at the chest, with FreeSewing's `brian` 4.10.2 (MIT
-licence), drafted for the lengths and girths of the package's own form and the same ease, its other options as they are. That is
-a boxy block: its side is straight down, and no waist is fitted. Its neck point lies farther from the centre, so its shoulder is
-shorter, and its armhole is cut deeper.
+compares the bodice of three men's sizes, without darts and with 5 cm of ease at the chest. `brian` is a boxy block: its side is
+straight down. Its area is therefore also told less the wedge between that side and the waist of ours. Its second draft has the
+design's own ease of the armhole, 9.5 % of the way from waist to armpit.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import time
+from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -29,46 +34,8 @@ from warpflat.scene.run_garment import plan_garment
 
 SCENE = Path(__file__).parents[1] / "scenes" / "basic_block.toml"
 SIZES = ("EU 36", "EU 38", "EU 40", "EU 42", "EU 44")
-#: Of EU 38: the least and the greatest drafted value.
-DRAFTED: dict[str, tuple[float, float]] = {
-    "centre front": (368, 368),
-    "centre back": (407, 407),
-    "shoulder front": (104, 104),
-    "shoulder back": (110, 110),
-    "armhole front": (208, 216),
-    "armhole back": (212, 221),
-    "side seam": (184, 184),
-    "waist front": (187, 194),
-    "waist back": (177, 184),
-    "bust dart": (63, 70),
-    "waist dart front": (52, 59),
-    "waist dart back": (17, 20),
-    "hip front": (230, 232),
-    "hip back": (250, 252),
-    "skirt darts front": (30, 30),
-    "skirt darts back": (37, 37),
-    "area front": (743, 768),
-    "area back": (703, 721),
-    "area front skirt": (1247, 1260),
-    "area back skirt": (1338, 1411),
-}
-
-
-#: Of `brian` by size: back and front.
-DRAFTED_MEN: dict[str, tuple[dict[str, float], dict[str, float]]] = {
-    "men 46": (
-        {"centre": 423, "shoulder": 139, "side": 197, "width": 242, "neck": 86, "armhole": 211, "area": 945},
-        {"centre": 380, "shoulder": 139, "side": 197, "width": 242, "neck": 109, "armhole": 211, "area": 919},
-    ),
-    "men 50": (
-        {"centre": 426, "shoulder": 139, "side": 197, "width": 262, "neck": 89, "armhole": 225, "area": 1002},
-        {"centre": 380, "shoulder": 139, "side": 197, "width": 262, "neck": 113, "armhole": 225, "area": 973},
-    ),
-    "men 54": (
-        {"centre": 429, "shoulder": 139, "side": 197, "width": 282, "neck": 93, "armhole": 240, "area": 1060},
-        {"centre": 382, "shoulder": 139, "side": 197, "width": 282, "neck": 118, "armhole": 241, "area": 1029},
-    ),
-}
+DRAFTED = Path(__file__).with_name("drafted_blocks.json")
+MEN = ("men 46", "men 50", "men 54")
 
 
 def measured(garment: Garment) -> dict[str, float]:
@@ -120,33 +87,108 @@ def half_area(garment: Garment, piece: str) -> float:
     return 1e4 * 0.25 * float(np.sum(x * np.roll(y, -1, axis=1) - y * np.roll(x, -1, axis=1)))
 
 
-def compare_men() -> None:
+def flattened(size: str) -> Garment:
+    """Return the block in a size: the shipped scene's, or a man's without darts."""
+    if size.startswith("men"):
+        table: dict[str, Any] = {"form": "basic_block", "fabric": "woven", "ease": {"preset": "close", "bust": 5.0}}
+    else:
+        table = load_scene(SCENE).settings.model_dump(exclude_unset=True, by_alias=True)
+    scene = make_scene({**table, "mannequin": {"size": size}}, name="block", folder=SCENE.parent, where=str(SCENE))
+    return plan_garment(scene).flatten()
+
+
+def bodice_values(garment: Garment, face: str) -> dict[str, float]:
+    """Return the values of half a man's front or back bodice [mm, cm2]."""
+    piece = f"{face}_bodice"
+    lines, positions = garment.form.pieces[piece].surface.lines, garment.pieces[piece].positions
+    whole = {"centre": f"centre {face}", "shoulder": "shoulder left", "side": "side left", "armhole": "armhole left"}
+    found = {key: 1e3 * polyline_length(positions[lines[line]]) for key, line in whole.items()}
+    half = {"width": "bust", "neck": "neck", "waist": "waist"}
+    found |= {key: 5e2 * polyline_length(positions[lines[line]]) for key, line in half.items()}
+    return {**found, "area": half_area(garment, piece)}
+
+
+def compare_men(sizes: Sequence[str]) -> None:
     """Print the bodices of men's sizes beside drafted ones."""
-    for size, drafted in DRAFTED_MEN.items():
-        table = {"form": "basic_block", "fabric": "woven", "ease": {"preset": "close", "bust": 5.0}}
-        scene = make_scene({**table, "mannequin": {"size": size}}, name="men", folder=Path(), where=str(SCENE))
-        garment = plan_garment(scene).flatten()
+    drafted = json.loads(DRAFTED.read_text(encoding="utf-8"))
+    for size in sizes:
+        garment = flattened(size)
         print(f"{size}: {quality(garment)}")
-        for face, there in zip(("back", "front"), drafted, strict=True):
-            piece = f"{face}_bodice"
-            lines, positions = garment.form.pieces[piece].surface.lines, garment.pieces[piece].positions
-            own = {
-                "centre": f"centre {face}",
-                "shoulder": "shoulder left",
-                "side": "side left",
-                "armhole": "armhole left",
-            }
-            here = {key: 1e3 * polyline_length(positions[lines[line]]) for key, line in own.items()}
-            here |= {
-                key: 5e2 * polyline_length(positions[lines[line]])
-                for key, line in {"width": "bust", "neck": "neck"}.items()
-            }
-            here["area"] = half_area(garment, piece)
-            row = ", ".join(f"{key} {here[key]:.0f} ({value:g})" for key, value in there.items())
-            print(
-                f"  {face}, ours (drafted): {row}; waist {5e2 * polyline_length(positions[lines['waist']]):.0f}",
-                flush=True,
+        for face in ("back", "front"):
+            own = bodice_values(garment, face)
+            found = []
+            for key in (key for key in own if key in drafted[size][0][face]):
+                low, high = sorted(draft[face][key] for draft in drafted[size])
+                found.append(f"{key} {own[key]:.0f} ({low}-{high}, {beyond(key, own[key], low, high)})")
+            # Ours is fitted at the waist: a triangle from the underarm to the waist is missing at the side.
+            least = min(
+                draft[face]["area"] - 0.005 * (draft[face]["width"] - own["waist"]) * draft[face]["side"]
+                for draft in drafted[size]
             )
+            print(f"  {face}, ours (drafted): {', '.join(found)}; area fitted at the waist {least:.0f} "
+                  f"({100 * (own['area'] / least - 1):+.1f} %)", flush=True)  # fmt: skip
+
+
+def beyond(name: str, own: float, low: float, high: float) -> str:
+    """Return how far a value lies outside a range, in mm or, of an area, in percent."""
+    away = max(low - own, own - high, 0.0) * (1.0 if own > high else -1.0)
+    if name.startswith("area"):
+        return f"{100 * away / (0.5 * (low + high)) + 0.0:+.1f} %"
+    return f"{away + 0.0:+.0f}"
+
+
+def drafting_inputs(size: str) -> dict[str, Any]:
+    """Return what the drafting program is given: lengths [mm], angles [degrees] and ease of a form on its body."""
+    garment = flattened(size)
+    body, girths = garment.mannequin, garment.metrics()["girths"]
+    layout, at = body.layout, body.vertices
+    levels = body.metrics()["levels"]
+    girth = {
+        name: 1e3 * levels[name]["girth_m"] for name in ("bust", "underbust", "waist", "hip", "neck", "biceps left")
+    }
+    height = {
+        name: float(at[layout.rings[layout.level_row[name]], 1].mean()) for name in ("bust", "waist", "hip", "knee")
+    }
+    ease = {name: own["pattern_m"] / own["body_m"] - 1.0 for name, own in girths.items()}
+    shoulder = at[layout.lines["shoulder left"]]
+    top, tip = shoulder[shoulder[:, 1].argmax()], shoulder[shoulder[:, 1].argmin()]
+    princess = at[layout.lines["princess front left"]]
+    given = {
+        "chest": girth["bust"],
+        "waist": girth["waist"],
+        "neck": girth["neck"],
+        "biceps": girth["biceps left"],
+        "hpsToBust": 1e3 * polyline_length(princess[princess[:, 1] >= height["bust"] - 1e-6]),
+        "shoulderToShoulder": 2e3 * float(tip[0]),
+        "shoulderSlope": float(np.degrees(np.arctan2(top[1] - tip[1], np.hypot(*(tip - top)[[0, 2]])))),
+        "waistToArmpit": 1e3 * (float(at[layout.lines["side left"], 1].max()) - height["waist"]),
+    }  # fmt: skip
+    if size.startswith("men"):
+        lengths = {face: bodice_values(garment, face) for face in ("back", "front")}
+        given |= {"hpsToWaistBack": lengths["back"]["centre"] + 0.05 * girth["neck"], "waistToHips": 110.0}
+        return {"measurements": given, "lengths": lengths, "brian": {"chestEase": ease["bust"]}}
+    own = measured(garment)
+    ring = at[layout.rings[layout.level_row["waist"]]]
+    to_seat = 1e3 * (height["waist"] - height["hip"])
+    given |= {
+        "highBust": 0.95 * girth["bust"],
+        "bustSpan": 1e3 * 0.205 * levels["bust"]["girth_m"],
+        "waistBack": 1e3 * polyline_length(ring[layout.quarter : 3 * layout.quarter + 1]),
+        "hpsToWaistFront": own["centre front"] + 0.19 * girth["neck"],
+        "hpsToWaistBack": own["centre back"] + 0.06 * girth["neck"],
+        "seat": girth["hip"],
+        "seatBack": girth["hip"] * own["hip back"] / (own["hip back"] + own["hip front"]),
+        "waistToHips": 0.5 * to_seat,
+        "waistToSeat": to_seat,
+        "waistToKnee": 1e3 * (height["waist"] - height["knee"]),
+    }
+    return {
+        "measurements": given,
+        "underbusts": [girth["underbust"], girth["bust"]],
+        "lengths": own,
+        "bella": {"chestEase": ease["bust"], "waistEase": ease["waist"]},
+        "penelope": {"waistEase": ease["waist"], "seatEase": ease["hip"]},
+    }
 
 
 def quality(garment: Garment) -> str:
@@ -166,31 +208,32 @@ def quality(garment: Garment) -> str:
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--sizes", nargs="+", default=SIZES)
+    parser.add_argument("--sizes", nargs="+")
     parser.add_argument("--men", action="store_true", help="men's bodices instead")
+    parser.add_argument("--inputs", action="store_true", help="print what the drafting program is given")
     arguments = parser.parse_args()
-    if arguments.men:
-        compare_men()
+    sizes = arguments.sizes or (MEN if arguments.men else SIZES)
+    if arguments.inputs:
+        print(json.dumps({size: drafting_inputs(size) for size in (*sizes, *MEN)}, indent=1))
         return
-    sizes = arguments.sizes
-    scene = load_scene(SCENE)
+    if arguments.men:
+        compare_men(sizes)
+        return
+    drafted = json.loads(DRAFTED.read_text(encoding="utf-8"))
     columns: dict[str, dict[str, float]] = {}
     for size in sizes:
-        table = scene.settings.model_dump(exclude_unset=True, by_alias=True)
-        table["mannequin"] = {"size": size}
-        start = time.perf_counter()
-        garment = plan_garment(make_scene(table, name=scene.name, folder=scene.folder, where=str(SCENE))).flatten()
+        start = time.process_time()
+        garment = flattened(size)
         columns[size] = measured(garment)
-        print(f"{size}: {quality(garment)}, {time.perf_counter() - start:.1f} s", flush=True)
-    print(f"\n{'':20}" + "".join(f"{size:>9}" for size in sizes) + f"{'drafted EU 38':>16}{'beyond':>9}")
-    for name, (low, high) in DRAFTED.items():
-        row = "".join(f"{columns[size][name]:9.0f}" for size in sizes)
-        beyond = ""
-        if "EU 38" in columns:
-            own = columns["EU 38"][name]
-            away = max(low - own, own - high, 0.0) * (1.0 if own > high else -1.0)
-            beyond = f"{100 * away / (low + high) * 2:+.1f} %" if name.startswith("area") else f"{away:+.0f}"
-        print(f"{name:20}{row}{f'{low:g}' if low == high else f'{low:g}-{high:g}':>16}{beyond:>9}")
+        print(f"{size}: {quality(garment)}, {time.process_time() - start:.1f} s", flush=True)
+    print(f"\nours (drafted, beyond)\n{'':20}" + "".join(f"{size:>24}" for size in sizes))
+    for name in columns[sizes[0]]:
+        row = []
+        for size in sizes:
+            low, high = sorted(draft[name] for draft in drafted[size])
+            words = f"{low}" if low == high else f"{low}-{high}"
+            row.append(f"{columns[size][name]:.0f} ({words}, {beyond(name, columns[size][name], low, high)})")
+        print(f"{name:20}" + "".join(f"{words:>24}" for words in row))
 
 
 if __name__ == "__main__":

@@ -14,7 +14,8 @@ from warpflat.fabric.fabric import grain_axes
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint, FixedLength, Straight, Symmetric
-from warpflat.garment.sewing import Sewn, sew
+from warpflat.garment.sewing import sew
+from warpflat.garment.sewn import Sewn
 from warpflat.model.constraint_equations import smooth_equations
 from warpflat.solver.options import RelaxOptions
 from warpflat.solver.relaxation import Relaxation

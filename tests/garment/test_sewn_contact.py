@@ -9,7 +9,8 @@ from devices import DEVICE
 
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.flattening.result import Flattening
-from warpflat.garment.sewing import SeamPair, sew
+from warpflat.garment.sewing import sew
+from warpflat.garment.sewn import SeamPair
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.injective import is_injective
 from warpflat.surface.repair.validate import make_surface

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 import tomllib
 
 from warpflat.cli.main import main
 from warpflat.core.errors import InputError
-from warpflat.core.polyline import arc_lengths
+from warpflat.core.polyline import arc_lengths, polyline_length
+from warpflat.export.read_pattern_json import read_pattern_json
+from warpflat.garment.pattern_files import PatternOptions, garment_files
 from warpflat.scene.form_edits import edit_dart, rotate_dart, split_dart
 from warpflat.scene.form_ledger import form_ledger, with_cut
 from warpflat.scene.form_shaping import settle_shape
@@ -133,6 +136,35 @@ def test_a_dart_turned_into_gathers_lengthens_its_seam():
     longer, shorter = max(side.lengths), min(side.lengths)
     assert longer - shorter == pytest.approx(mouth, rel=0.1)
     assert tomllib.loads(data["toml"])["seams"][0]["longer"] == "front"
+
+
+def test_a_dart_turned_into_a_pleat_is_sewn_as_far_as_it_is_drawn(tmp_path: Path):
+    """The mouth stays and is sewn for 40 mm; below, the cloth is free, which can only cost less."""
+    darted = scene(cuts=[{**FRONT, "name": "waist dart", "mouth_mm": 40}])
+    edit = edit_dart(darted, "front.waist dart", how="turn", aim="pleat")
+    data = edit.as_dict()
+    assert data["after"]["model_energy_j"] < data["before"]["model_energy_j"] * 1.001
+    assert data["after"]["mouths_m"] == pytest.approx(data["before"]["mouths_m"], abs=1e-5)
+    assert tomllib.loads(data["toml"])["cuts"][-1]["pleat_mm"] == 40
+    piece = edit.after.form.pieces["front"]
+    left, right = (piece.edges[leg] for leg in piece.darts["waist dart left"])
+    apart = np.linalg.norm(
+        np.diff(edit.after.pieces["front"].positions[np.stack([left, right[::-1]])], axis=0)[0], axis=1
+    )
+    # Legs that are sewn to each other are as long; the tip is one point.
+    assert apart[0] == pytest.approx(0.04, abs=1e-4)
+    written = garment_files(
+        {"": edit.after}, tmp_path, name="pleat", options=PatternOptions(formats=("dxf", "svg", "json"))
+    )
+    drafted = read_pattern_json(tmp_path / "pattern.json").pieces[""]
+    front = next(own for own in drafted if own.name == "front")
+    assert {dart.dart.pleat for dart in front.darts} == {0.04}
+    assert front.drill_holes == ()
+    legs = [front.edge(name) for dart in front.darts for name in (dart.dart.left, dart.dart.right)]
+    assert [polyline_length(front.drawn_line(leg)) for leg in legs] == pytest.approx([0.04] * len(legs), abs=1e-6)
+    assert sum(notch.seam.startswith("waist dart") for notch in front.notches) == len(legs)
+    assert "PLEAT: waist dart left" in (tmp_path / "pleat.dxf").read_text(encoding="utf-8")
+    assert any("pleat waist dart left: fold 40 mm" in note for note in written.notes)
 
 
 def test_the_command_makes_a_cut_of_a_form(tmp_path: Path, capsys: pytest.CaptureFixture[str]):

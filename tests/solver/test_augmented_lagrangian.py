@@ -11,7 +11,8 @@ from warpflat.kernels.constraints import LENGTHS, LINEAR, STRAIGHT
 from warpflat.fabric.library import find_fabric
 from warpflat.flattening.flatten_piece import flatten
 from warpflat.garment.constraints import FixedLength, Straight
-from warpflat.garment.sewing import Sewn, sew
+from warpflat.garment.sewing import sew
+from warpflat.garment.sewn import Sewn
 from warpflat.model.network import SpringNetwork
 from warpflat.solver.augmented_lagrangian import _equation_rows
 from warpflat.solver.options import RelaxOptions, Solver

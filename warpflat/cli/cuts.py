@@ -33,7 +33,9 @@ __all__ = ["cuts"]
 )
 @click.option("--rotate", nargs=2, metavar="DART LINE", help="A form's dart is to lie along another line of its piece.")
 @click.option("--split", nargs=2, metavar="DART LINE", help="A second dart along LINE, or between the dart and LINE.")
-@click.option("--turn", nargs=2, metavar="DART KIND", help="A form's dart becomes a seam, ease, gathers or nothing.")
+@click.option(
+    "--turn", nargs=2, metavar="DART KIND", help="A form's dart becomes a seam, ease, a pleat, gathers or nothing."
+)
 @click.option("--at", metavar="LINE", help="Where the mouth of the rotated or second dart lies, as 'shoulder left'.")
 @output_options(printed="ledger.json, with --apply metrics.json,")
 def cuts(

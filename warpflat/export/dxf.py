@@ -198,7 +198,8 @@ def _write_edges(
             _line(block, edge.line[[0, -1]], scale, "6")
         else:
             # The legs of a dart that is cut away are seams with an allowance, those of a folded one lie inside.
-            _polyline(block, edge.line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
+            line = piece.drawn_line(edge)
+            _polyline(block, line, scale, "8" if edge.kind == "dart" and edge.width == 0 else "14")
         texts = [f"EDGE: {edge.name}", *(f"SEAM: {words}" for words in seams.get((piece.name, edge.name), ()))]
         middle = edge.line[len(edge.line) // 2] if len(edge.line) > 2 else edge.line.mean(axis=0)
         for row, text in enumerate(texts):
@@ -210,7 +211,8 @@ def _write_darts(block: list[str], piece: DraftedPiece, scale: float) -> None:
     for dart in piece.darts:
         if dart.fold is not None:
             _polyline(block, dart.fold, scale, "8")
-        _text(block, f"DART: {dart.dart.name}", dart.tip, scale, "15", 0.003)
+        word = "DART" if dart.dart.pleat is None else "PLEAT"
+        _text(block, f"{word}: {dart.dart.name}", dart.tip, scale, "15", 0.003)
     for name, line in piece.fisheyes.items():
         _polyline(block, line, scale, "8", closed=True)
         _text(block, f"DART: {name}", line.mean(axis=0), scale, "15", 0.003)

@@ -118,6 +118,7 @@ def _piece(piece: DraftedPiece) -> dict[str, Any]:
                 "fold": None if dart.fold is None else dart.fold.tolist(),
                 "fold_to": dart.fold_to,
                 "opening": dart.opening,
+                "pleat": dart.dart.pleat,
                 "length_mm": [1000 * piece.edge(leg).length for leg in (dart.dart.left, dart.dart.right)],
             }
             for dart in piece.darts

@@ -100,6 +100,7 @@ class DartEntry(Entry):
     fold: Line | None
     fold_to: Literal["", "left", "right"]
     opening: float
+    pleat: float | None = None
 
 
 class NotchEntry(Entry):

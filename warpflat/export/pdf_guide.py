@@ -194,8 +194,8 @@ def _thumbnail(canvas: Any, piece: DraftedPiece, centre: FloatArray, scale: floa
     draw(piece.cut_line, 0.7, closed=True)
     draw(piece.grain, 0.4, closed=False)
     for dart in piece.darts:
-        legs = np.concatenate([piece.edge(dart.dart.left).line, piece.edge(dart.dart.right).line])
-        draw(legs, 0.4, closed=False)
+        for leg in (dart.dart.left, dart.dart.right):
+            draw(piece.drawn_line(piece.edge(leg)), 0.4, closed=False)
     canvas.setDash([2, 1.2])
     canvas.setStrokeColor("#b8460b")
     for edge in piece.fold_edges:

@@ -123,7 +123,9 @@ def _side(parts: Sequence[SideEntry]) -> tuple[SeamSide, ...]:
 
 def _piece(name: str, size: str, data: PieceEntry) -> DraftedPiece:
     frame = np.array(data.frame)
-    darts = [Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None) for d in data.darts]
+    darts = [
+        Dart(name=d.name, left=d.left, right=d.right, fold_to=d.fold_to or None, pleat=d.pleat) for d in data.darts
+    ]
     cutouts = {key: _cutout(data, key) for key in data.cutouts}
     fisheyes = {key: np.array(line) for key, line in data.fisheye_darts.items()}
     internal_lines = {key: np.array(line) for key, line in data.internal_lines.items()}

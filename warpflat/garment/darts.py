@@ -7,23 +7,37 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length
+from warpflat.core.polyline import arc_lengths, polyline_length
 from warpflat.garment.constraints import DartMouth
-from warpflat.garment.sewing import SeamPair
+from warpflat.garment.sewn import SeamPair
 
 if TYPE_CHECKING:
     from warpflat.mannequin.forms import FormResult
 
-__all__ = ["dart_constraints", "dart_pairs", "measure_darts"]
+__all__ = ["dart_constraints", "dart_pairs", "measure_darts", "pleat_depths"]
 
 
 def dart_pairs(form: FormResult) -> list[SeamPair]:
-    """Return the legs of every dart, to be sewn to each other."""
-    return [
-        SeamPair(name=f"{name}.{dart}", pieces=(name, name), vertices=(piece.edges[left], piece.edges[right][::-1]))
-        for name, piece in form.pieces.items()
-        for dart, (left, right) in piece.darts.items()
-    ]
+    """Return the legs of every dart, to be sewn to each other; those of a pleat as far as it is sewn."""
+    pleats = pleat_depths(form)
+    found = []
+    for name, piece in form.pieces.items():
+        for dart, (left, right) in piece.darts.items():
+            legs = piece.edges[left], piece.edges[right][::-1]
+            along = arc_lengths(piece.surface.vertices[legs[0]])
+            # One edge of the mesh at least.
+            count = max(2, int(np.searchsorted(along, pleats.get((name, dart), along[-1]) + 1e-9, "right")))
+            found.append(
+                SeamPair(name=f"{name}.{dart}", pieces=(name, name), vertices=(legs[0][:count], legs[1][:count]))
+            )
+    return found
+
+
+def pleat_depths(form: FormResult) -> dict[tuple[str, str], float]:
+    """Return how far from its mouth every pleat is sewn [m], by piece and dart."""
+    return {
+        (dart.piece, dart.name): 1e-3 * dart.asked.pleat_mm for dart in form.darts if dart.asked.pleat_mm is not None
+    }
 
 
 def dart_constraints(form: FormResult) -> list[DartMouth]:
@@ -51,6 +65,7 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
     """
     piece = form.pieces[name]
     placed = {dart.name: dart for dart in form.darts if dart.piece == name}
+    pleats = pleat_depths(form)
     found = []
     for dart, (left, right) in piece.darts.items():
         legs = [positions[piece.edges[edge]] for edge in (left, right)]
@@ -61,6 +76,7 @@ def measure_darts(form: FormResult, name: str, positions: FloatArray) -> list[di
                 "intake_m": float(np.linalg.norm(legs[0][0] - legs[1][-1])),
                 "legs_m": [polyline_length(leg) for leg in legs],
                 "tip_to_point_m": placed[dart].to_point,
+                **({"pleat_m": pleats[name, dart]} if (name, dart) in pleats else {}),
             }
         )
     return found

@@ -20,7 +20,7 @@ from warpflat.garment.edge_rules import HEMMED_LEVELS
 from warpflat.pattern.fairing import count_inflections, fair_line, shortest_wave
 
 if TYPE_CHECKING:
-    from warpflat.garment.sewing import ConstraintResult
+    from warpflat.garment.sewn import ConstraintResult
     from warpflat.mannequin.forms import FormResult
     from warpflat.mannequin.layout import Layout
 

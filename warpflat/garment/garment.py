@@ -29,7 +29,8 @@ from warpflat.garment.openings import Opening, opened_rings
 from warpflat.garment.pockets import Pocket
 from warpflat.garment.rings import GarmentRing, measure_rings
 from warpflat.garment.seam_length import SeamLengths
-from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.garment.sewing import sew
+from warpflat.garment.sewn import SeamPair, Sewn
 from warpflat.garment.wearer import WearerFit, assess_wearer
 from warpflat.mannequin.forms import FormResult
 from warpflat.mannequin.mannequin import Mannequin

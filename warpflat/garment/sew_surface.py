@@ -12,7 +12,8 @@ from warpflat.flattening.result import Flattening
 from warpflat.garment.constraints import Constraint
 from warpflat.garment.fullness import FullEdge, give_fullness
 from warpflat.garment.seam_length import SeamLengths
-from warpflat.garment.sewing import SeamPair, Sewn, sew
+from warpflat.garment.sewing import sew
+from warpflat.garment.sewn import SeamPair, Sewn
 from warpflat.solver.options import RelaxOptions
 from warpflat.surface.border_seams import NamedSeam, SurfaceSeam, surface_seams
 

@@ -16,6 +16,7 @@ import numpy as np
 from warpflat.core.arrays import FloatArray, IntArray
 from warpflat.core.errors import InputError
 from warpflat.core.text import find_unused_name
+from warpflat.garment.darts import pleat_depths
 from warpflat.garment.ease import measure_ease
 from warpflat.garment.edge_rules import EdgeRules
 from warpflat.garment.facings import STAND, Stand
@@ -167,6 +168,7 @@ def _pieces(
     quantities: Mapping[str, int],
 ) -> tuple[Piece, ...]:
     """Return all pieces of one size; those in `opened` are halves that cannot lie on the fold and are cut twice."""
+    pleats = pleat_depths(garment.form)
     return tuple(
         _piece(
             flat,
@@ -176,6 +178,7 @@ def _pieces(
             size=size,
             quantity=2 if name in opened else quantities[name],
             open_fold=name in opened,
+            pleats={dart: depth for (piece, dart), depth in pleats.items() if piece == name},
         )
         for name, flat in garment.pieces.items()
     )
@@ -291,6 +294,7 @@ def _piece(
     size: str,
     quantity: int,
     open_fold: bool,
+    pleats: Mapping[str, float],
 ) -> Piece:
     """Return one piece of a garment with its edges, internal lines and grain."""
     name = piece.surface.name
@@ -306,7 +310,13 @@ def _piece(
     edges = _clear_legs(edges, piece.darts, name)
     legs = {edge.name: edge.points for edge in edges if edge.kind == "dart"}
     darts = [
-        Dart(name=dart, left=left, right=right, cut=are_curved(legs[left], legs[right]))
+        Dart(
+            name=dart,
+            left=left,
+            right=right,
+            cut=are_curved(legs[left], legs[right]),
+            pleat=pleats.get(dart),
+        )
         for dart, (left, right) in piece.darts.items()
     ]
     border = list(piece.edges.values())

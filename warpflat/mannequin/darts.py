@@ -42,6 +42,7 @@ class FormDart:
         mirrored: its mirror image is a dart, too, in the same piece or in the mirror image of that.
         mouth_mm: how wide it opens at the border [mm]; None leaves it to the cloth.
         like: name of another dart of the piece that opens as wide; None leaves it to the cloth.
+        pleat_mm: it is a pleat, sewn this far from its mouth [mm], and hangs open below; None for a dart.
     """
 
     name: str
@@ -55,6 +56,7 @@ class FormDart:
     mouth_mm: float | None = None
     like: str | None = None
     at: str | None = None
+    pleat_mm: float | None = None
 
     @property
     def place(self) -> tuple[str, str, str | None, str | None]:

@@ -192,8 +192,8 @@ def _internal_lines(piece: Piece, frame: FloatArray, tolerance: float | None) ->
 
 
 def _drill_holes(darts: Sequence[DraftedDart], fisheyes: Mapping[str, FloatArray]) -> tuple[DrillHole, ...]:
-    """Return the tips of all darts, which are marked through the cloth."""
-    holes = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts]
+    """Return the tips of all darts but pleats, which are marked through the cloth."""
+    holes = [DrillHole(name=dart.dart.name, at=dart.tip) for dart in darts if dart.dart.pleat is None]
     holes += [DrillHole(name=name, at=end) for name, line in fisheyes.items() for end in fisheye_legs(line)[0][[0, -1]]]
     return tuple(holes)
 

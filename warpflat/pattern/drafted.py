@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from warpflat.core.arrays import FloatArray
-from warpflat.core.polyline import polyline_length
+from warpflat.core.polyline import arc_lengths, points_at_lengths, polyline_length
 from warpflat.pattern.curves import Curve
 from warpflat.pattern.label import Label
 from warpflat.pattern.pieces import Dart, Edge, Garment, Piece
@@ -24,6 +24,7 @@ __all__ = [
     "DrillHole",
     "Notch",
     "SeamReport",
+    "drawn_leg",
 ]
 
 
@@ -164,6 +165,15 @@ class DraftedPiece:
         self.piece.edge(name)
         return next(edge for edge in self.edges if edge.name == name)
 
+    def drawn_line(self, edge: DraftedEdge) -> FloatArray:
+        """Return what is drawn of an edge, #P by 2 [m]: all of it, but of the legs of a pleat what is sewn."""
+        for dart in self.darts:
+            if dart.dart.pleat is not None and edge.name == dart.dart.left:
+                return drawn_leg(edge.line, dart.dart.pleat)
+            if dart.dart.pleat is not None and edge.name == dart.dart.right:
+                return drawn_leg(edge.line[::-1], dart.dart.pleat)[::-1]
+        return edge.line
+
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class DraftedGarment:
@@ -243,3 +253,10 @@ class SeamReport:
     def matches(self) -> bool:
         near = self.local_mm is None or self.local_mm <= LOCAL_TOLERANCE * 1000
         return near and abs(self.difference_mm) <= SEAM_TOLERANCE * 1000
+
+
+def drawn_leg(line: FloatArray, depth: float) -> FloatArray:
+    """Return the part of a pleat's line (#P by 2 [m], from the border) that is drawn: as far as it is sewn."""
+    arc = arc_lengths(line)
+    kept = arc < depth
+    return line if kept.all() else np.vstack([line[kept], points_at_lengths(line, depth)])

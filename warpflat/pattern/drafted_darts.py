@@ -11,7 +11,7 @@ from warpflat.core.arrays import FloatArray
 from warpflat.core.polyline import arc_lengths
 from warpflat.pattern.curves import TOLERANCE, fit_curve
 from warpflat.pattern.dart_allowance import WIDEST_DART
-from warpflat.pattern.drafted import DraftedDart, DraftedEdge
+from warpflat.pattern.drafted import DraftedDart, DraftedEdge, drawn_leg
 from warpflat.pattern.pieces import SAME_POINT, Dart, Piece
 from warpflat.pattern.seam_difference import SEAM_TOLERANCE
 from warpflat.pattern.sides import Wedge
@@ -68,7 +68,7 @@ def dart_legs(piece: Piece, edges: Sequence[DraftedEdge]) -> dict[str, DartLegs]
         wedge = Wedge(name=dart.name, left=left.line, right=right.line, fold_to=fold_to)
         legs = DartLegs(dart=dart, left=left, right=right, wedge=wedge)
         # Legs that are one line (a dart of no width) have nothing to fold.
-        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and _has_room(legs))
+        folded = SAME_POINT < wedge.opening <= WIDEST_DART and not (dart.cut and dart.pleat is None and _has_room(legs))
         found[dart.name] = replace(
             legs,
             left=replace(left, width=0.0 if folded else _leg_width(left)),
@@ -113,6 +113,8 @@ def dart_line(legs: DartLegs, cut_line: FloatArray) -> DraftedDart:
     fold = np.stack([wedge.tip, far])
     if are_curved(left, right):
         fold = np.concatenate([_middle_line(left[::-1], right), fold[1:]])
+    if legs.dart.pleat is not None:
+        fold = drawn_leg(fold[::-1], legs.dart.pleat)[::-1]
     return DraftedDart(dart=legs.dart, tip=wedge.tip, fold=fold, fold_to=wedge.fold_to, opening=legs.mouth)
 
 
@@ -130,11 +132,16 @@ def dart_notes(legs: DartLegs) -> list[str]:
     """Return what the cutter should know of a dart whose legs have their allowance."""
     dart, left, right = legs.dart, legs.left, legs.right
     notes = []
-    if abs(left.length - right.length) > SEAM_TOLERANCE:
+    if dart.pleat is None and abs(left.length - right.length) > SEAM_TOLERANCE:
         notes.append(f"dart {dart.name}: its legs differ by {abs(left.length - right.length) * 1000:.1f} mm")
     if legs.wedge is None and left.width > 0:
         why = f"its legs bend by {legs.bend * 1000:.0f} mm" if dart.cut else "it opens too wide"
         notes.append(f"dart {dart.name} is cut away, not folded: {why}; sew its legs as a seam")
+    if dart.pleat is not None:
+        return [
+            *notes,
+            f"pleat {dart.name}: fold {legs.mouth * 1000:.0f} mm, sew {dart.pleat * 1000:.0f} mm down from the edge",
+        ]
     if legs.wedge is not None and dart.cut:
         notes.append(
             f"dart {dart.name} is folded, not cut away: its mouth of {legs.mouth * 1000:.0f} mm has no room for the "

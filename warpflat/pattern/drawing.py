@@ -91,7 +91,7 @@ def draw_piece(piece: DraftedPiece, paper: OnPaper | None = None) -> Drawing:
     joints = () if paper is None else paper.joints
     strokes = [
         *_cut_strokes(piece, open_folds=paper is not None),
-        *(_edge_stroke(edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
+        *(_edge_stroke(piece, edge) for edge in piece.edges if paper is None or edge.kind != "fold"),
         *_cutout_sew_strokes(piece),
         *_detail_strokes(piece),
         *grain_strokes(piece.grain),
@@ -121,7 +121,7 @@ def draw_nest(pieces: tuple[DraftedPiece, ...], paper: OnPaper | None = None) ->
         strokes = [
             *_cut_strokes(piece, open_folds=paper is not None),
             *(
-                replace(_edge_stroke(e), hidden=e.kind not in ("dart", "fold"))
+                replace(_edge_stroke(piece, e), hidden=e.kind not in ("dart", "fold"))
                 for e in piece.edges
                 if paper is None or e.kind != "fold"
             ),
@@ -159,7 +159,7 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
         on_fold |= np.maximum(*away) < ON_FOLD
     if not on_fold.any() or on_fold.all():
         whole = Stroke(role="cut", name="cut", points=ring, closed=True)
-        return [whole, *(_edge_stroke(edge) for edge in piece.fold_edges)]
+        return [whole, *(_edge_stroke(piece, edge) for edge in piece.fold_edges)]
     first = next(k for k in range(len(ring)) if on_fold[k - 1] and not on_fold[k])
     order = np.roll(np.arange(len(ring)), -first)
     changes = [k for k in range(len(ring)) if on_fold[order[k]] != on_fold[order[k - 1]]]
@@ -178,9 +178,10 @@ def _cut_strokes(piece: DraftedPiece, *, open_folds: bool) -> list[Stroke]:
     return strokes
 
 
-def _edge_stroke(edge: DraftedEdge) -> Stroke:
+def _edge_stroke(piece: DraftedPiece, edge: DraftedEdge) -> Stroke:
     role = edge.kind if edge.kind in ("hem", "fold", "dart") else "sew"
-    return Stroke(role=role, name=edge.name, points=edge.line, curve=edge.curve)
+    line = piece.drawn_line(edge)
+    return Stroke(role=role, name=edge.name, points=line, curve=edge.curve if line is edge.line else None)
 
 
 def _cutout_sew_strokes(piece: DraftedPiece) -> list[Stroke]:
@@ -294,7 +295,7 @@ def _named_lines(piece: DraftedPiece, *, borders: bool) -> list[tuple[str, Float
     lines = [(name, line, False) for name, line in piece.internal_lines.items()]
     for edge in piece.edges:
         if edge.name in first_legs:
-            lines.append((first_legs[edge.name], edge.line, True))
+            lines.append((first_legs[edge.name], piece.drawn_line(edge), True))
         elif borders and edge.kind != "fold" and edge.name not in second_legs:
             lines.append((edge.name, edge.line, True))
     lines += [(name, fisheye_legs(line)[0][::-1], True) for name, line in piece.fisheyes.items()]

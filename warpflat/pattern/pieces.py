@@ -102,6 +102,7 @@ class Dart:
             a dart that lies across the grain, towards the fold or the middle of the piece for one along it.
         cut: the wedge is cut away and its legs get a seam's allowance, as in wide darts, where the mouth has room for
             that.
+        pleat: how far from the border a pleat is sewn [m]; it is folded, and open from there on. None for a dart.
     """
 
     name: str
@@ -109,6 +110,7 @@ class Dart:
     right: str
     fold_to: str | None = None
     cut: bool = False
+    pleat: float | None = None
 
     def __post_init__(self) -> None:
         if self.fold_to not in (None, "left", "right"):

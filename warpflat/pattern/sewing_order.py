@@ -107,10 +107,20 @@ def sewing_steps(garment: DraftedGarment, size: str) -> tuple[str, ...]:
     pieces = garment.pieces[size]
     titles = piece_titles([piece.piece for piece in pieces])
     steps = []
+    pleats = [
+        f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece, pleats=True))
+    ]
     darts = [f"{titles[piece.name]}: {_listed(names)}" for piece in pieces if (names := _dart_names(piece))]
     if darts:
         steps.append(
             translate("Sew the darts, from the edge to the tip, and press them: {darts}.", darts="; ".join(darts))
+        )
+    if pleats:
+        steps.append(
+            translate(
+                "Fold the pleats and sew them as far as they are marked; they hang open below: {pleats}.",
+                pleats="; ".join(pleats),
+            )
         )
     patches = [titles[piece.name] for piece in pieces if piece.piece.role == "pocket" and _is_patch(piece)]
     if patches:
@@ -199,9 +209,9 @@ def _eased(seam: SewnSeam) -> str:
     return translate(f", {'gather' if share > 0.15 else 'ease in'} the {{piece}}", piece=longer)
 
 
-def _dart_names(piece: DraftedPiece) -> list[str]:
-    names = [without_side(dart.dart.name) for dart in piece.darts]
-    names += [without_side(name) for name in piece.fisheyes]
+def _dart_names(piece: DraftedPiece, *, pleats: bool = False) -> list[str]:
+    names = [without_side(dart.dart.name) for dart in piece.darts if (dart.dart.pleat is not None) == pleats]
+    names += [without_side(name) for name in ([] if pleats else piece.fisheyes)]
     return [translate_name(name) for name in dict.fromkeys(names)]
 
 

@@ -169,6 +169,9 @@ PHRASES = {
     "Sew the darts, from the edge to the tip, and press them: {darts}.": (
         "Abnäher von der Kante zur Spitze nähen und bügeln: {darts}."
     ),
+    "Fold the pleats and sew them as far as they are marked; they hang open below: {pleats}.": (
+        "Falten legen und so weit nähen, wie sie eingezeichnet sind; darunter fallen sie offen: {pleats}."
+    ),
     "Finish the raw edges with a facing, a band or binding: {edges}.": (
         "Offene Kanten mit Beleg, Bündchen oder Einfassung versäubern: {edges}."
     ),

@@ -51,8 +51,9 @@ class CutTable(Table):
     "princess front left" and the like from the waist) need no `part`: `tip_mm` is how far before the bust point, or below
     the waist in a skirt, the dart ends. `at` names the line on which its mouth lies, as "shoulder left". `towards` puts it
     between two lines, `between` at that share of the way. `mouth_mm` is how wide it opens, or `like` another dart of its
-    piece; the energy that this costs is told. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts
-    the piece. `omit` leaves out the dart that the form's `shape` has there.
+    piece; the energy that this costs is told. With `pleat_mm` it is a pleat: folded, sewn this far from its mouth, and open
+    below. It is `mirrored` unless that is false. A `part` of [0, 1] is a seam, which parts the piece. `omit` leaves out the
+    dart that the form's `shape` has there.
     """
 
     name: Annotated[str, Field(max_length=100), AfterValidator(lambda name: plain_name(name, " _.+-"))] | None = None
@@ -70,6 +71,7 @@ class CutTable(Table):
     tip_mm: Annotated[float, Field(ge=0.0, le=500.0)] | None = None
     mouth_mm: Annotated[float, Field(ge=1.0, le=300.0)] | None = None
     like: str | None = None
+    pleat_mm: Annotated[float, Field(ge=1.0, le=500.0)] | None = None
     at: str | None = None
     omit: bool = False
     mirrored: bool = True
@@ -92,9 +94,9 @@ class CutTable(Table):
             raise ValueError(f"{where}: give part, or tip_mm, towards and at")
         if self.mouth_mm is not None and self.like is not None:
             raise ValueError(f"{where}: give mouth_mm or like")
-        if self.parts_piece and (self.mouth_mm is not None or self.like is not None):
+        if self.parts_piece and (self.mouth_mm or self.like or self.pleat_mm):
             raise ValueError(
-                f"{where}: a cut along the whole line is a seam, which has no mouth; leave out mouth_mm and like"
+                f"{where}: a cut along the whole line is a seam, which has no mouth; leave out mouth_mm, like and pleat_mm"
             )
 
     def check_for_surface(self, where: str) -> None:
@@ -106,6 +108,7 @@ class CutTable(Table):
             "tip_mm",
             "mouth_mm",
             "like",
+            "pleat_mm",
             "at",
             "omit",
             "mirrored",

@@ -70,13 +70,14 @@ def _dart(table: CutTable) -> FormDart:
         mirrored=table.mirrored,
         mouth_mm=table.mouth_mm,
         like=table.like,
+        pleat_mm=table.pleat_mm,
     )
 
 
 def cut_of_dart(dart: FormDart) -> dict[str, Any]:
     """Return the table of `[[cuts]]` that asks for a dart; what is the default anyway is left out."""
     keys: dict[str, Any] = {"name": dart.name, "piece": dart.piece, "line": dart.line}
-    for key in ("at", "towards", "tip_mm", "mouth_mm", "like"):
+    for key in ("at", "towards", "tip_mm", "mouth_mm", "like", "pleat_mm"):
         if getattr(dart, key) is not None:
             keys[key] = getattr(dart, key)
     if dart.towards is not None:

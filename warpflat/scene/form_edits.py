@@ -1,4 +1,4 @@
-"""Darts of a form are rotated, split, or turned into seams, ease and gathers: edits of a scene's tables.
+"""Darts of a form are rotated, split, or turned into seams, ease, pleats and gathers: edits of a scene's tables.
 
 An edit returns another scene. Both are run, and their energies lie side by side.
 """
@@ -24,7 +24,9 @@ from warpflat.scene.run_garment import plan_garment, scene_form, scene_recipe
 __all__ = ["KINDS", "DartEdit", "edit_dart", "rotate_dart", "split_dart", "turn_dart"]
 
 #: What a dart can be turned into.
-KINDS = ("seam", "ease", "gathers", "nothing")
+KINDS = ("seam", "ease", "pleat", "gathers", "nothing")
+#: How far from its mouth a pleat is sewn unless it is told otherwise [mm].
+PLEAT_MM = 40.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -131,13 +133,14 @@ def split_dart(scene: Scene, dart: str, line: str, *, at: str | None = None) -> 
 def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
     """Return a scene in which something else takes in what a dart took.
 
-    A seam runs along the whole line of the dart, and takes over other darts that point to it. Ease and gathers make the edge at
+    A seam runs along the whole line of the dart, and takes over other darts that point to it. A pleat has the dart's place
+    and mouth; it is sewn for 40 mm, and open below. Ease and gathers make the edge at
     the dart's mouth longer by what the dart took in than the one that it is sewn to.
 
     Args:
         scene: with a form.
         dart: "piece.name".
-        into: "seam", "ease", "gathers" or "nothing".
+        into: one of `KINDS`.
         garment: of the scene, flattened.
 
     Raises:
@@ -149,6 +152,9 @@ def turn_dart(scene: Scene, dart: str, into: str, garment: Garment) -> Scene:
     cuts = _cuts_without(scene, old)
     if into == "nothing":
         return scene_with(scene, cuts=cuts)
+    if into == "pleat":
+        pleat = cut_of_dart(replace(old, pleat_mm=PLEAT_MM))
+        return scene_with(scene, cuts=[*_cuts_without(scene, old, keep=True), pleat])
     if into == "seam":
         # The book's dart there goes with the piece.
         kept = [cut for cut in cuts if not (cut.get("omit") and place_of(cut) == old.place)]
