@@ -6,13 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from armhole_curves import depth_inside
 
 from warpflat.core.errors import InputError
 from warpflat.garment.rings import find_rings, ring_line
 from warpflat.mannequin.closest import Closest
 from warpflat.mannequin.forms import form_from_mapping, shipped_form
 from warpflat.mannequin.mannequin import Mannequin
-from warpflat.mannequin.neckline import Neckline
+from warpflat.mannequin.neckline import Neckline, widen_neck
 
 
 def neck_length(mannequin: Mannequin, form) -> float:
@@ -32,22 +33,31 @@ def test_neck_of_a_t_shirt_passes_the_head_at_a_jerseys_limit(size: str):
 def test_neckline_lies_on_the_form_and_leaves_the_rest_in_place():
     mannequin = Mannequin.from_size("EU 38", resolution_mm=20.0)
     plain = mannequin.form(form_from_mapping("top", {"like": "bodice"}))
-    wide = mannequin.form(form_from_mapping("top", {"like": "bodice", "neckline": {"side_cm": 2, "front_cm": 6}}))
     layout = mannequin.layout
+    wide = widen_neck(layout, plain.vertices, Neckline(side_cm=2.0, front_cm=6.0))
     faces = layout.faces.astype(np.int64)
     middles = len(plain.vertices) + np.arange(len(faces))
     triangles = np.concatenate([np.column_stack([faces[:, [k, (k + 1) % 4]], middles]) for k in range(4)])
     surface = Closest(np.vstack([plain.vertices, plain.vertices[faces].mean(axis=1)]), triangles)
-    moved = np.flatnonzero(np.any(wide.vertices != plain.vertices, axis=1))
+    moved = np.flatnonzero(np.any(wide != plain.vertices, axis=1))
     assert len(moved) > 100
     # The shoulder seam is a line of the mesh; all else is brought back to its faces.
-    assert surface(wide.vertices[moved])[2].max() < 1e-6
+    assert surface(wide[moved])[2].max() < 1e-6
     still = np.concatenate([layout.arms["left"][0], layout.rings[layout.level_row["bust"]]])
-    assert np.array_equal(wide.vertices[still], plain.vertices[still])
+    assert np.array_equal(wide[still], plain.vertices[still])
     mirror = layout.mirror[moved]
-    assert np.abs(wide.vertices[mirror] * [-1, 1, 1] - wide.vertices[moved]).max() < 1e-6
+    assert np.abs(wide[mirror] * [-1, 1, 1] - wide[moved]).max() < 1e-6
     front = layout.front[-1, layout.front.shape[1] // 2]
-    assert np.linalg.norm(wide.vertices[front] - plain.vertices[front]) == pytest.approx(0.06, abs=3e-3)
+    assert np.linalg.norm(wide[front] - plain.vertices[front]) == pytest.approx(0.06, abs=3e-3)
+
+
+def test_form_with_a_wide_neckline_lies_outside_the_body():
+    mannequin = Mannequin.from_size("men 46", resolution_mm=20.0)
+    made = mannequin.form("tshirt")
+    # Moved within the form's faces alone, vertices would lie 0.4 mm inside.
+    assert depth_inside(made, mannequin) < 1e-4
+    mirrored = made.vertices[mannequin.layout.mirror] * [-1, 1, 1]
+    assert np.abs(mirrored - made.vertices).max() < 1e-9
 
 
 def test_neckline_that_cannot_be_is_named():

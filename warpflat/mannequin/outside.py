@@ -30,12 +30,15 @@ class BodySurface:
     def __init__(self, layout: Layout, vertices: FloatArray) -> None:
         from scipy.spatial import cKDTree
 
-        faces = layout.body_faces
-        self.triangles = np.concatenate([faces[:, :3], faces[:, [0, 2, 3]]]).astype(np.int64)
-        self.vertices, self.normals = vertices, vertex_normals(vertices, faces)
+        faces = layout.body_faces.astype(np.int64)
+        # Both diagonals of each quad: the outer one counts, and mirror images stay alike.
+        splits = [
+            np.concatenate([faces[:, a], faces[:, b]]) for a, b in (([0, 1, 2], [0, 2, 3]), ([1, 2, 3], [1, 3, 0]))
+        ]
+        self.vertices, self.normals = vertices, vertex_normals(vertices, layout.body_faces)
         self.used = np.unique(faces)
         self.tree = cKDTree(vertices[self.used])
-        self.closest = Closest(vertices, self.triangles)
+        self.splits = [(triangles, Closest(vertices, triangles)) for triangles in splits]
         self.near = 0.25 * layout.resolution
 
     def ways_out(self, points: FloatArray) -> FloatArray:
@@ -45,12 +48,14 @@ class BodySurface:
         vertex = self.used[self.tree.query(points)[1]]
         rise = np.einsum("nk,nk->n", points - self.vertices[vertex], self.normals[vertex])
         near = np.flatnonzero(rise < self.near)
-        if len(near):
-            triangle, weights, _ = self.closest(points[near])
-            corners = self.triangles[triangle]
+        for triangles, closest in self.splits if len(near) else ():
+            triangle, weights, _ = closest(points[near])
+            corners = triangles[triangle]
             way = np.einsum("nk,nkd->nd", weights, self.vertices[corners]) - points[near]
             outward = np.einsum("nk,nkd->nd", weights, self.normals[corners])
-            ways[near] = np.where(np.einsum("nk,nk->n", way, outward)[:, None] > 0.0, way, 0.0)
+            way[np.einsum("nk,nk->n", way, outward) <= 0.0] = 0.0
+            longer = np.linalg.norm(way, axis=1) > np.linalg.norm(ways[near], axis=1)
+            ways[near[longer]] = way[longer]
         return ways
 
 

@@ -39,6 +39,7 @@ class LegSections:
         girths: by side #S, the hulls' girths [m].
         inwards: by side #S, how far each section is moved towards the midplane [m].
         crotch: height of the lowest point of the body in the midplane [m].
+        hip: height of the hip [m].
         slope: how far the legs' middles run apart per metre down the leg.
         noise: how far noise moved the scan's vertices before it was smoothed [m]; 0 without noise.
     """
@@ -48,6 +49,7 @@ class LegSections:
     girths: Mapping[str, FloatArray]
     inwards: Mapping[str, FloatArray]
     crotch: float
+    hip: float
     slope: float
     noise: float = 0.0
 
@@ -57,12 +59,19 @@ class LegSections:
         return self.hulls[side][row] - np.array([sign * self.inwards[side][row], 0.0])
 
     def move(self, points: FloatArray) -> FloatArray:
-        """Return points of the scan, #P by 3 [m], those of the legs moved inwards with them."""
+        """Return points of the scan, #P by 3 [m], those of the legs moved inwards with them.
+
+        From the crotch up to the hip flesh follows less and less, and in proportion to its distance from the midplane.
+        """
         out = points.copy()
-        low = points[:, 1] < self.y[-1]
+        top = float(self.y[-1])
+        rise = np.clip((points[:, 1] - top) / (self.hip - top), 0.0, 1.0)
         for side, sign in (("left", 1.0), ("right", -1.0)):
-            rows = low & (sign * points[:, 0] > 0.0) & (np.abs(points[:, 0]) < 0.5 * self.y[-1])
-            out[rows, 0] -= sign * np.interp(points[rows, 1], self.y, self.inwards[side])
+            rows = (rise < 1.0) & (sign * points[:, 0] > 0.0) & (np.abs(points[:, 0]) < 0.5 * top)
+            inwards = np.interp(points[rows, 1], self.y, self.inwards[side]) * (1.0 - rise[rows])
+            joint = 0.5 * float(np.ptp(self.hulls[side][-1][:, 0]))
+            follows = np.where(rise[rows] > 0.0, np.clip(sign * points[rows, 0] / joint, 0.0, 1.0), 1.0)
+            out[rows, 0] -= sign * inwards * follows
         return out
 
 
@@ -96,7 +105,7 @@ def slice_legs(slicer: Slicer, trunk: TrunkSections, hip: float) -> LegSections:
     return LegSections(
         y=heights, hulls={s: tuple(h) for s, h in found.items()}, inwards=inwards,
         girths={s: np.array(g) for s, g in girths.items()},
-        crotch=float(near.min()) if len(near) else trunk.crotch, slope=slope, noise=slicer.noise,
+        crotch=float(near.min()) if len(near) else trunk.crotch, hip=hip, slope=slope, noise=slicer.noise,
     )  # fmt: skip
 
 
@@ -213,11 +222,14 @@ def _seat_attractor(
         slicer: the upright scan.
         legs: sections of the legs, which are moved together.
         low, high: heights between which it is asked [m].
-        half: of the width at the hip [m]: what lies farther out is a hand.
+        half: of the width at the hip [m]: what lies farther out than hip and thighs is a hand.
     """
     points, triangles = legs.move(slicer.vertices), slicer.triangles
     middle = slicer.vertices[triangles].mean(axis=1)
     room = 0.06
+    # The thighs may be broader than the hip.
+    thighs = [hull for hulls in legs.hulls.values() for hull, y in zip(hulls, legs.y, strict=True) if y > low - room]
+    half = max(half, *(float(np.abs(hull[:, 0]).max()) for hull in thighs))
     near = (middle[:, 1] > low - room) & (middle[:, 1] < high + room) & (np.abs(middle[:, 0]) < half + 0.01)
     corners = points[triangles]
     normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
