@@ -190,6 +190,18 @@ def test_a_tube_is_put_around_the_body():
         drape_pattern(pattern, None, fabric=worn.cloth.fabric)
 
 
+def test_a_tube_that_nothing_holds_falls_off():
+    body = warpflat.Mannequin.from_size("EU 38", resolution_mm=30.0)
+    with pytest.raises(InputError, match=r"falls off: nothing on the body holds the garment"):
+        drape_pattern(
+            tube(0.6, 0.25),
+            body,
+            fabric=warpflat.find_fabric("woven"),
+            placement=Placement(spacing=0.04),
+            device=DEVICE,
+        )
+
+
 def test_a_half_is_lifted_to_both_sides_of_its_surface(tmp_path: Path):
     """A quarter of a cylinder, whose other quarter is its image."""
     radius = 0.1
