@@ -16,20 +16,9 @@ from warpflat.draping.body import Body
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
 from warpflat.fabric.fabric import Fabric
-from warpflat.kernels.drape import (
-    Bending,
-    Contact,
-    Motion,
-    anchor_friction,
-    carry_contact,
-    evaluate_cloth,
-    evaluate_curvature,
-    find_planes,
-    gather_drape,
-    load_contact,
-    stiffen_cloth,
-    stiffen_contact,
-)
+from warpflat.kernels.drape import Bending, Contact, Motion, evaluate_cloth, evaluate_curvature, gather_drape
+from warpflat.kernels.drape_contact import anchor_friction, carry_contact, find_planes, load_contact
+from warpflat.kernels.drape_stiffness import stiffen_cloth, stiffen_contact
 from warpflat.kernels.membrane import Cloth
 from warpflat.model.membrane import make_cloth
 from warpflat.solver.quasi_newton import Point, Solve

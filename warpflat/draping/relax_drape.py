@@ -27,7 +27,7 @@ from warpflat.draping.body import Body
 from warpflat.draping.drape_energy import DrapeEnergy
 from warpflat.draping.options import DrapeOptions
 from warpflat.draping.sewn_cloth import SewnCloth
-from warpflat.kernels.drape import advance_drape, watch_power
+from warpflat.kernels.drape_steps import advance_drape, watch_power
 from warpflat.kernels.reduce import sum_blocks
 from warpflat.solver.quasi_newton import Descent
 
@@ -48,11 +48,13 @@ _LONGEST_ROUND = 0.1
 # A garment that is held by nothing and whose top has sunk by this much has left its place on the body [m].
 _FALLEN = 0.4
 # Rounds of the augmented Lagrangian, after which dynamic relaxation goes on alone, and steps of L-BFGS in each.
-_MOST_ROUNDS, _STEPS_PER_ROUND = 40, 40
+_MOST_ROUNDS, _STEPS_PER_ROUND = 80, 40
 # Tension that is added to the factor [N/m]. Cloth without tension has next to no stiffness across its plane: steps would be too long.
 _PULL = 10.0
 # A round ends when the mean force is at most this share of what is allowed; dynamic relaxation takes over from so many times that.
 _ROUND_ENDS, _NEARLY_AT_REST = 0.4, 20.0
+# It goes on while a hundred steps of it leave less than this share.
+_EASES = 0.8
 _BLOCKS = 64
 
 
@@ -178,9 +180,9 @@ def relax_drape(
     observe = observer or (lambda _: None)
     observe(start)
     lowest = -np.inf if energy.is_held else float(start[:, 1].max()) - _FALLEN
-    fell_off = False
+    fell_off = eases = False
     while steps < options.max_steps and not (converged or fell_off):
-        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS:
+        if steps >= _FIRST_STEPS and rounds < _MOST_ROUNDS and not eases:
             if rounds == 0:
                 energy.load_contact()
             rounds += 1
@@ -189,9 +191,12 @@ def relax_drape(
             fell_off = float(energy.motion.position.numpy()[:, 1].max()) < lowest
             if fell_off or left > _NEARLY_AT_REST * options.tolerance:
                 continue
+        before = residual if eases else np.inf
         relaxation.run(_STEPS_PER_CHECK)
         steps += _STEPS_PER_CHECK
         residual, worst = relaxation.check()
+        # Dynamic relaxation goes on by itself as long as it serves.
+        eases = residual < _EASES * before
         observe(energy.motion.position.numpy())
         converged = steps > _STEPS_PER_CHECK and residual <= options.tolerance and worst <= _WORST * options.tolerance
         if callback is not None:
